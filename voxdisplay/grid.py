@@ -1,0 +1,92 @@
+"""The shape of a display: how (x, y, z) and ``[z, y, x]`` belong together.
+
+This module and ``frame.py`` are the only places where the axes turn round. It knows nothing of
+curves, colours or the wire.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Grid(NamedTuple):
+    """A display's shape in voxels: nx x ny x nz.
+
+    Voxel (x, y, z) is the cube [x, x+1) x [y, y+1) x [z, z+1); arrays over a grid are indexed
+    ``[z, y, x]``, so that a flat array runs along x fastest, which is scan order on the wire
+    (protocol.md, section 2).
+    """
+
+    nx: int
+    ny: int
+    nz: int
+
+    @classmethod
+    def parse(cls, text: str) -> Grid:
+        """Read ``"17x64x40"``.
+
+        Raises
+        ------
+        ValueError
+            If the text is not three positive whole numbers joined by ``x``.
+
+        """
+        match = re.fullmatch(r"(\d{1,5})x(\d{1,5})x(\d{1,5})", text.strip().lower())
+        if not match or "0" in (parts := [part.lstrip("0") or "0" for part in match.groups()]):
+            raise ValueError(f"{text!r} is not a size: write it like 128x128x128")
+        return cls(*map(int, parts))
+
+    def __str__(self) -> str:
+        return f"{self.nx}x{self.ny}x{self.nz}"
+
+    @property
+    def voxels(self) -> int:
+        """Number of voxels."""
+        return math.prod(self)
+
+    @property
+    def array_shape(self) -> tuple[int, int, int]:
+        """Shape of an array over this grid: (nz, ny, nx)."""
+        return self.nz, self.ny, self.nx
+
+    def inside(self, voxels: NDArray[np.integer]) -> NDArray[np.bool_]:
+        """Tell which voxels the grid has.
+
+        Parameters
+        ----------
+        voxels : (N, 3) integer array
+            Columns x, y, z.
+
+        Returns
+        -------
+        (N,) bool array
+
+        """
+        return np.asarray(((voxels >= 0) & (voxels < np.asarray(self))).all(axis=1))
+
+    def index(self, voxels: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Give the scan-order index of voxels: x + nx * (y + ny * z).
+
+        Parameters
+        ----------
+        voxels : (N, 3) integer array
+            Columns x, y, z, all inside the grid: numpy would wrap the others silently.
+
+        Returns
+        -------
+        (N,) int64 array
+
+        """
+        x, y, z = np.asarray(voxels, dtype=np.int64).T
+        return np.asarray(x + self.nx * (y + self.ny * z))
+
+    def unindex(self, index: NDArray[np.integer]) -> NDArray[np.int32]:
+        """Give the voxels, (N, 3) int32 with columns x, y, z, of scan-order indices, (N,)."""
+        rest, x = np.divmod(index, self.nx)
+        z, y = np.divmod(rest, self.ny)
+        return np.stack((x, y, z), axis=1).astype(np.int32)

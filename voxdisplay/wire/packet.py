@@ -1,0 +1,272 @@
+"""Packets as values, and those values as bytes (protocol.md, sections 3 to 5 and 9 to 11).
+
+Each type of packet is a frozen dataclass whose fields have the document's names. ``encode`` gives
+what goes on the wire; ``decode`` takes what ``stream`` has found between two delimiters and checked.
+Knows nothing of what is on its way, nor of what the ops of a packet draw.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, TypeAlias, TypeVar
+
+from cobs import cobs
+
+from voxdisplay.errors import RemoteProtocolError
+from voxdisplay.wire import spec
+
+_CODES = {1: "B", 2: "H", 4: "I"}
+_CRC = struct.Struct("<I")
+_HEADER_BYTES = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packet:
+    """What all packets have: the header of section 4."""
+
+    TYPE: ClassVar[int]
+    SECTION: ClassVar[str]
+    LAYOUT: ClassVar[spec.Layout] = ()
+    BODY: ClassVar[struct.Struct] = struct.Struct("<")
+
+    seq: int = 0
+    frame: int = 0
+    flags: int = 0
+
+    def tail(self) -> bytes:
+        """Give what follows the fields of the layout."""
+        return b""
+
+    @classmethod
+    def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        """Read what follows the fields of the layout, at an offset of the packet."""
+        del tail, offset
+        return {}
+
+
+_P = TypeVar("_P", bound=Packet)
+
+
+def _type(kind: int, section: str, layout: spec.Layout = ()) -> Any:
+    """Make a dataclass a type of packet: its number, its section, and its layout as a struct."""
+
+    def finish(cls: type[_P]) -> type[_P]:
+        cls.TYPE, cls.SECTION, cls.LAYOUT = kind, section, layout
+        cls.BODY = struct.Struct("<" + "".join(_CODES[size] for _, _, size in layout))
+        return cls
+
+    return finish
+
+
+@_type(spec.TYPE_DATA, "6")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Data(Packet):
+    """Ops for the back page."""
+
+    ops: bytes = b""
+
+    def tail(self) -> bytes:
+        return self.ops
+
+    @classmethod
+    def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        del offset
+        return {"ops": tail}
+
+
+@_type(spec.TYPE_HELLO, "5", spec.LAYOUT_HELLO)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hello(Packet):
+    """Opens a session."""
+
+    session: int
+    major: int = spec.VERSION_MAJOR
+    minor: int = spec.VERSION_MINOR
+
+
+@_type(spec.TYPE_STATUS, "9")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status(Packet):
+    """Asks for an ACK; ``seq`` is the tag."""
+
+
+@_type(spec.TYPE_READ, "10", spec.LAYOUT_READ)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Read(Packet):
+    """Asks for the pixels of a range of indices; ``seq`` is the tag."""
+
+    start: int
+    count: int
+
+
+@_type(spec.TYPE_ACK, "9", spec.LAYOUT_ACK)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ack(Packet):
+    """What the device has, and what it has room for."""
+
+    last: int
+    session: int
+    boot: int
+    received: int
+    credit: int
+    digest: int
+    damaged: int
+
+    @property
+    def next(self) -> int:
+        """The lowest sequence number that has not been received."""
+        return self.seq
+
+    @property
+    def shown(self) -> int | None:
+        """Id of the frame on display, or None if this session has shown none."""
+        return self.frame if self.flags & spec.ACK_FLAG_SHOWN else None
+
+
+@_type(spec.TYPE_INFO, "5", spec.LAYOUT_INFO)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Info(Packet):
+    """What the device says of itself."""
+
+    major: int
+    session: int
+    boot: int
+    minor: int
+    format: int
+    nx: int
+    ny: int
+    nz: int
+    pages: int
+    max_payload: int
+    rx_buffer: int
+    refresh: int
+    features: int
+    name: str = ""
+    firmware: str = ""
+    serial: str = ""
+
+    def has(self, feature: int) -> bool:
+        """Tell whether the device announced a feature, ``spec.FEATURE_...``."""
+        return bool(self.features >> feature & 1)
+
+    def tail(self) -> bytes:
+        texts = (text.encode() for text in (self.name, self.firmware, self.serial))
+        return b"".join(bytes((len(text),)) + text for text in texts)
+
+    @classmethod
+    def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        texts = {}
+        at = 0
+        for name in ("name", "firmware", "serial"):
+            end = at + 1 + tail[at] if at < len(tail) else len(tail) + 1
+            if end > len(tail):
+                raise RemoteProtocolError(
+                    f"INFO ends inside its string {name!r}", section="5", offset=offset + at
+                )
+            texts[name] = tail[at + 1 : end].decode(errors="replace")
+            at = end
+        return texts
+
+
+@_type(spec.TYPE_PAGE, "10", spec.LAYOUT_PAGE)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page(Packet):
+    """Pixels of a range of indices, as ops."""
+
+    start: int
+    count: int
+    ops: bytes = b""
+
+    def tail(self) -> bytes:
+        return self.ops
+
+    @classmethod
+    def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        del offset
+        return {"ops": tail}
+
+
+@_type(spec.TYPE_ERROR, "11", spec.LAYOUT_ERROR)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Error(Packet):
+    """What the device refused, and where."""
+
+    code: int
+    session: int
+    offset: int
+    text: str = ""
+
+    def tail(self) -> bytes:
+        return self.text.encode()
+
+    @classmethod
+    def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        del offset
+        return {"text": tail.decode(errors="replace")}
+
+
+AnyPacket: TypeAlias = Data | Hello | Status | Read | Ack | Info | Page | Error
+TYPES: dict[int, type[Packet]] = {
+    cls.TYPE: cls for cls in (Data, Hello, Status, Read, Ack, Info, Page, Error)
+}
+
+
+def pack(packet: Packet) -> bytes:
+    """Give a packet's bytes with the check value, before COBS."""
+    body = packet.BODY.pack(*(getattr(packet, name, 0) for name, _, _ in packet.LAYOUT))
+    head = bytes((packet.TYPE << 4 | packet.flags, packet.seq, packet.frame))
+    data = head + body + packet.tail()
+    return data + _CRC.pack(zlib.crc32(data))
+
+
+def encode(packet: Packet) -> bytes:
+    """Give what goes on the wire for a packet: COBS, and the 00 that ends it (section 3)."""
+    return bytes(cobs.encode(pack(packet))) + b"\0"
+
+
+def intact(raw: bytes) -> bool:
+    """Tell whether bytes out of COBS are a packet: long enough, and the check value holds."""
+    return (
+        len(raw) >= spec.LIMIT_OVERHEAD
+        and zlib.crc32(raw[: -_CRC.size]) == _CRC.unpack_from(raw, len(raw) - _CRC.size)[0]
+    )
+
+
+def decode(raw: bytes) -> Packet:
+    """Read an intact packet: header, payload and check value, out of COBS.
+
+    Raises
+    ------
+    RemoteProtocolError
+        If the type is not known, or the payload too short for it.
+
+    """
+    kind = raw[0] >> 4
+    cls = TYPES.get(kind)
+    if cls is None:
+        raise RemoteProtocolError(f"packet of unknown type {kind}", section="4", raw=raw)
+    payload = raw[_HEADER_BYTES : -_CRC.size]
+    size = cls.BODY.size
+    if len(payload) < size:
+        raise RemoteProtocolError(
+            f"{cls.__name__.upper()} has {len(payload)} bytes of payload, fewer than {size}",
+            section=cls.SECTION,
+            offset=_HEADER_BYTES + len(payload),
+            raw=raw,
+        )
+    known = {field.name for field in fields(cls)}
+    values = zip((name for name, _, _ in cls.LAYOUT), cls.BODY.unpack_from(payload), strict=True)
+    try:
+        tail = cls.read_tail(payload[size:], _HEADER_BYTES + size)
+    except RemoteProtocolError as error:
+        error.raw = raw
+        raise
+    return cls(
+        seq=raw[1],
+        frame=raw[2],
+        flags=raw[0] & 0x0F,
+        **{name: value for name, value in values if name in known},
+        **tail,
+    )

@@ -1,0 +1,104 @@
+"""Bytes as they come from a pipe -> packets (protocol.md, section 3): delimiting, CRC, resync.
+
+Any bytes whatever may be fed in any portions; what is no packet is counted and dropped, in bounded
+memory. Knows nothing of what the packets mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cobs import cobs
+
+from voxdisplay.errors import RemoteProtocolError
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+
+# A longest packet out of a longest payload, with COBS's byte for each 254 and one more.
+_LONGEST = spec.LIMIT_MAX_PAYLOAD + spec.LIMIT_OVERHEAD
+_LONGEST_SEGMENT = _LONGEST + _LONGEST // 254 + 1
+_KEPT_NOISE = 64
+
+
+@dataclass(slots=True)
+class StreamCounters:
+    """What a `PacketStream` has seen. ``noise_bytes`` are all bytes that made no packet."""
+
+    packets: int = 0
+    damaged: int = 0
+    noise_bytes: int = 0
+
+
+class PacketStream:
+    """An incremental reader of packets.
+
+    Attributes
+    ----------
+    counters : StreamCounters
+        What has come so far.
+    noise : bytes
+        The first bytes that were no packet, at most 64: they tell a person what is really there.
+
+    """
+
+    def __init__(self) -> None:
+        self.counters = StreamCounters()
+        self.noise = b""
+        self._segment = bytearray()
+        self._overlong = 0
+
+    def feed(self, data: bytes) -> Iterator[packets.Packet]:
+        """Take bytes, give the packets that they complete, one by one.
+
+        Raises
+        ------
+        RemoteProtocolError
+            If an intact packet breaks protocol.md. The packets behind it are not lost: go on with
+            ``feed(b"")``.
+
+        """
+        self._segment += data
+        return self._packets()
+
+    def _packets(self) -> Iterator[packets.Packet]:
+        while (end := self._segment.find(0)) >= 0:
+            segment = bytes(self._segment[:end])
+            del self._segment[: end + 1]
+            if self._overlong:
+                self._drop(segment, self._overlong + end)
+                self._overlong = 0
+                continue
+            raw = self._unpack(segment)
+            if raw is not None:
+                self.counters.packets += 1
+                yield packets.decode(raw)
+        if len(self._segment) > _LONGEST_SEGMENT:
+            self._keep_noise(self._segment)
+            self._overlong += len(self._segment)
+            self._segment.clear()
+
+    def _unpack(self, segment: bytes) -> bytes | None:
+        if len(segment) < spec.LIMIT_MIN_SEGMENT:
+            self.counters.noise_bytes += len(segment)
+            self._keep_noise(segment)
+            return None
+        try:
+            raw = bytes(cobs.decode(segment))
+        except cobs.DecodeError:
+            raw = b""
+        if len(raw) <= _LONGEST and packets.intact(raw):
+            return raw
+        self._drop(segment, len(segment))
+        return None
+
+    def _drop(self, segment: bytes, size: int) -> None:
+        self.counters.damaged += 1
+        self.counters.noise_bytes += size
+        self._keep_noise(segment)
+
+    def _keep_noise(self, data: bytes | bytearray) -> None:
+        self.noise = (self.noise + bytes(data[:_KEPT_NOISE]))[:_KEPT_NOISE]
+
+
+__all__ = ["PacketStream", "RemoteProtocolError", "StreamCounters"]
