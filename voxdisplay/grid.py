@@ -69,7 +69,7 @@ class Grid(NamedTuple):
         """
         return np.asarray(((voxels >= 0) & (voxels < np.asarray(self))).all(axis=1))
 
-    def index(self, voxels: NDArray[np.integer]) -> NDArray[np.int64]:
+    def index_of(self, voxels: NDArray[np.integer]) -> NDArray[np.int64]:
         """Give the scan-order index of voxels: x + nx * (y + ny * z).
 
         Parameters
@@ -85,7 +85,7 @@ class Grid(NamedTuple):
         x, y, z = np.asarray(voxels, dtype=np.int64).T
         return np.asarray(x + self.nx * (y + self.ny * z))
 
-    def unindex(self, index: NDArray[np.integer]) -> NDArray[np.int32]:
+    def voxels_at(self, index: NDArray[np.integer]) -> NDArray[np.int32]:
         """Give the voxels, (N, 3) int32 with columns x, y, z, of scan-order indices, (N,)."""
         rest, x = np.divmod(index, self.nx)
         z, y = np.divmod(rest, self.ny)
