@@ -1,0 +1,239 @@
+"""Smooth curves through or along given points: Bezier, B-spline (and NURBS), Catmull-Rom.
+
+All have exact derivatives. Points are (n, 3) arrays, in voxels. Knows formulas only.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from voxdisplay.curves import checks
+from voxdisplay.curves.curve import Curve, Floats
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+MAX_DEGREE = 64
+"""Highest degree of a Bezier curve or B-spline; the work grows with its square."""
+
+
+class Bezier(Curve):
+    """A Bezier curve of any degree, 0 <= t <= 1, by de Casteljau's algorithm.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        The control points, 2 <= n <= `MAX_DEGREE` + 1; the degree is n - 1.
+    closed : bool, optional
+        None: found from the end points.
+
+    """
+
+    t_range = (0.0, 1.0)
+
+    def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
+        self.closed = closed
+        self._points = checks.points("points", points, least=2)
+        _check_degree("points", len(self._points) - 1)
+        self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
+
+    def position(self, t: Floats) -> Floats:
+        """Give the points at t, (n,), as a (3, n) float64 array."""
+        return _de_casteljau(self._points, t)
+
+    def derivative(self, t: Floats) -> Floats:
+        """Give dP/dt at t, (n,), as a (3, n) float64 array."""
+        return _de_casteljau(self._slopes, t)
+
+
+def _de_casteljau(points: Floats, t: Floats) -> Floats:
+    layer = np.broadcast_to(points[:, :, None], (*points.shape, t.size))
+    while len(layer) > 1:
+        layer = layer[:-1] * (1 - t) + layer[1:] * t
+    return np.array(layer[0])
+
+
+class BSpline(Curve):
+    """A B-spline; with weights, a NURBS curve.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        The control points, n > degree.
+    degree : int, optional
+    knots : (n + degree + 1,) array, optional
+        Not descending; t runs from ``knots[degree]`` to ``knots[n]``. A knot inside that range
+        may stand ``degree`` times at most, so that the curve has no gap. Default: 0, 1, 2, ... with
+        the ends repeated, so that the curve begins at the first point and ends at the last.
+    weights : (n,) array, optional
+        Positive. Default: all alike.
+    closed : bool, optional
+        True without knots: the curve is periodic, as smooth where it closes as anywhere.
+
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        degree: float = 3,
+        knots: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        *,
+        closed: bool | None = None,
+    ) -> None:
+        self.closed = closed
+        self._degree = p = checks.whole("degree", degree)
+        if p < 1:
+            raise checks.ArgumentError("degree", f"must be 1 or more, not {p}")
+        _check_degree("degree", p)
+        control = checks.points("points", points, least=p + 1)
+        self._rational = weights is not None
+        if weights is not None:
+            control = _weighted(control, weights)
+        if knots is None and closed:
+            control = np.concatenate((control, control[:p]))
+            self._knots = np.arange(-p, len(control) + 1.0)
+        elif knots is None:
+            inner = np.arange(len(control) - p + 1.0)
+            self._knots = np.concatenate((np.zeros(p), inner, np.full(p, inner[-1])))
+        else:
+            self._knots = _checked_knots(knots, len(control), p)
+        self._points = control
+        n = len(control)
+        self.t_range = (float(self._knots[p]), float(self._knots[n]))
+        values, counts = np.unique(self._knots[p + 1 : n], return_counts=True)
+        self.breaks = values[counts >= p]
+        # The derivative is a B-spline too, of one degree less. Where its denominator is 0, it has
+        # no weight anywhere in the range.
+        length = self._knots[p + 1 : -1] - self._knots[1 : -p - 1]
+        self._slopes = p * np.diff(control, axis=0) / np.where(length, length, 1.0)[:, None]
+
+    def position(self, t: Floats) -> Floats:
+        """Give the points at t, (n,), as a (3, n) float64 array."""
+        points = _de_boor(self._points, self._knots, self._degree, t)
+        return np.asarray(points[:3] / points[3]) if self._rational else points
+
+    def derivative(self, t: Floats) -> Floats:
+        """Give dP/dt at t, (n,), as a (3, n) float64 array; at a kink, of what comes after it."""
+        slopes = _de_boor(self._slopes, self._knots[1:-1], self._degree - 1, t)
+        if not self._rational:
+            return slopes
+        points = _de_boor(self._points, self._knots, self._degree, t)
+        return np.asarray((slopes[:3] - points[:3] / points[3] * slopes[3]) / points[3])
+
+
+def _weighted(points: Floats, weights: ArrayLike) -> Floats:
+    """Give homogeneous coordinates, (n, 4): x w, y w, z w, w."""
+    factors = checks.array("weights", weights, (len(points),))
+    if (factors <= 0).any():
+        raise checks.ArgumentError("weights", f"must be positive, not {factors.min():g}")
+    return np.column_stack((points * factors[:, None], factors))
+
+
+def _checked_knots(knots: ArrayLike, n: int, p: int) -> Floats:
+    values = checks.array("knots", knots, (None,))
+    if len(values) != n + p + 1:
+        raise checks.ArgumentError(
+            "knots", f"are {len(values)}, not {n + p + 1}: {n} points + degree {p} + 1"
+        )
+    if (np.diff(values) < 0).any():
+        raise checks.ArgumentError("knots", "must not descend")
+    if values[p] == values[n]:
+        raise checks.ArgumentError("knots", "leave no range for t")
+    inside = values[(values > values[p]) & (values < values[n])]
+    often, counts = np.unique(inside, return_counts=True)
+    if (counts > p).any():
+        raise checks.ArgumentError(
+            "knots", f"have {often[counts > p][0]:g} more than {p} times, which tears the curve"
+        )
+    return values
+
+
+def _de_boor(points: Floats, knots: Floats, p: int, t: Floats) -> Floats:
+    """Evaluate a B-spline, (dimensions, n), by de Boor's algorithm, for all t at once."""
+    # The span of each t: the last k with knots[k] <= t < knots[k + 1]; at the end, the last one
+    # that has a length.
+    last = np.searchsorted(knots, knots[len(points)], side="left") - 1
+    k = np.clip(np.searchsorted(knots, t, side="right") - 1, p, last)
+    layer = [points[k - p + j].T for j in range(p + 1)]
+    for r in range(1, p + 1):
+        for j in range(p, r - 1, -1):
+            low, high = knots[k - p + j], knots[k + 1 + j - r]
+            f = (t - low) / (high - low)
+            layer[j] = layer[j - 1] * (1 - f) + layer[j] * f
+    return layer[p]
+
+
+class CatmullRom(Curve):
+    """A smooth curve through points: the centripetal Catmull-Rom spline.
+
+    Between two points, t grows by the square root of their distance, which keeps the curve from
+    overshooting and from looping. An open curve leaves and arrives as if its neighbouring point
+    were mirrored at the end.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        At least two that differ; a point equal to the one before it counts once.
+    closed : bool, optional
+        True: the curve goes on to the first point, smoothly.
+
+    """
+
+    def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
+        self.closed = closed
+        nodes = checks.points("points", points, least=2)
+        if closed:
+            nodes = np.concatenate((nodes, nodes[:1]))
+        nodes = nodes[np.r_[True, (np.diff(nodes, axis=0) != 0).any(axis=1)]]
+        if len(nodes) < 2:
+            raise checks.ArgumentError("points", "are all the same")
+        ends = (
+            (nodes[-2], nodes[1])
+            if closed
+            else (2 * nodes[0] - nodes[1], 2 * nodes[-1] - nodes[-2])
+        )
+        chords = np.diff(np.concatenate((ends[:1], nodes, ends[1:])), axis=0)
+        # hypot, which is 0 for none but equal points
+        steps = np.sqrt(np.hypot(np.hypot(chords[:, 0], chords[:, 1]), chords[:, 2]))[:, None]
+        rates = chords / steps
+        before, after = steps[:-1], steps[1:]
+        # The slope at a node, of the parabola through it and its neighbours.
+        self._slopes = (rates[:-1] * after + rates[1:] * before) / (before + after)
+        self._nodes = nodes
+        self._t = np.concatenate(([0.0], np.cumsum(steps[1:-1])))
+        self.t_range = (0.0, float(self._t[-1]))
+        # Where it comes back the way it went, it stops and turns.
+        stops = np.linalg.norm(self._slopes[1:-1], axis=1) <= 1e-9 * steps[1:-2, 0]
+        self.breaks = self._t[1:-1][stops]
+
+    def position(self, t: Floats) -> Floats:
+        """Give the points at t, (n,), as a (3, n) float64 array."""
+        a, b, slope_a, slope_b, h, f = self._span(t)
+        g = 1 - f
+        return (
+            (1 + 2 * f) * g * g * a
+            + f * g * g * h * slope_a
+            + f * f * (3 - 2 * f) * b
+            - f * f * g * h * slope_b
+        )
+
+    def derivative(self, t: Floats) -> Floats:
+        """Give dP/dt at t, (n,), as a (3, n) float64 array."""
+        a, b, slope_a, slope_b, h, f = self._span(t)
+        g = 1 - f
+        return 6 * f * g * (b - a) / h + g * (1 - 3 * f) * slope_a + f * (3 * f - 2) * slope_b
+
+    def _span(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+        """Give, for each t, its two nodes, their slopes, their distance in t, the place between."""
+        i = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
+        h = self._t[i + 1] - self._t[i]
+        nodes, slopes = self._nodes.T, self._slopes.T
+        return nodes[:, i], nodes[:, i + 1], slopes[:, i], slopes[:, i + 1], h, (t - self._t[i]) / h
+
+
+def _check_degree(name: str, degree: int) -> None:
+    if degree > MAX_DEGREE:
+        raise checks.ArgumentError(name, f"make degree {degree}: more than {MAX_DEGREE}")

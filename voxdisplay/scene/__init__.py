@@ -1,0 +1,9 @@
+"""Scene files: what they may say, and the curves and colours they mean.
+
+Knows curves, colours and the grid; does not know voxels, frames or displays.
+"""
+
+from voxdisplay.scene.model import Item, Scene
+from voxdisplay.scene.read import load_scene, read_scene
+
+__all__ = ["Item", "Scene", "load_scene", "read_scene"]

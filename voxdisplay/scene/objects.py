@@ -1,0 +1,304 @@
+"""What a scene file may say: one Struct for each type of object, and the curve it means.
+
+The JSON Schema is derived from these. Knows the keys and their types; the values are checked by
+the curves. In angles, ``deg`` is a constant: ``"90*deg"``.
+"""
+
+from abc import abstractmethod
+from typing import Annotated, get_args
+
+from msgspec import Meta, Struct, field
+
+from voxdisplay import curves
+from voxdisplay.curves.expression import MAX_LENGTH
+from voxdisplay.curves.params import MAX_PARAMS
+from voxdisplay.errors import CurveError
+from voxdisplay.scene.place import Place
+
+MAX_SIDE = 65535
+
+Number = Annotated[
+    float | Annotated[str, Meta(max_length=MAX_LENGTH)],
+    Meta(description="A number, or an expression in numbers, constants and the scene's params."),
+]
+Formula = Annotated[
+    float | Annotated[str, Meta(max_length=MAX_LENGTH)],
+    Meta(description="An expression in t, numbers, constants and the scene's params."),
+]
+Vector = tuple[Number, Number, Number]
+Side = Annotated[int, Meta(ge=1, le=MAX_SIDE)]
+Color = Annotated[
+    str | Annotated[list[str], Meta(min_length=1)],
+    Meta(
+        description="#rgb, #rrggbb or a CSS colour name; or a list of them, spread along the curve."
+    ),
+]
+
+
+class Thing(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What all objects can say."""
+
+    color: Color = "white"
+    closed: bool | None = None
+
+    @abstractmethod
+    def curve(self, place: Place) -> curves.Curve:
+        """Make the curve; raise SceneError or CurveError."""
+
+
+class Parametric(Thing, tag="parametric", frozen=True):
+    """A curve given by three expressions of t, a <= t <= b, and optionally their derivatives."""
+
+    x: Formula
+    y: Formula
+    z: Formula
+    t: tuple[Number, Number]
+    dx: Formula | None = None
+    dy: Formula | None = None
+    dz: Formula | None = None
+
+    def curve(self, place: Place) -> curves.Parametric:
+        """Make the curve."""
+        x, y, z = (place.formula(key, getattr(self, key)) for key in ("x", "y", "z"))
+        dx, dy, dz = (
+            None if source is None else place.formula(key, source)
+            for key, source in (("dx", self.dx), ("dy", self.dy), ("dz", self.dz))
+        )
+        a, b = place.row("t", self.t).tolist()
+        return curves.Parametric(x, y, z, t=(a, b), closed=self.closed, dx=dx, dy=dy, dz=dz)
+
+
+class Segment(Thing, tag="segment", frozen=True):
+    """A straight line."""
+
+    start: Vector = field(name="from")
+    end: Vector = field(name="to")
+
+    def curve(self, place: Place) -> curves.Segment:
+        """Make the curve."""
+        return curves.Segment(
+            place.row("from", self.start), place.row("to", self.end), closed=self.closed
+        )
+
+
+class Polyline(Thing, tag="polyline", frozen=True):
+    """Straight lines from point to point, and back to the first if closed is true."""
+
+    points: list[Vector]
+
+    def curve(self, place: Place) -> curves.Polyline:
+        """Make the curve."""
+        return curves.Polyline(place.table("points", self.points), closed=self.closed)
+
+
+class Arc(Thing, tag="arc", frozen=True):
+    """A part of a circle, from the angle start to the angle end, in radians.
+
+    With the normal [0, 0, 1], angle 0 is +x and "90*deg" is +y.
+    """
+
+    center: Vector
+    radius: Number
+    start: Number
+    end: Number
+    normal: Vector = (0.0, 0.0, 1.0)
+
+    def curve(self, place: Place) -> curves.Arc:
+        """Make the curve."""
+        return curves.Arc(
+            place.row("center", self.center),
+            place.number("radius", self.radius),
+            place.number("start", self.start),
+            place.number("end", self.end),
+            place.row("normal", self.normal),
+            closed=self.closed,
+        )
+
+
+class Circle(Thing, tag="circle", frozen=True):
+    """A circle in the plane across normal."""
+
+    center: Vector
+    radius: Number
+    normal: Vector = (0.0, 0.0, 1.0)
+
+    def curve(self, place: Place) -> curves.Circle:
+        """Make the curve."""
+        return curves.Circle(
+            place.row("center", self.center),
+            place.number("radius", self.radius),
+            place.row("normal", self.normal),
+            closed=self.closed is not False,
+        )
+
+
+class Ellipse(Thing, tag="ellipse", frozen=True):
+    """An ellipse, of two half axes: vectors from its center."""
+
+    center: Vector
+    axes: tuple[Vector, Vector]
+
+    def curve(self, place: Place) -> curves.Ellipse:
+        """Make the curve."""
+        return curves.Ellipse(
+            place.row("center", self.center),
+            place.table("axes", self.axes),
+            closed=self.closed is not False,
+        )
+
+
+class Helix(Thing, tag="helix", frozen=True):
+    """A helix: begins beside center at the angle start, and advances by pitch in each turn."""
+
+    center: Vector
+    radius: Number
+    pitch: Number
+    turns: Number
+    axis: Vector = (0.0, 0.0, 1.0)
+    start: Number = 0.0
+
+    def curve(self, place: Place) -> curves.Helix:
+        """Make the curve."""
+        return curves.Helix(
+            place.row("center", self.center),
+            place.number("radius", self.radius),
+            place.number("pitch", self.pitch),
+            place.number("turns", self.turns),
+            place.row("axis", self.axis),
+            start=place.number("start", self.start),
+            closed=self.closed,
+        )
+
+
+class Lissajous(Thing, tag="lissajous", frozen=True):
+    """center + amplitude * sin(frequency * t + phase), 0 <= t <= tau, for x, y and z."""
+
+    center: Vector
+    amplitude: Vector
+    frequency: Vector
+    phase: Vector = (0.0, 0.0, 0.0)
+
+    def curve(self, place: Place) -> curves.Lissajous:
+        """Make the curve."""
+        return curves.Lissajous(
+            place.row("center", self.center),
+            place.row("amplitude", self.amplitude),
+            place.row("frequency", self.frequency),
+            place.row("phase", self.phase),
+            closed=self.closed,
+        )
+
+
+class TorusKnot(Thing, tag="torus_knot", frozen=True):
+    """p times around the axis while q times around the tube; p = 2, q = 3 is the trefoil.
+
+    major is the radius of the middle circle of the torus, minor that of its tube.
+    """
+
+    p: Number
+    q: Number
+    center: Vector
+    major: Number
+    minor: Number
+    axis: Vector = (0.0, 0.0, 1.0)
+
+    def curve(self, place: Place) -> curves.TorusKnot:
+        """Make the curve."""
+        return curves.TorusKnot(
+            place.number("p", self.p),
+            place.number("q", self.q),
+            place.row("center", self.center),
+            place.number("major", self.major),
+            place.number("minor", self.minor),
+            place.row("axis", self.axis),
+            closed=self.closed is not False,
+        )
+
+
+class Bezier(Thing, tag="bezier", frozen=True):
+    """A Bezier curve; its degree is one less than its control points."""
+
+    points: list[Vector]
+
+    def curve(self, place: Place) -> curves.Bezier:
+        """Make the curve."""
+        return curves.Bezier(place.table("points", self.points), closed=self.closed)
+
+
+class BSpline(Thing, tag="bspline", frozen=True):
+    """A B-spline; with weights, a NURBS curve. There is one knot for each point, and degree + 1."""
+
+    points: list[Vector]
+    degree: Number = 3.0
+    knots: list[Number] | None = None
+    weights: list[Number] | None = None
+
+    def curve(self, place: Place) -> curves.BSpline:
+        """Make the curve."""
+        return curves.BSpline(
+            place.table("points", self.points),
+            place.number("degree", self.degree),
+            None if self.knots is None else place.row("knots", self.knots),
+            None if self.weights is None else place.row("weights", self.weights),
+            closed=self.closed,
+        )
+
+
+class CatmullRom(Thing, tag="catmull_rom", frozen=True):
+    """A smooth curve through points, and on to the first if closed is true."""
+
+    points: list[Vector]
+
+    def curve(self, place: Place) -> curves.CatmullRom:
+        """Make the curve."""
+        return curves.CatmullRom(place.table("points", self.points), closed=self.closed)
+
+
+class Points(Thing, tag="points", frozen=True):
+    """Ordered points, joined by straight lines: either inline or in a file beside the scene.
+
+    The file is a .csv of three columns x, y, z, or a .npy array of shape (n, 3).
+    """
+
+    points: list[Vector] | None = None
+    file: str | None = None
+
+    def curve(self, place: Place) -> curves.Points:
+        """Make the curve."""
+        if self.points is not None and self.file is None:
+            points = place.table("points", self.points)
+        elif self.file is not None and self.points is None:
+            points = place.file("file", self.file)
+        else:
+            raise CurveError("points needs either the key 'points' or the key 'file'")
+        return curves.Points(points, closed=self.closed)
+
+
+Object = (
+    Parametric
+    | Segment
+    | Polyline
+    | Arc
+    | Circle
+    | Ellipse
+    | Helix
+    | Lissajous
+    | TorusKnot
+    | Bezier
+    | BSpline
+    | CatmullRom
+    | Points
+)
+TYPES = {str(thing.__struct_config__.tag): thing for thing in get_args(Object)}
+
+
+class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """A scene: objects, in the order in which they are drawn.
+
+    Coordinates are in voxels: voxel (i, j, k) is the cube [i, i+1) x [j, j+1) x [k, k+1).
+    """
+
+    objects: list[Object]
+    size: tuple[Side, Side, Side] | None = None
+    params: Annotated[dict[str, Number], Meta(max_length=MAX_PARAMS)] = {}
+    schema: str = field(name="$schema", default="")
