@@ -1,0 +1,128 @@
+"""What holds for sequences along all curves: connectivity, ends, distance, symmetries, batches."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from space_curves import Function, chain, fourier_curve, moved, turned
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelize import Sequence, measure, voxelize, voxelize_many
+
+seeds = st.integers(0, 2**32 - 1)
+fouriers = st.builds(
+    lambda seed, kind, closed: fourier_curve(seed, kind, closed=closed),
+    seeds,
+    st.sampled_from(["smooth", "rough", "tiny"]),
+    st.booleans(),
+)
+# Vertices on corners, faces and centres of voxels bring about every tie there is.
+lattice = st.integers(-40, 40).map(lambda n: n / 2)
+anywhere = st.floats(-20, 20, allow_subnormal=False)
+coordinates = lattice | anywhere
+polylines = st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=2, max_size=6).map(
+    lambda vertices: chain(np.array(vertices, dtype=float))
+)
+cusps = st.builds(
+    lambda p, q, size, x, y: Function(
+        lambda t: (x + size * np.abs(t) ** p, y + size * np.sign(t) * np.abs(t) ** q, 0.3 * t),
+        -1,
+        1,
+    ),
+    st.sampled_from([0.5, 2 / 3, 1, 2, 3]),
+    st.sampled_from([1 / 3, 1, 2, 3, 5]),
+    st.floats(0.1, 40),
+    coordinates,
+    coordinates,
+)
+curves = fouriers | polylines | cusps
+
+
+def check(sequence: Sequence, curve: Curve) -> None:
+    voxels = sequence.voxels
+    ends = np.floor(curve.position(np.array(curve.t_range))).T
+    assert np.array_equal(voxels[0], ends[0])
+    assert sequence.closed or np.array_equal(voxels[-1], ends[1])
+    assert sequence.starts.tolist() == [0]
+    assert measure.gaps(voxels, closed=sequence.closed).size == 0
+    assert not (np.diff(voxels, axis=0) == 0).all(axis=1).any()
+    distance = measure.distances(voxels, curve)
+    assert distance.max() <= 0.8661
+    inner = distance[1:] if sequence.closed else distance[1:-1]
+    assert inner.max(initial=0.0) <= 0.7072
+    violations = measure.neighbour_violations(voxels, closed=sequence.closed)
+    assert set(violations) <= set(sequence.contact_pairs.reshape(-1))
+    assert np.all(np.diff(sequence.t) >= 0)
+    # Nearest in the maximum norm, two voxels; the curve may be as far in all three axes.
+    assert measure.coverage(voxels, curve) <= 2.5 * np.sqrt(3)
+
+
+@given(curves)
+@settings(max_examples=150, deadline=None)
+def test_guarantees(curve: Curve) -> None:
+    check(voxelize(curve), curve)
+
+
+@given(curves, st.tuples(*[st.integers(-3, 3).map(lambda n: 32 * n)] * 3))
+@settings(max_examples=60, deadline=None)
+def test_moving_by_whole_voxels_moves_the_voxels(curve: Curve, shift: tuple[int, int, int]) -> None:
+    # Moving rounds coordinates: let them be multiples of 2^-30, so that nothing is lost.
+    def rounded(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(np.round(curve.position(t) * 2**30) / 2**30)
+
+    exact = Function(rounded, *curve.t_range)
+    here, there = voxelize(exact), voxelize(moved(exact, shift))
+    assert np.array_equal(here.voxels + np.array(shift), there.voxels)
+    assert here.closed == there.closed
+
+
+@given(
+    seeds,
+    st.sampled_from(["smooth", "rough"]),
+    st.booleans(),
+    st.permutations([0, 1, 2]).map(tuple),
+)
+@settings(max_examples=40, deadline=None)
+def test_turning_the_axes_turns_the_voxels(
+    seed: int, kind: str, closed: bool, axes: tuple[int, ...]
+) -> None:
+    curve = fourier_curve(seed, kind, closed=closed)  # where ties do not happen
+    here, there = voxelize(curve), voxelize(turned(curve, axes))
+    assert np.array_equal(here.voxels[:, list(axes)], there.voxels)
+
+
+@given(st.lists(curves, min_size=1, max_size=8))
+@settings(max_examples=25, deadline=None)
+def test_a_batch_gives_what_each_curve_gives_alone(batch: list[Curve]) -> None:
+    for curve, many in zip(batch, voxelize_many(batch), strict=True):
+        alone = voxelize(curve)
+        assert np.array_equal(alone.voxels, many.voxels)
+        assert np.array_equal(alone.t, many.t)
+        assert alone.closed == many.closed
+
+
+@given(seeds, st.floats(0, 1))
+@settings(max_examples=40, deadline=None)
+def test_a_jump_is_found_anywhere(seed: int, where: float) -> None:
+    smooth = fourier_curve(seed, "smooth", closed=False)
+    at = 0.1 + 6 * where
+
+    def function(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        x, y, z = smooth.position(t)
+        return x, y + 40 * (t > at), z
+
+    sequence = voxelize(Function(function, *smooth.t_range))
+    assert len(sequence.starts) == 2
+    assert measure.gaps(sequence.voxels, starts=sequence.starts).size == 0
+    before, after = sequence.starts[1] - 1, sequence.starts[1]
+    assert sequence.t[before] <= at <= sequence.t[after]
+    assert sequence.t[after] - sequence.t[before] < 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["smooth", "rough", "tiny"])
+@pytest.mark.parametrize("closed", [False, True])
+def test_guarantees_of_a_thousand(kind: str, closed: bool) -> None:
+    many = [fourier_curve(seed, kind, closed=closed) for seed in range(1000)]
+    for curve, sequence in zip(many, voxelize_many(many), strict=True):
+        check(sequence, curve)

@@ -1,0 +1,63 @@
+"""From curves to voxels: ordered, connected sequences along parametric space curves.
+
+``voxelize(curve)`` gives a `Sequence`; `measure` judges any list of voxels. This package knows
+curves only by their positions, and neither displays nor colours nor the wire. It needs numpy.
+
+The package is callable: as ``voxdisplay.voxelize`` it is both the home of these modules and the
+function users type.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from types import ModuleType
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelize import measure
+from voxdisplay.voxelize.digitise import digitise
+from voxdisplay.voxelize.sequence import Report, Sequence, clip
+
+__all__ = ["Report", "Sequence", "clip", "measure", "voxelize", "voxelize_many"]
+
+
+def voxelize(curve: Curve, *, method: str = "grid-plane") -> Sequence:
+    """Find the voxels along a curve.
+
+    Parameters
+    ----------
+    curve : Curve
+        Any continuous curve; where it jumps, the sequence is split.
+    method : {"grid-plane"}
+        How: see `grid_plane`.
+
+    Returns
+    -------
+    Sequence
+        26-connected; the first voxel holds the curve's first point, the last its last; others
+        are within 0.7072 of the curve. Each has exactly two neighbours but for the contacts that
+        ``.contact_pairs`` lists.
+
+    Raises
+    ------
+    CurveError
+        If the curve cannot be evaluated, runs off, or has no end.
+
+    """
+    return voxelize_many([curve], method=method)[0]
+
+
+def voxelize_many(curves: Iterable[Curve], *, method: str = "grid-plane") -> list[Sequence]:
+    """Find the voxels along many curves, much faster than one by one, and exactly the same."""
+    if method != "grid-plane":
+        raise ValueError(f"there is no method {method!r}: take 'grid-plane'")
+    return list(digitise(curves))
+
+
+class _Callable(ModuleType):
+    """A module that forwards calls to its function `voxelize`."""
+
+    __call__ = staticmethod(voxelize)
+
+
+sys.modules[__name__].__class__ = _Callable

@@ -1,0 +1,162 @@
+"""Where curves are: checked positions of many curves at once.
+
+Parameters and points only; this module must not know what a voxel is. All arrays hold many curves
+(or pieces of curves), one after the other, so that a thousand short curves cost a thousand calls
+of ``Curve.position`` and nothing else a thousand times. What a curve gets never depends on its
+neighbours in the batch: decisions are taken per interval, and positions asked for per curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelize.ranges import spread
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+AXES = "xyz"
+
+# Voxel indices are int32, and sums and differences of a few of them must be as well.
+FARTHEST = 2.0**30
+# Points per call of Curve.position: three rows of this many stay in a core's cache.
+CALL = 1 << 14
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Points along pieces of curves.
+
+    Attributes
+    ----------
+    piece : (K,) int64 array
+        The piece each point belongs to, ascending.
+    t : (K,) float64 array
+        Parameters, ascending within a piece.
+    points : (3, K) float64 array
+        P(t), rows x, y, z, in voxels.
+    curve : (pieces,) int64 array
+        The curve that each piece is a part of, ascending.
+
+    """
+
+    piece: Ints
+    t: Floats
+    points: Floats
+    curve: Ints
+
+    @property
+    def joined(self) -> Bools:
+        """Which of the K - 1 steps stay inside a piece."""
+        return np.asarray(self.piece[1:] == self.piece[:-1])
+
+    @property
+    def bounds(self) -> Ints:
+        """Index of the first sample of each piece, and K: (pieces + 1,)."""
+        return np.searchsorted(self.piece, np.arange(self.curve.size + 1))
+
+
+class Batch:
+    """Curves that are voxelised together.
+
+    Parameters
+    ----------
+    curves : iterable of Curve
+        Each with a finite range a < b.
+
+    Raises
+    ------
+    CurveError
+        If a range is not finite or empty.
+
+    """
+
+    def __init__(self, curves: Iterable[Curve]) -> None:
+        self.curves = list(curves)
+        ranges = np.array([curve.t_range for curve in self.curves], dtype=float).reshape(-1, 2)
+        self.first, self.last = ranges.T
+        good = np.isfinite(ranges).all(axis=1) & (self.first < self.last)
+        if not good.all():
+            index = int(np.argmin(good))
+            raise CurveError(
+                f"{self.name(index)}the range of t must be finite and ascending, "
+                f"not {self.first[index]} to {self.last[index]}"
+            )
+        # Parameters nearer to each other than this cannot be told apart everywhere in the range.
+        self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
+
+    def name(self, index: int) -> str:
+        """Give the beginning of a message about a curve: nothing if there is only one."""
+        return f"curve {index}: " if len(self.curves) > 1 else ""
+
+    def evaluate(self, curve: Ints, t: Floats) -> Floats:
+        """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).
+
+        Raises
+        ------
+        CurveError
+            If a position is not finite, or too far out to have a voxel.
+
+        """
+        points = np.empty((3, t.size))
+        if not t.size:
+            return points
+        edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1
+        with np.errstate(all="ignore"):
+            for start, stop in pairwise([0, *edges.tolist(), t.size]):
+                position = self.curves[curve[start]].position
+                for low in range(start, stop, CALL):
+                    high = min(low + CALL, stop)
+                    points[:, low:high] = position(t[low:high])
+            good = np.abs(points) < FARTHEST  # and so not where P is not a number
+        if not good.all():
+            at = int(np.argmin(good.all(axis=0)))
+            raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])
+        return points
+
+    def _out_of_reach(self, index: int, t: float, point: Floats) -> CurveError:
+        row = int(np.argmin(np.abs(point) < FARTHEST))
+        where = f"{self.name(index)}{AXES[row]} = {point[row]:.6g} at t = {t!r}"
+        if not np.isfinite(point[row]):
+            hint = "shorten the range of t so that it keeps away from this parameter"
+            return CurveError(f"{where} is not finite", axis=AXES[row], hint=hint)
+        hint = "shorten the range of t, or scale the curve down"
+        return CurveError(f"{where} is too far out to have a voxel", axis=AXES[row], hint=hint)
+
+    def split(self, samples: Samples, parts: Ints) -> Samples:
+        """Cut steps of samples into equal parts.
+
+        Parameters
+        ----------
+        samples : Samples
+            K of them.
+        parts : (K - 1,) int64 array
+            Into how many parts each step is cut; 1 leaves it as it is.
+
+        """
+        cut = np.flatnonzero(parts > 1)
+        count = parts[cut] - 1
+        left = np.repeat(cut, count)
+        nth = spread(np.ones_like(count), count)
+        t_left = samples.t[left]
+        t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])
+        piece_fresh = samples.piece[left]
+
+        kept = np.concatenate(([0], np.cumsum(parts)))
+        fresh = np.ones(kept[-1] + 1, dtype=bool)
+        fresh[kept] = False
+        piece = np.empty(fresh.size, dtype=np.int64)
+        t = np.empty(fresh.size)
+        points = np.empty((3, fresh.size))
+        piece[kept], t[kept], points[:, kept] = samples.piece, samples.t, samples.points
+        piece[fresh], t[fresh] = piece_fresh, t_fresh
+        points[:, fresh] = self.evaluate(samples.curve[piece_fresh], t_fresh)
+        return Samples(piece, t, points, samples.curve)

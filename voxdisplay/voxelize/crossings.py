@@ -1,0 +1,269 @@
+"""Where curves pass the mid-planes of their dominant axis, and with which voxels to draw that.
+
+The bulk of the work is done here, in blocks, a constant number of array operations each. Nothing
+in this module looks at two crossings at once: whether the voxels hang together is
+``grid_plane.py``'s business.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
+from voxdisplay.voxelize.events import Events, Voxels
+from voxdisplay.voxelize.ranges import blocks, spread
+from voxdisplay.voxelize.roots import TOLERANCE, cross
+
+# Knot intervals handled at once. What is computed per crossing then stays in a core's cache.
+BLOCK = 1 << 12
+# A corner must be better by this much, in square voxels, to be preferred to the nearest one:
+# ties are not to be decided by the last bit.
+MARGIN = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """Crossings of dominant mid-planes: ``events`` hold the nearest corners, ``better`` others.
+
+    ``gain`` (M,) says by how much, in square voxels, the corner in ``better`` (3, M) is nearer to
+    the tangent; infinite where there is no better one.
+    """
+
+    events: Events
+    better: Voxels
+    gain: Floats
+
+
+class _Steps(NamedTuple):
+    """Steps between knots which cross mid-planes of their dominant axis, one entry per step."""
+
+    knot: Ints  # the knot where it begins
+    axis: NDArray[np.int8]
+    planes: Ints  # how many it passes
+    level: Floats  # of the first of them: i + 1/2
+    sense: Floats  # +1 or -1
+
+
+def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
+    """Find all crossings between knots, along curves, of planes of the axis that changes most.
+
+    Their events are connected only where one axis goes on to dominate.
+    """
+    slopes = _slopes(knots)
+    starts = np.searchsorted(knots.curve[knots.piece], np.arange(len(batch.curves)))
+    found = [
+        _crossings_of(batch, knots, slopes, _crossing_steps(knots, low, high))
+        for low, high in blocks(starts, knots.t.size, BLOCK)
+    ]
+    events = Events(
+        np.concatenate([part.events.piece for part in found]),
+        np.concatenate([part.events.t for part in found]),
+        np.concatenate([part.events.voxels for part in found], axis=1),
+        np.concatenate([part.events.heading for part in found]),
+    )
+    better = np.concatenate([part.better for part in found], axis=1)
+    gain = np.concatenate([part.gain for part in found])
+    step = np.diff(events.t)
+    if (step[events.joined] < 0).any():  # several crossings of one plane, found in any order
+        order = np.lexsort((events.t, events.piece))
+        return Crossings(events.take(order), better[:, order], gain[order])
+    return Crossings(events, better, gain)
+
+
+def _slopes(knots: Samples) -> Floats:
+    """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
+    joined = knots.joined
+    h = np.where(joined, np.diff(knots.t), 1.0)
+    slopes = np.zeros_like(knots.points)
+    with np.errstate(all="ignore"):
+        velocity = np.diff(knots.points, axis=1) / h
+        slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
+        inner = np.zeros(knots.t.size, dtype=bool)
+        inner[1:-1] = joined[1:] & joined[:-1]
+        bounds = knots.bounds
+        first, last = bounds[:-1], bounds[1:] - 1
+        slopes[:, first[first == last]] = 0.0
+        first, last = first[first < last], last[first < last]
+        for end, other, step in ((first, first + 1, first), (last, last - 1, last - 1)):
+            # On a parabola the slopes at both ends of a step average to its velocity.
+            slopes[:, end] = np.where(
+                inner[other], 2 * velocity[:, step] - slopes[:, other], velocity[:, step]
+            )
+    return slopes
+
+
+def _crossing_steps(knots: Samples, low: int, high: int) -> _Steps:
+    """Find the steps beginning at knots low..high-1 which pass planes of their dominant axis."""
+    stop = min(high + 1, knots.t.size)
+    points = knots.points[:, low:stop]
+    cells = np.floor(points - 0.5)
+    length = np.abs(points[:, 1:] - points[:, :-1])
+    axis = np.where(
+        (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
+    ).astype(np.int8)
+    passed = _of_axis(cells[:, 1:] - cells[:, :-1], axis)
+    step = np.flatnonzero(
+        (passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])
+    )
+    axis, passed = axis[step], passed[step]
+    from_cell = _of_axis(cells[:, step], axis)
+    return _Steps(
+        knot=low + step,
+        axis=axis,
+        planes=np.abs(passed).astype(np.int64),
+        # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
+        level=np.where(passed > 0, from_cell + 1.5, from_cell + 0.5),
+        sense=np.sign(passed),
+    )
+
+
+def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, steps: _Steps) -> Crossings:
+    left, right = steps.knot, steps.knot + 1
+    h = knots.t[right] - knots.t[left]
+    begin = _of_axis(knots.points[:, left], steps.axis)
+    length = _of_axis(knots.points[:, right], steps.axis) - begin
+    slope_left, slope_right = slopes[:, left] * h, slopes[:, right] * h  # per step, not per t
+    with np.errstate(all="ignore"):
+        m_left = length / _of_axis(slope_left, steps.axis)
+        m_right = length / _of_axis(slope_right, steps.axis)
+    # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
+    m_left[~((m_left > 0) & (m_left < 3))] = 1.0
+    m_right[~((m_right > 0) & (m_right < 3))] = 1.0
+
+    # From here on everything is per crossing.
+    of = np.repeat(np.arange(left.size), steps.planes)
+    nth = spread(np.zeros_like(steps.planes), steps.planes)
+    axis, sense = steps.axis[of], steps.sense[of]
+    level = steps.level[of] + sense * nth
+    begin, length, h, t_left = begin[of], length[of], h[of], knots.t[left][of]
+    curve = knots.curve[knots.piece[left]][of]
+
+    u = (level - begin) / length
+    rest = 1.0 - u
+    tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
+    t = np.clip(t_left + tau * h, t_left, knots.t[right][of])
+    points = batch.evaluate(curve, t)
+    found = np.ones(t.size, dtype=bool)
+    miss = _of_axis(points, axis) - level
+    off = np.flatnonzero(np.abs(miss) > TOLERANCE)
+    if off.size:
+        bracket, ends = _brackets(t_left, h, begin, length, level, t, miss, off)
+        t[off], points[:, off], found[off] = cross(
+            batch, curve[off], axis[off].astype(np.int64), level[off], bracket, ends
+        )
+        tau[off] = (t[off] - t_left[off]) / h[off]
+
+    nearest = np.floor(points)
+    for row in range(3):
+        np.copyto(nearest[row], level - 0.5, where=axis == row)
+    tangent = slope_left[:, of]
+    tangent += tau * (slope_right[:, of] - tangent)
+    better, gain, foot = _better_corners(nearest, points, tangent, axis)
+    check = np.flatnonzero(foot != 0)
+    if check.size:
+        t_foot = np.clip(
+            t[check] + foot[check] * h[check], batch.first[curve[check]], batch.last[curve[check]]
+        )
+        apart = better[:, check] + 0.5 - batch.evaluate(curve[check], t_foot)
+        far = check[(apart * apart).sum(axis=0) > 0.5]
+        gain[far] = np.inf
+
+    events = Events(
+        knots.piece[left][of].astype(np.int32),
+        t,
+        nearest.astype(np.int32),
+        (2 * axis + (sense < 0)).astype(np.int8),
+    )
+    better_voxels = better.astype(np.int32)
+    if found.all():
+        return Crossings(events, better_voxels, gain)
+    return Crossings(events.take(found), better_voxels[:, found], gain[found])
+
+
+def _brackets(
+    t_left: Floats,
+    h: Floats,
+    begin: Floats,
+    length: Floats,
+    level: Floats,
+    t: Floats,
+    miss: Floats,
+    off: Ints,
+) -> tuple[Floats, Floats]:
+    """Narrow steps, by a first guess ``t`` that is off by ``miss``, to where the crossing is."""
+    bracket = np.stack((t_left[off], t_left[off] + h[off]))
+    ends = np.stack((begin[off] - level[off], begin[off] + length[off] - level[off]))
+    after = (miss[off] < 0) == (ends[0] < 0)  # the crossing comes after the guess
+    bracket[0] = np.where(after, t[off], bracket[0])
+    ends[0] = np.where(after, miss[off], ends[0])
+    bracket[1] = np.where(after, bracket[1], t[off])
+    ends[1] = np.where(after, ends[1], miss[off])
+    return bracket, ends
+
+
+def _better_corners(
+    nearest: Floats, points: Floats, tangent: Floats, axis: NDArray[np.int8]
+) -> tuple[Floats, Floats, Floats]:
+    """Look for the corner of the crossed face that is nearest to the tangent.
+
+    For a line, and up to the second order for a curve, that is the best voxel among all with
+    this coordinate on the dominant axis.
+
+    Parameters
+    ----------
+    nearest, points, tangent : (3, n) float64 arrays
+        Voxel nearest to the crossing, the crossing, and the direction there (of any length).
+    axis : (n,) int8 array
+        The axis crossed.
+
+    Returns
+    -------
+    better : (3, n) float64 array
+        The best corner.
+    gain : (n,) float64 array
+        How much nearer to the tangent it is than ``nearest``, in square voxels; infinite where
+        ``nearest`` is the best.
+    foot : (n,) float64 array
+        Where the corner is further than sqrt(1/2) from the crossing: the way along ``tangent``,
+        in its lengths, to the foot of the perpendicular. 0 elsewhere.
+
+    """
+    apart = nearest + 0.5 - points
+    length = np.sqrt((tangent * tangent).sum(axis=0))
+    along = tangent / np.maximum(length, np.finfo(float).tiny)
+    project = (apart * along).sum(axis=0)
+    # The other corner along axis b is a unit step e_b away, towards the crossing. With w the
+    # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
+    # with p = D.w and s = w.e_b. Two such steps change it by the sum of both minus 2 s s'.
+    towards = np.where(apart > 0, -1.0, 1.0)
+    shift = towards * along
+    change = 1.0 - 2.0 * np.abs(apart) - (2.0 * project + shift) * shift
+    for row in range(3):
+        np.copyto(change[row], np.inf, where=axis == row)
+    best = np.zeros(axis.size)
+    move = np.zeros((3, axis.size), dtype=bool)
+    for rows in ((0,), (1,), (2,), (0, 1), (1, 2), (0, 2)):
+        total = change[rows[0]]
+        if len(rows) == 2:
+            total = total + change[rows[1]] - 2.0 * shift[rows[0]] * shift[rows[1]]
+        wins = total < best - MARGIN
+        best = np.where(wins, total, best)
+        for row in range(3):
+            np.copyto(move[row], row in rows, where=wins)
+    gain = np.where(best < 0, -best, np.inf)
+    step = np.where(move, towards, 0.0)
+    better = nearest + step
+    apart += step
+    far = (best < 0) & ((apart * apart).sum(axis=0) > 0.5)
+    with np.errstate(all="ignore"):
+        foot = np.where(far, (apart * along).sum(axis=0) / length, 0.0)
+    return better, gain, foot
+
+
+def _of_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:
+    """Pick from three rows, (3, n), the one named by ``axis`` (n,)."""
+    return np.asarray(np.where(axis == 0, rows[0], np.where(axis == 1, rows[1], rows[2])))

@@ -1,0 +1,181 @@
+"""How finely curves must be sampled to see their features, and where they jump.
+
+The samples are called knots: what is between two of them is taken to be nearly straight. This
+module also stops at curves that cannot be drawn, before they cost time and memory. It must not
+know what a voxel sequence is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelize.batch import AXES, Batch, Floats, Ints, Samples
+
+# More than this is no picture on a display (256^3 has 17 million voxels in all) but a mistake.
+MOST_VOXELS = 10_000_000
+MOST_SAMPLES = 4_000_000
+# A knot interval may be this long (voxels, along its longest axis) and bend this far off its
+# chord (voxels). No guarantee rests on these: they only decide how small a feature is seen.
+CHORD = 3.0
+BEND = 0.05
+# Into how many parts an interval is cut at once, at most.
+PARTS = 16
+# A step wider than this between neighbouring parameters is a jump; a narrower one cannot be told
+# from a step between adjacent voxels.
+JUMP = 1.0
+
+# The first look at a curve: 65 parameters, jittered so that no oscillation can hide between
+# them by having their period. Fixed, so that the same curve always gives the same voxels.
+_LOOK = np.linspace(0.0, 1.0, 65)
+_LOOK[1:-1] += np.random.default_rng(65).uniform(-0.3, 0.3, 63) / 64
+
+
+def knots(batch: Batch) -> Samples:
+    """Sample curves finely enough to see their features, and cut them at their jumps.
+
+    Steps are split until none is longer than ``CHORD`` or bends more than ``BEND``; the bend
+    h^2 |P''| / 8 is taken from second divided differences. A step that is still wider than
+    ``JUMP`` where parameters cannot be told apart any more is a jump.
+
+    Parameters
+    ----------
+    batch : Batch
+        The curves.
+
+    Returns
+    -------
+    Samples
+        With at least one sample per piece and at least one piece per curve.
+
+    Raises
+    ------
+    CurveError
+        If a curve runs off, does not settle, or would need too many voxels.
+
+    """
+    samples = _first_look(batch)
+    while True:
+        parts, chord = _needed_parts(samples, batch.resolution)
+        if not (parts > 1).any():
+            return _cut_at_jumps(batch, samples, chord)
+        _check_size(batch, samples, parts, chord)
+        samples = batch.split(samples, parts)
+
+
+def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
+    """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
+    while True:
+        chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
+        curve = samples.curve[samples.piece[:-1]]
+        possible = np.floor(np.diff(samples.t) / batch.resolution[curve])
+        parts = np.clip(np.minimum(np.ceil(chord / longest), possible), 1, PARTS).astype(np.int64)
+        parts[~samples.joined] = 1
+        if not (parts > 1).any():
+            return samples
+        count = np.bincount(curve, parts, len(batch.curves))
+        if (count > MOST_SAMPLES).any():
+            raise _too_rough(batch, int(np.argmax(count)))
+        samples = batch.split(samples, parts)
+
+
+def _first_look(batch: Batch) -> Samples:
+    t = batch.first[:, None] + (batch.last - batch.first)[:, None] * _LOOK
+    t[:, -1] = batch.last
+    index = np.arange(len(batch.curves))
+    if not any(len(curve.breaks) for curve in batch.curves):
+        piece = np.repeat(index, _LOOK.size)
+        return Samples(piece, t.ravel(), batch.evaluate(piece, t.ravel()), index)
+    looks = []
+    for look, curve in zip(t, batch.curves, strict=True):
+        inside = (curve.breaks > look[0]) & (curve.breaks < look[-1])
+        looks.append(np.union1d(look, curve.breaks[inside]))
+    piece = np.repeat(index, [look.size for look in looks])
+    flat = np.concatenate(looks)
+    return Samples(piece, flat, batch.evaluate(piece, flat), index)
+
+
+def _needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+    """Tell into how many parts each step should be cut, and how long it is in max norm."""
+    joined = samples.joined
+    h = np.where(joined, np.diff(samples.t), 1.0)
+    step = np.diff(samples.points, axis=1)
+    chord = np.abs(step).max(axis=0)
+    chord[~joined] = 0.0
+    with np.errstate(all="ignore"):
+        velocity = step / h
+        turn = np.abs(np.diff(velocity, axis=1)).max(axis=0) / (h[1:] + h[:-1])
+        turn[~(joined[1:] & joined[:-1])] = 0.0
+        second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
+        second[1:] = turn
+        second[:-1] = np.maximum(second[:-1], turn)
+        bend = h * h * second / 4
+        wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+        # Parts must stay distinct parameters.
+        possible = np.floor(h / resolution[samples.curve[samples.piece[:-1]]])
+        parts = np.minimum(np.minimum(wanted, possible), PARTS)
+    parts[~(joined & (parts > 1))] = 1.0  # and where the bend is not a number
+    return parts.astype(np.int64), chord
+
+
+def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:
+    """Stop before the work gets out of hand: ``parts`` is what comes next."""
+    curve = samples.piece[:-1]
+    length = np.bincount(curve, chord, len(batch.curves))
+    count = np.bincount(curve, parts, len(batch.curves))
+    count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
+    # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
+    wriggles = count > MOST_SAMPLES // 16 + 3 * length
+    excess = np.flatnonzero((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    if not excess.size:
+        return
+    index = int(excess[0])
+    worst = int(np.argmax(np.where(curve == index, chord, -1.0)))
+    if chord[worst] > max(0.1 * length[index], 1e3):
+        raise _runs_off(batch, index, samples, worst)
+    if length[index] > MOST_VOXELS:
+        raise CurveError(
+            f"{batch.name(index)}the curve is too long: {length[index]:.3g} voxels at least, "
+            f"and {MOST_VOXELS} is the limit",
+            hint="shorten the range of t, scale the curve down, or slow its oscillation",
+        )
+    raise _too_rough(batch, index)
+
+
+def _too_rough(batch: Batch, index: int) -> CurveError:
+    return CurveError(
+        f"{batch.name(index)}the curve is too rough: however closely one looks it does not settle",
+        hint="slow its oscillation, or shorten the range of t",
+    )
+
+
+def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError:
+    """Name the axis that leaps in the step after sample ``at``, and find out where."""
+    t, points = samples.t[at : at + 2], samples.points[:, at : at + 2]
+    row = int(np.argmax(np.abs(points[:, 1] - points[:, 0])))
+    while t[1] - t[0] > batch.resolution[index]:
+        t = np.linspace(t[0], t[1], PARTS + 1)
+        points = batch.evaluate(np.full(t.size, index), t)  # raises where it is not finite
+        leap = int(np.argmax(np.abs(np.diff(points[row]))))
+        t, points = t[leap : leap + 2], points[:, leap : leap + 2]
+    return CurveError(
+        f"{batch.name(index)}{AXES[row]} does not settle near t = {float(t[0])!r}: "
+        f"it leaps from {points[row, 0]:.6g} to {points[row, 1]:.6g}",
+        axis=AXES[row],
+        hint="shorten the range of t so that it keeps away from this parameter",
+    )
+
+
+def _cut_at_jumps(batch: Batch, samples: Samples, chord: Floats) -> Samples:
+    finest = np.diff(samples.t) < 2 * batch.resolution[samples.piece[:-1]]
+    torn = samples.joined & finest & (chord > JUMP)
+    if not torn.any():
+        return samples
+    # A jump tears one step, or two if a knot sits right on it. Where whole stretches are torn
+    # the curve is a pole, or noise at the finest scale there is.
+    stretch = torn[2:] & torn[1:-1] & torn[:-2]
+    if stretch.any():
+        at = int(np.argmax(np.where(stretch, chord[1:-1], -1.0))) + 1
+        raise _runs_off(batch, int(samples.piece[at]), samples, at)
+    opens = np.concatenate(([True], torn | ~samples.joined))
+    return Samples(np.cumsum(opens) - 1, samples.t, samples.points, samples.piece[opens])

@@ -1,0 +1,34 @@
+"""Index arithmetic for arrays that hold many ranges, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+
+def spread(low: Ints, count: Ints) -> Ints:
+    """Write out ranges: low, low + 1, ... ``count`` numbers for each."""
+    return np.repeat(low - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))
+
+
+def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
+    """Cut [0, stop) into blocks of about ``size``.
+
+    Cuts are made at ``starts``, where curves begin, and at multiples of ``size`` from there, so
+    that a curve is cut in the same places whatever comes before it.
+    """
+    begin = 0
+    for low, high in pairwise([*starts.tolist(), stop]):
+        if high - begin > size and low > begin:
+            yield begin, low
+            begin = low
+        while high - begin > size:
+            yield begin, begin + size
+            begin += size
+    if begin < stop:
+        yield begin, stop

@@ -1,0 +1,111 @@
+"""Thinning: from a connected list of voxels to one without short cuts.
+
+A *chord* is a pair of neighbouring voxels that are not consecutive in the sequence; each one
+gives some voxel a third neighbour. Integer work on events only: nothing here knows a curve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.voxelize.events import OTHER, Events, near
+
+# How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
+WINDOW = 12
+
+
+def without_repeats(events: Events) -> Events:
+    """Drop events whose voxel is that of the event before them in the piece."""
+    same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
+    if not same.any():
+        return events
+    keep = np.concatenate(([True], ~same))
+    return events.take(keep)
+
+
+def reduce(events: Events) -> Events:
+    """Take short cuts, event i to event J(i), from the first to the last event of every piece.
+
+    J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
+    with every event between them adjacent to i (a prefix) or to j (the rest). On the way so found
+    no two voxels are neighbours but consecutive ones, unless the curve leaves their surroundings
+    between them: a chord from a to c across b would have made c, not b, the J(a).
+
+    Parameters
+    ----------
+    events : Events
+        Consecutive ones 26-adjacent or equal within a piece.
+
+    Returns
+    -------
+    Events
+        Of which no two consecutive ones of a piece are equal. First and last stay.
+
+    """
+    events = without_repeats(events)
+    start, stop = _short_cuts(events)
+    change = np.zeros(events.t.size, dtype=np.int8)
+    change[start + 1] += 1
+    change[stop] -= 1
+    return without_repeats(events.take(np.cumsum(change, dtype=np.int8) == 0))
+
+
+def runs_on(events: Events) -> NDArray[np.bool_]:
+    """Tell which events, (M,), are one step further than the last on the axis both head along.
+
+    Events that run on have no chord among them: they are as far apart as their indices are.
+    """
+    heading, voxels = events.heading[1:], events.voxels
+    on = np.zeros(events.t.size, dtype=bool)
+    on[1:] = events.joined & (heading == events.heading[:-1]) & (heading != OTHER)
+    for axis in range(3):
+        step = voxels[axis, 1:] - voxels[axis, :-1]
+        on[1:] &= (heading >> 1 != axis) | (step == 1 - 2 * (heading & 1))
+    return on
+
+
+def _short_cuts(events: Events) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
+    size = events.t.size
+    # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
+    turn = np.flatnonzero(~runs_on(events))
+    reach = np.bincount(np.maximum(turn - WINDOW, 0), minlength=size + 1)
+    reach -= np.bincount(np.minimum(turn + WINDOW, size), minlength=size + 1)
+    look = np.flatnonzero(np.cumsum(reach[:-1]) > 0)
+    if look.size < 3:
+        return look[:0], look[:0]
+    voxels = events.voxels[:, look]
+    stretch = np.cumsum(np.diff(look, prepend=look[0]) > 1) + events.piece[look]
+    leap = furthest(voxels, stretch)
+    short = np.flatnonzero(leap > 1)
+    starts, stops = look[short], look[short] + leap[short]
+    taken = []
+    end = -1
+    for nth, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
+        if start >= end:
+            taken.append(nth)
+            end = stop
+    return starts[taken], stops[taken]
+
+
+def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
+    """Give J(i) - i for each of n voxels, (3, n), which are looked at within stretches (n,)."""
+    size = stretch.size
+    window = min(WINDOW, size - 1)
+    touch = np.zeros((window + 1, size), dtype=bool)  # [w, i]: voxels i and i + w are neighbours
+    for w in range(1, window + 1):
+        touch[w, :-w] = near(voxels[:, w:], voxels[:, :-w]) & (stretch[w:] == stretch[:-w])
+    ahead = np.zeros(size, dtype=np.int8)  # how many events after i are its neighbours
+    behind = np.zeros(size, dtype=np.int8)  # and how many before it
+    on, back = np.ones(size, dtype=bool), np.ones(size, dtype=bool)
+    for w in range(1, window + 1):
+        on &= touch[w]
+        ahead += on
+        back[:w] = False
+        back[w:] &= touch[w, :-w]
+        behind += back
+    leap = np.ones(size, dtype=np.int8)
+    for w in range(2, window + 1):
+        leap[:-w][touch[w, :-w] & (ahead[:-w] + behind[w:] >= w - 1)] = w
+    return leap

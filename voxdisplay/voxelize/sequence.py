@@ -1,0 +1,132 @@
+"""What comes out: an ordered list of voxels along a curve, and what can be said of it.
+
+A sequence is a value. It knows no colour and no display; ``clip`` is told a display's shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelize import measure
+
+
+@dataclass(frozen=True)
+class Report:
+    """How good a sequence is.
+
+    Attributes
+    ----------
+    voxels : int
+        How many there are.
+    closed : bool
+        Whether the last is followed by the first.
+    pieces : int
+        Into how many connected pieces jumps of the curve split them.
+    e_max, e_av : float
+        Greatest and mean true distance of voxel centres from the curve, in voxels (paper,
+        equations 7 and 8, but to the nearest point).
+    gaps : int
+        Consecutive voxels of a piece that are not neighbours.
+    contacts : int
+        Pairs i < j, j - i > 1 (cyclically if closed), of equal or 26-adjacent voxels.
+    seconds : float
+        What it took to find the voxels (a share by voxels, where many curves were done at once).
+
+    """
+
+    voxels: int
+    closed: bool
+    pieces: int
+    e_max: float
+    e_av: float
+    gaps: int
+    contacts: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """An ordered, 26-connected list of voxels along a curve.
+
+    Attributes
+    ----------
+    voxels : (N, 3) int32 array
+        Columns x, y, z; read-only. Voxel i of an axis covers [i, i + 1).
+    closed : bool
+        Whether the last voxel is followed by the first.
+    starts : (pieces,) int64 array
+        Index of the first voxel of every piece; the first is 0. The curve jumps before each other.
+    t : (N,) float64 array
+        A parameter at which the curve is near each voxel, ascending; read-only.
+    curve : Curve
+        What the voxels show.
+    seconds : float
+        What it took to find them.
+
+    """
+
+    voxels: NDArray[np.int32]
+    closed: bool
+    starts: NDArray[np.int64]
+    t: NDArray[np.float64] = field(repr=False)
+    curve: Curve = field(repr=False)
+    seconds: float = field(default=0.0, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.voxels)
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Distance of every voxel's centre from the curve, in voxels: (N,)."""
+        return measure.distances(self.voxels, self.curve)
+
+    @cached_property
+    def contact_pairs(self) -> NDArray[np.int64]:
+        """Where the sequence touches itself, as index pairs: see `measure.contacts`."""
+        return measure.contacts(self.voxels, closed=self.closed)
+
+    @cached_property
+    def report(self) -> Report:
+        """How good the sequence is. Found when first asked for: it can take longer than drawing."""
+        return Report(
+            voxels=len(self),
+            closed=self.closed,
+            pieces=len(self.starts),
+            e_max=float(self.distances.max()),
+            e_av=float(self.distances.mean()),
+            gaps=len(measure.gaps(self.voxels, closed=self.closed, starts=self.starts)),
+            contacts=measure.count_contacts(self.voxels, closed=self.closed),
+            seconds=self.seconds,
+        )
+
+
+def clip(sequence: Sequence, grid: tuple[int, int, int]) -> NDArray[np.int64]:
+    """Find the stretches of a sequence inside a grid.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        The voxels.
+    grid : (nx, ny, nz)
+        A display's shape; voxels 0 <= x < nx and so on are inside.
+
+    Returns
+    -------
+    (k, 2) int64 array
+        Bounds [start, stop) of maximal stretches of consecutive voxels that are all inside and
+        of one piece, ascending. A closed sequence is taken as open: a stretch may end with the
+        last voxel and go on at the first.
+
+    """
+    voxels = sequence.voxels
+    inside = np.asarray(((voxels >= 0) & (voxels < np.asarray(grid))).all(axis=1))
+    runs_on = inside[1:] & inside[:-1]
+    runs_on[sequence.starts[1:] - 1] = False
+    start = np.flatnonzero(inside & ~np.append(False, runs_on))
+    stop = np.flatnonzero(inside & ~np.append(runs_on, False)) + 1
+    return np.stack((start, stop), axis=1)
