@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 from cobs import cobs
 
-from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
@@ -99,6 +98,3 @@ class PacketStream:
 
     def _keep_noise(self, data: bytes | bytearray) -> None:
         self.noise = (self.noise + bytes(data[:_KEPT_NOISE]))[:_KEPT_NOISE]
-
-
-__all__ = ["PacketStream", "RemoteProtocolError", "StreamCounters"]

@@ -1,0 +1,150 @@
+"""Every vector of protocol.md, through both sides."""
+
+import document
+import numpy as np
+import pytest
+from sides import DeviceSide, flags_of, state_of
+
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+from voxdisplay.wire.digest import digest
+from voxdisplay.wire.stream import PacketStream
+
+
+def each(kind):
+    return pytest.mark.parametrize("vector", document.vectors(kind), ids=str)
+
+
+@each("cobs")
+def test_delimiting(vector):
+    decoded, encoded = vector.hex("decoded"), vector.hex("encoded")
+    assert document.cobs_encode(decoded) == encoded
+    assert document.cobs_decode(encoded) == decoded
+    assert packets.cobs.encode(decoded) == encoded
+    assert packets.cobs.decode(encoded) == decoded
+    assert DeviceSide.cobs_encode(decoded) == encoded
+    assert DeviceSide.cobs_decode(encoded) == decoded
+
+
+@each("crc")
+def test_check_value(vector):
+    data, crc = vector.hex("bytes"), vector.hex("crc")
+    assert packets.zlib.crc32(data).to_bytes(4, "little") == crc
+    assert DeviceSide.crc(data).to_bytes(4, "little") == crc
+
+
+PACKET_CLASSES = {cls.__name__.upper(): cls for cls in packets.TYPES.values()}
+
+
+def fields_of(vector):
+    """The fields of a ``packet`` vector, as the driver's dataclass takes them."""
+    group = {"READ": "READ_FLAG", "PAGE": "READ_FLAG"}.get(vector["type"], f"{vector['type']}_FLAG")
+    values = {}
+    for key, text in vector.lines:
+        if key in {"type", "packet", "wire"}:
+            continue
+        if key == "flags":
+            values[key] = flags_of(text, group)
+        elif key == "features":
+            values[key] = sum(1 << getattr(spec, f"FEATURE_{name}") for name in text.split("|"))
+        elif key == "format":
+            values[key] = getattr(spec, f"FORMAT_{text}")
+        elif key == "code":
+            values[key] = getattr(spec, f"CODE_{text}")
+        elif key == "ops":
+            values[key] = document.hex_bytes(text)
+        elif text.startswith('"'):
+            values[key] = text.strip('"')
+        else:
+            values[key] = int(text)
+    return values
+
+
+@each("packet")
+def test_packets_of_the_driver(vector):
+    packet = PACKET_CLASSES[vector["type"]](**fields_of(vector))
+    assert packets.pack(packet) == vector.hex("packet")
+    assert packets.encode(packet) == vector.hex("wire")
+    assert packets.decode(vector.hex("packet")) == packet
+
+
+@each("packet")
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_packets_in_the_drivers_stream(vector, size):
+    data = b"boot text\0" + vector.hex("wire") + b"tail"
+    stream = PacketStream()
+    found = []
+    for at in range(0, len(data), size):
+        found += stream.feed(data[at : at + size])
+    assert found == [packets.decode(vector.hex("packet"))]
+
+
+@each("packet")
+def test_packets_of_the_device(vector):
+    assert document.on_wire(vector.hex("packet")[:-4]) == vector.hex("wire")
+    assert DeviceSide.segments(vector.hex("wire")) == [vector.hex("packet")[:-4]]
+    assert DeviceSide.wire(vector.hex("packet")[:-4]) == vector.hex("wire")
+
+
+@each("ops")
+def test_ops_on_the_device(vector):
+    device = DeviceSide(vector.grid, vector["format"])
+    device.open()
+    answers = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
+    assert [state_of(answer) for answer in answers] == ["ACK SHOWN"]
+    assert device.lit() == vector.voxels()
+    assert int.from_bytes(answers[0][16:20], "little") == vector.integer("digest")
+
+
+@each("ops")
+def test_digest_of_the_driver(vector):
+    nx, ny, _ = vector.grid
+    voxels = vector.voxels()
+    index = [x + nx * (y + ny * z) for x, y, z in voxels]
+    values = [int.from_bytes(pixel, "little") for pixel in voxels.values()]
+    found = digest(np.array(index, dtype=int), np.array(values, dtype=int))
+    assert found == vector.integer("digest")
+
+
+@each("refused")
+def test_refused_ops(vector):
+    device = DeviceSide(vector.grid, vector["format"])
+    device.open()
+    (answer,) = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
+    assert answer[0] == 0xB0
+    assert answer[3] == getattr(spec, f"CODE_{vector['code']}")
+    assert int.from_bytes(answer[6:8], "little") == vector.integer("offset")
+    assert device.lit() == {}
+    (after,) = device.send(bytes((0x40, 9, 0)))
+    assert after[3] == spec.CODE_NO_SESSION
+
+
+@each("dialogue")
+def test_dialogues_with_the_device(vector):
+    facts = dict(vector.lines)
+    device = DeviceSide(
+        vector.grid,
+        facts["format"],
+        boot=int(facts["boot"]),
+        max_payload=int(facts["max_payload"]),
+        rx_buffer=int(facts["rx_buffer"]),
+        refresh=int(facts["refresh"]),
+        name=facts["name"].strip('"'),
+        firmware=facts["firmware"].strip('"'),
+        serial=facts["serial"].strip('"'),
+    )
+    said = []
+    for key, text in vector.lines:
+        if key in {"host", "raw", "tick"}:
+            assert said == [], "the device said more than the document"
+        if key == "host":
+            said = device.send(document.hex_bytes(text))
+        elif key == "raw":
+            said = device.send_raw(document.hex_bytes(text))
+        elif key == "tick":
+            said = device.tick()
+        elif key == "device":
+            meant = document.hex_bytes(text.removesuffix("*"))
+            got = said.pop(0)
+            assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
+    assert said == []

@@ -1,0 +1,106 @@
+"""The device side as the conformance tests see it: packets in, packets out, and its front page."""
+
+from __future__ import annotations
+
+import document
+
+from firmware_sim import crc, sender
+from firmware_sim.bench import Bench
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+from firmware_sim.receiver import Receiver
+from voxdisplay.wire import spec
+
+HELLO = bytes.fromhex("30 00 00 01 17 5A 00 00")
+
+
+class DeviceSide:
+    """An emulated device on a bench, spoken to by hand-made packets."""
+
+    def __init__(self, grid, pixel_format, *, refresh=0, **config):
+        self.device = Device(
+            Config(grid=grid, pixel_format=pixel_format.lower(), refresh=refresh, **config)
+        )
+        self.bench = Bench(self.device)
+
+    def send_raw(self, data):
+        """Give bytes to the device; return header and payload of each packet of its answer."""
+        self.device.receive(data)
+        return document.off_wire(self.device.transmit())
+
+    def send(self, packet):
+        """Give a packet, written without its check value, to the device."""
+        return self.send_raw(document.on_wire(packet))
+
+    def open(self):
+        (info,) = self.send(HELLO)
+        assert info[0] == 0x90
+
+    def tick(self):
+        self.device.tick()
+        return document.off_wire(self.device.transmit())
+
+    def lit(self):
+        """The front page's voxels that are not dark, with their pixels."""
+        snapshot = self.bench.snapshot()
+        nx, ny, _ = snapshot.grid
+        size = document.pixel_bytes()[getattr(spec, f"FORMAT_{snapshot.pixel_format.upper()}")]
+        lit = {}
+        for index in range(len(snapshot.pixels) // size):
+            pixel = snapshot.pixels[index * size : (index + 1) * size]
+            if any(pixel):
+                lit[index % nx, index // nx % ny, index // nx // ny] = pixel
+        return lit
+
+    @staticmethod
+    def cobs_encode(data):
+        return sender.encode(data)[:-1]
+
+    @staticmethod
+    def cobs_decode(segment):
+        """What the receiver makes of a segment, with a check value for it to be happy."""
+        receiver = Receiver(70000)
+        body = document.cobs_decode(segment)
+        data = document.on_wire(body)
+        receiver.read(data, 0)
+        if len(data) > spec.LIMIT_MIN_SEGMENT:
+            assert receiver.packet is not None
+            return receiver.packet
+        return body
+
+    @staticmethod
+    def crc(data):
+        return crc.crc32(data)
+
+    @staticmethod
+    def segments(data):
+        """Header and payload of the packets that the receiver finds."""
+        receiver = Receiver(70000)
+        found, at = [], 0
+        while at < len(data):
+            at = receiver.read(data, at)
+            if receiver.packet is not None:
+                found.append(receiver.packet)
+        return found
+
+    @staticmethod
+    def wire(body):
+        return sender.send(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:])
+
+
+def flags_of(text, group):
+    """Read flags as the document writes them: ``CLEAR|COMMIT``, or ``-``."""
+    names = [] if text == "-" else text.split("|")
+    return sum(getattr(spec, f"{group}_{name}") for name in names)
+
+
+def state_of(answer):
+    """Say what an ACK says, for messages."""
+    if answer[0] >> 4 != spec.TYPE_ACK:
+        return answer.hex(" ")
+    names = [
+        name
+        for name in ("SHOWN", "PENDING", "ASKED")
+        if answer[0] & getattr(spec, f"ACK_FLAG_{name}")
+    ]
+    return " ".join(["ACK", *names])

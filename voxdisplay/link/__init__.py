@@ -1,0 +1,15 @@
+"""The host's end of protocol.md, without any I/O: bytes in, events out, time is an argument."""
+
+from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown
+from voxdisplay.link.link import Link, LinkCounters
+
+__all__ = [
+    "Event",
+    "Link",
+    "LinkCounters",
+    "PageRead",
+    "Ready",
+    "Refused",
+    "Restarted",
+    "Shown",
+]

@@ -1,0 +1,45 @@
+"""What a `Link` has to tell: plain values, no behaviour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from voxdisplay.wire.packet import Error, Info, Page
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """A session is open."""
+
+    info: Info
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A frame is on display. ``digest`` is the device's, or None if it gives none."""
+
+    ticket: int
+    digest: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class PageRead:
+    """Pixels came back."""
+
+    page: Page
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The device refused a packet; if it was a DATA, the session is over."""
+
+    error: Error
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """The device has lost the session; a new one is being opened, and frames are sent again."""
+
+
+Event: TypeAlias = Ready | Shown | PageRead | Refused | Restarted

@@ -1,0 +1,120 @@
+"""Which packets are on their way, which are lost, and how many bytes may follow.
+
+This is sections 9.1 to 9.3 of protocol.md.
+Everything that is sent gets an *ordinal*. The pipe keeps order, so once the device has taken
+something, all that was sent before and has not been received is lost: a fact, not a guess. Knows
+packets only as sequence numbers and sizes; knows no frames and no clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from voxdisplay.wire import spec
+from voxdisplay.wire.packet import Ack
+
+_MODULUS = 256
+
+
+@dataclass(slots=True)
+class Flight:
+    """A DATA packet that the device has not received yet, as far as we know."""
+
+    wire: bytes
+    ordinal: int = 0
+    sent_s: float = 0.0
+    transmissions: int = 0
+    lost: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """When something was sent, and where in the stream of bytes it ended."""
+
+    ordinal: int
+    end: int
+
+
+class Window:
+    """The sliding window over one session's DATA packets, and its credit."""
+
+    def __init__(self, credit: int) -> None:
+        self.next_seq = 0
+        self.flights: dict[int, Flight] = {}
+        self._base = 0  # the lowest number not received
+        self._ordinal = 0
+        self._position = 0
+        self._limit = credit  # absolute: bytes of the stream up to here fit
+        self._taken = 0  # the newest ordinal that the device has taken
+        self._data_marks: dict[int, _Mark] = {}
+        self._tag_marks: dict[int, _Mark] = {}
+
+    @property
+    def has_room(self) -> bool:
+        """Whether another sequence number fits the window."""
+        return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
+
+    def fits(self, size: int, *, reserved: bool = False) -> bool:
+        """Tell whether credit allows another ``size`` bytes; STATUS may use the reserve."""
+        reserve = 0 if reserved else spec.LIMIT_RESERVE
+        return self._position + size <= self._limit - reserve
+
+    def lost(self) -> int | None:
+        """Give the oldest packet that is known to be lost, or None."""
+        order = sorted(self.flights, key=lambda seq: (seq - self._base) % _MODULUS)
+        return next((seq for seq in order if self.flights[seq].lost), None)
+
+    def add(self, wire: bytes) -> int:
+        """Enter a new packet; give its sequence number's flight to `send` next."""
+        seq = self.next_seq
+        self.flights[seq] = Flight(wire)
+        self.next_seq = (seq + 1) % _MODULUS
+        return seq
+
+    def send(self, seq: int, now: float) -> bytes:
+        """Note that a packet goes out now, and give its bytes."""
+        flight = self.flights[seq]
+        self._data_marks[seq] = mark = self._mark(len(flight.wire))
+        flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
+        flight.transmissions += 1
+        return flight.wire
+
+    def send_tagged(self, tag: int, size: int) -> int:
+        """Note that a STATUS or READ goes out now; give its ordinal."""
+        self._tag_marks[tag] = mark = self._mark(size)
+        return mark.ordinal
+
+    def _mark(self, size: int) -> _Mark:
+        self._ordinal += 1
+        self._position += size
+        return _Mark(self._ordinal, self._position)
+
+    def taken_tag(self, tag: int) -> int:
+        """Note that the device has taken what carried a tag; give its ordinal."""
+        mark = self._tag_marks.get(tag)
+        return self._take(mark) if mark else 0
+
+    def acknowledge(self, ack: Ack) -> list[Flight]:
+        """Take an ACK; give the packets that it reports as received."""
+        marks = self._tag_marks if ack.flags & spec.ACK_FLAG_ASKED else self._data_marks
+        if mark := marks.get(ack.last):
+            self._limit = max(self._limit, mark.end + ack.credit)
+        received = [seq for seq in self.flights if self._is_received(seq, ack)]
+        done = [self.flights.pop(seq) for seq in received]
+        if (ack.next - self._base) % _MODULUS <= spec.LIMIT_WINDOW:
+            self._base = ack.next
+        if mark:
+            self._take(mark)
+        return done
+
+    def _is_received(self, seq: int, ack: Ack) -> bool:
+        ahead = (seq - ack.next) % _MODULUS
+        if ahead >= _MODULUS // 2:
+            return True
+        return ahead > 0 and bool(ack.received >> (ahead - 1) & 1)
+
+    def _take(self, mark: _Mark) -> int:
+        self._taken = max(self._taken, mark.ordinal)
+        for flight in self.flights.values():
+            flight.lost = flight.lost or flight.ordinal <= self._taken
+        return mark.ordinal

@@ -1,0 +1,143 @@
+"""Pixel formats: how colours become what a display stores, and how that lies in an array.
+
+Knows the formats of protocol.md, section 2.1, and nothing of frames, curves or packets.
+"""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.wire import spec
+
+Values = NDArray[np.uint32]
+Pixels = NDArray[np.uint8 | np.uint16]
+
+
+class PixelFormat(enum.Enum):
+    """What a voxel can be. The names are those of the command line and of ``INFO``."""
+
+    MONO1 = "mono1"
+    INDEX8 = "index8"
+    RGB565 = "rgb565"
+    RGB888 = "rgb888"
+
+    @classmethod
+    def of_wire(cls, number: int) -> PixelFormat | None:
+        """Give the format that has a number in INFO, or None."""
+        return next((format_ for format_ in cls if format_.wire == number), None)
+
+    @property
+    def wire(self) -> int:
+        """The format's number on the wire."""
+        return int(getattr(spec, f"FORMAT_{self.name}"))
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of one pixel."""
+        return spec.PIXEL_BYTES[self.wire]
+
+    @property
+    def full(self) -> int:
+        """The value of the full pixel, with all its bits set."""
+        return 1 if self is PixelFormat.MONO1 else (1 << 8 * self.bytes) - 1
+
+    @property
+    def dtype(self) -> type[np.uint8 | np.uint16]:
+        """Element type of an array of this format."""
+        return np.uint16 if self is PixelFormat.RGB565 else np.uint8
+
+    def shape(self, array_shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Shape of an array of this format: RGB888 has a last axis of 3."""
+        return (*array_shape, 3) if self is PixelFormat.RGB888 else array_shape
+
+    def nearest(self, rgb: NDArray[np.uint8]) -> Values:
+        """Give the pixel values nearest to colours.
+
+        On a display of one colour every colour but black is lit: a curve is drawn to be seen.
+
+        Parameters
+        ----------
+        rgb : (n, 3) uint8 array
+            sRGB colours.
+
+        Returns
+        -------
+        (n,) uint32 array
+
+        """
+        red, green, blue = np.asarray(rgb, dtype=np.uint32).T
+        match self:
+            case PixelFormat.MONO1:
+                values = (red | green | blue) != 0
+            case PixelFormat.INDEX8:
+                values = _level(red, 7) << 5 | _level(green, 7) << 2 | _level(blue, 3)
+            case PixelFormat.RGB565:
+                values = _level(red, 31) << 11 | _level(green, 63) << 5 | _level(blue, 31)
+            case PixelFormat.RGB888:
+                values = red | green << 8 | blue << 16
+        return np.asarray(values, dtype=np.uint32)
+
+    def rgb(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
+        """Give the colours, (n, 3) uint8, of pixel values, (n,)."""
+        v = np.asarray(values, dtype=np.uint32)
+        channels: tuple[NDArray[np.integer], ...]
+        match self:
+            case PixelFormat.MONO1:
+                channels = (v * 255,) * 3
+            case PixelFormat.INDEX8:
+                channels = (_full(v >> 5, 7), _full(v >> 2 & 7, 7), _full(v & 3, 3))
+            case PixelFormat.RGB565:
+                channels = (_full(v >> 11, 31), _full(v >> 5 & 63, 63), _full(v & 31, 31))
+            case PixelFormat.RGB888:
+                channels = (v & 255, v >> 8 & 255, v >> 16)
+        return np.stack(channels, axis=1).astype(np.uint8)
+
+    def values(self, array: NDArray[np.generic]) -> Values:
+        """Give the pixel values, flat in scan order, of an array of this format."""
+        if self is PixelFormat.RGB888:
+            channels = array.reshape(-1, 3).astype(np.uint32)
+            shifted = channels << np.array([0, 8, 16], dtype=np.uint32)
+            return np.asarray(shifted.sum(axis=1, dtype=np.uint32))
+        return array.reshape(-1).astype(np.uint32)
+
+    def pixels(self, values: NDArray[np.integer]) -> Pixels:
+        """Give pixel values, (n,), as array elements: (n,), or (n, 3) for RGB888."""
+        if self is PixelFormat.RGB888:
+            return np.asarray(values[:, None] >> np.array([0, 8, 16]) & 255, dtype=np.uint8)
+        return np.asarray(values, dtype=self.dtype)
+
+    def check(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> None:
+        """Refuse an array that is not memory of this format.
+
+        Raises
+        ------
+        ValueError
+            If shape or type differ, or MONO1 has anything but 0 and 1.
+
+        """
+        want = self.shape(array_shape)
+        if array.shape != want:
+            raise ValueError(
+                f"the array has the shape {array.shape}, a {self.value} frame of this display "
+                f"has {want}, indexed [z, y, x]"
+            )
+        if array.dtype != self.dtype:
+            raise ValueError(
+                f"the array is {array.dtype}, a {self.value} frame is {self.dtype.__name__}: "
+                f"convert it with array.astype('{self.dtype.__name__}')"
+            )
+        if self is PixelFormat.MONO1 and (array.astype(np.uint8) > 1).any():
+            raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
+
+
+def _level(channel: NDArray[np.integer], top: int) -> NDArray[np.integer]:
+    """Nearest of the levels 0..top to a channel of 0..255."""
+    return (channel * top * 2 + 255) // 510
+
+
+def _full(level: NDArray[np.integer], top: int) -> NDArray[np.integer]:
+    """Channel of 0..255 of a level of 0..top."""
+    return (level * 510 + top) // (2 * top)
