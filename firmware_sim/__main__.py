@@ -1,0 +1,213 @@
+"""The program ``voxdisplay-sim``: a device on a pseudo-terminal or a TCP port.
+
+Its first line on stdout is a JSON object that says where the device is; all else goes to stderr.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import re
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from firmware_sim.bench import Bench
+from firmware_sim.config import Config, parse_number, parse_refresh, parse_size
+from firmware_sim.device import Device
+from firmware_sim.faults import parse_faults
+from firmware_sim.memory import FORMATS
+from firmware_sim.npy import write_npy
+from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.wire import Wire
+
+_EPILOG = """\
+examples:
+  voxdisplay-sim
+      128x128x128 rgb888 on a pseudo-terminal; its path is in the first line
+  voxdisplay-sim --link /tmp/voxdisplay --dump front.npy
+      the same, always to be found as /tmp/voxdisplay, and the picture in a file for numpy
+  voxdisplay-sim --tcp 127.0.0.1:5000 --size 64x64x64 --format mono1 --refresh 0
+      a smaller one on TCP that swaps at once
+  voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
+      on a bad line: bits inverted and bytes lost, at the same places each time
+"""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the program.
+
+    Parameters
+    ----------
+    argv
+        Arguments; None for those of the process.
+
+    Returns
+    -------
+    int
+        Exit code: 0 after SIGINT or SIGTERM. Bad arguments exit with 2.
+    """
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.link and options.tcp:
+        parser.error("--link is a name for a pseudo-terminal: leave out --tcp")
+    try:
+        config = Config(options.size, options.format, options.refresh, options.rx_buffer)
+        device = Device(config)
+        if options.dump:
+            _dump_swaps(device, options.dump)
+        with _signals() as stop:
+            _serve(Wire(device, options.fault, options.seed), options, stop)
+    except (ValueError, OSError) as error:
+        parser.error(str(error))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    default = Config()
+    parser = argparse.ArgumentParser(
+        prog="voxdisplay-sim",
+        description="Emulate a volumetric display.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument(
+        "--pty", action="store_true", help="be found on a pseudo-terminal (the default)"
+    )
+    place.add_argument(
+        "--tcp",
+        metavar="HOST:PORT",
+        type=_argument(_parse_address),
+        help="be found on a TCP port, one connection at a time; port 0 is any that is free",
+    )
+    parser.add_argument(
+        "--allow-remote", action="store_true", help="let other machines reach the TCP port"
+    )
+    parser.add_argument(
+        "--link", metavar="PATH", type=Path, help="keep a symbolic link to the pseudo-terminal"
+    )
+    parser.add_argument(
+        "--size",
+        metavar="NXxNYxNZ",
+        type=_argument(parse_size),
+        default=default.grid,
+        help="grid (default: 128x128x128)",
+    )
+    parser.add_argument(
+        "--format",
+        choices=tuple(FORMATS),
+        default=default.pixel_format,
+        help="pixel format (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--refresh",
+        metavar="HZ",
+        type=_argument(parse_refresh),
+        default=default.refresh,
+        help="refresh ticks a second; 0: a swap happens at once (default: 30)",
+    )
+    parser.add_argument(
+        "--rx-buffer",
+        metavar="BYTES",
+        type=_argument(parse_number),
+        default=default.rx_buffer,
+        help="size of the receive ring, which is the credit (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--fault",
+        metavar="SPEC",
+        type=_argument(parse_faults),
+        default=(),
+        help="a bad line: KIND=RATE,... with the kinds flip (bits) and drop (bytes)",
+    )
+    parser.add_argument(
+        "--seed",
+        metavar="N",
+        type=_argument(parse_number),
+        default=0,
+        help="where the chance of --fault begins (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--dump",
+        metavar="FILE.npy",
+        type=Path,
+        help="write the front page there at the start and after each swap",
+    )
+    return parser
+
+
+def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Make the message of a parser's ValueError that of argparse."""
+
+    def parse_argument(text: str) -> Any:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parse_argument
+
+
+def _parse_address(text: str) -> tuple[str, int]:
+    match = re.fullmatch(r"\[?([^\[\]]+?)\]?:([0-9]{1,5})", text)
+    if not match or int(match[2]) > 0xFFFF:
+        raise ValueError(f"{text!r} is no address: write HOST:PORT like 127.0.0.1:5000")
+    return match[1], int(match[2])
+
+
+def _dump_swaps(device: Device, path: Path) -> None:
+    bench = Bench(device)
+    write_npy(path, bench.snapshot())  # what cannot be written is better known at the start
+
+    def dump() -> None:
+        try:
+            write_npy(path, bench.snapshot())
+        except OSError as error:
+            sys.stderr.write(f"voxdisplay-sim: {error}: this picture is not dumped\n")
+
+    device.on_swap = dump
+
+
+@contextlib.contextmanager
+def _signals() -> Iterator[int]:
+    """Turn SIGINT and SIGTERM into a file descriptor that becomes readable."""
+    stop, stopper = os.pipe()
+    names = (signal.SIGINT, signal.SIGTERM)
+    handlers = [signal.signal(name, lambda *_: os.write(stopper, b"\0")) for name in names]
+    try:
+        yield stop
+    finally:
+        for name, handler in zip(names, handlers, strict=True):
+            signal.signal(name, handler)
+        os.close(stop)
+        os.close(stopper)
+
+
+def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
+    if options.tcp:
+        with listen(*options.tcp, remote=options.allow_remote) as listener:
+            host, port = listener.getsockname()[:2]
+            _announce(wire, f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
+            serve_tcp(wire, listener, stop)
+        return
+    with contextlib.ExitStack() as stack:
+        line, name = stack.enter_context(open_pty())
+        if options.link:
+            stack.enter_context(linked(options.link, name))
+        _announce(wire, name)
+        serve_wire(wire, line, stop)
+
+
+def _announce(wire: Wire, port: str) -> None:
+    config = wire.device.config
+    place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
+    sys.stdout.write(json.dumps(place) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

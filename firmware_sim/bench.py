@@ -1,0 +1,110 @@
+"""The bench face: what a person in the laboratory sees of the device, past the wire.
+
+For tests and viewers; nothing here is part of the protocol.
+"""
+
+from dataclasses import dataclass
+
+from firmware_sim import spec
+from firmware_sim.device import Device
+
+_TYPES = {
+    value: name.removeprefix("TYPE_")
+    for name, value in vars(spec).items()
+    if name.startswith("TYPE_")
+}
+_CODES = {
+    value: name.removeprefix("CODE_")
+    for name, value in vars(spec).items()
+    if name.startswith("CODE_")
+}
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What is on display.
+
+    Parameters
+    ----------
+    pixels
+        All pixels in scan order as they stand in memory; MONO1 has a byte for each voxel.
+    grid
+        (nx, ny, nz).
+    pixel_format
+        ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
+    frame
+        Frame id, or None if no frame of the open session is on display.
+    digest
+        Digest of the page, section 8.
+    """
+
+    pixels: bytes
+    grid: tuple[int, int, int]
+    pixel_format: str
+    frame: int | None
+    digest: int
+
+
+@dataclass(frozen=True)
+class Counters:
+    """What has happened since the start of the device.
+
+    Parameters
+    ----------
+    packets
+        Packets taken, by type: its name, or its number if it has none.
+    refused
+        ERRORs sent, by the name of their code.
+    damaged
+        Damaged segments.
+    swaps
+        Swaps.
+    overruns
+        How many times bytes found no room in the receive ring.
+    """
+
+    packets: dict[str, int]
+    refused: dict[str, int]
+    damaged: int
+    swaps: int
+    overruns: int
+
+
+class Bench:
+    """Sees a device from outside, and has its power switch.
+
+    Parameters
+    ----------
+    device
+        The device.
+    """
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+
+    def snapshot(self) -> Snapshot:
+        """Return what is on display."""
+        device = self._device
+        front = device.memory.front
+        return Snapshot(
+            bytes(front.pixels),
+            device.config.grid,
+            device.config.pixel_format,
+            device.session.shown if device.session else None,
+            front.digest,
+        )
+
+    def counters(self) -> Counters:
+        """Return what has happened since the start of the device."""
+        device = self._device
+        return Counters(
+            {_TYPES.get(kind, str(kind)): n for kind, n in sorted(device.taken.items())},
+            {_CODES[code]: n for code, n in sorted(device.refused.items())},
+            device.damaged,
+            device.swaps,
+            device.refused.get(spec.CODE_OVERRUN, 0),
+        )
+
+    def power_cycle(self) -> None:
+        """Switch the device off and on: another boot id, no session, dark pages."""
+        self._device.power_cycle()

@@ -1,0 +1,163 @@
+"""What kind of device is emulated, and what would be no device of the protocol.
+
+Everything here is known before the device starts.
+"""
+
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+from firmware_sim import spec
+from firmware_sim.grid import Grid
+from firmware_sim.memory import FORMATS, PixelFormat
+from firmware_sim.sender import wire_size
+
+FEATURES: Final = {"read": spec.FEATURE_READ, "digest": spec.FEATURE_DIGEST}
+_INFO_FIXED: Final = 29  # bytes of an INFO's payload before its strings (5)
+_U32: Final = 0xFFFFFFFF
+
+
+@dataclass(frozen=True)
+class Config:
+    """A device.
+
+    Parameters
+    ----------
+    grid
+        Voxels along x, y and z.
+    pixel_format
+        ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
+    refresh
+        Refresh ticks per 1000 seconds; 0: a swap happens at once.
+    rx_buffer
+        Size of the receive ring in bytes, which is the credit.
+    max_payload
+        Longest payload in bytes.
+    boot
+        Boot id, 0 to 65535; None for one at random.
+    name, firmware, serial
+        What INFO says.
+    features
+        Names of what is announced: ``"read"``, ``"digest"``.
+    silent
+        How many ACKs in a row are left out while more packets can be taken, 0 to 8 (9).
+
+    Attributes
+    ----------
+    shape : Grid
+        The grid.
+    pixels : PixelFormat
+        The pixel format.
+
+    Raises
+    ------
+    ValueError
+        If the protocol has no such device; the message says what to change.
+    """
+
+    grid: tuple[int, int, int] = (128, 128, 128)
+    pixel_format: str = "rgb888"
+    refresh: int = 30_000
+    rx_buffer: int = 16_384
+    max_payload: int = 1024
+    boot: int | None = None
+    name: str = "voxdisplay emulator"
+    firmware: str = "1.0"
+    serial: str = ""
+    features: frozenset[str] = frozenset(FEATURES)
+    silent: int = 0
+    shape: Grid = field(init=False, repr=False, compare=False)
+    pixels: PixelFormat = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shape", Grid(*self.grid))
+        if self.pixel_format not in FORMATS:
+            raise ValueError(
+                f"pixel format {self.pixel_format!r}: take one of {', '.join(FORMATS)}"
+            )
+        object.__setattr__(self, "pixels", FORMATS[self.pixel_format])
+        unknown = ", ".join(sorted(self.features - FEATURES.keys()))
+        if unknown:
+            raise ValueError(f"feature {unknown}: take of {', '.join(FEATURES)}")
+        _check("refresh", self.refresh, 0, _U32)
+        _check("max_payload", self.max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
+        longest = wire_size(self.max_payload + spec.LIMIT_OVERHEAD)
+        _check("rx_buffer", self.rx_buffer, spec.LIMIT_RESERVE + longest, _U32)
+        _check("silent", self.silent, 0, spec.LIMIT_MAX_SILENT)
+        if self.boot is not None:
+            _check("boot", self.boot, 0, 0xFFFF)
+        for name, text in (
+            ("name", self.name),
+            ("firmware", self.firmware),
+            ("serial", self.serial),
+        ):
+            _check(f"bytes of the {name}", len(text.encode()), 0, 0xFF)
+        info = _INFO_FIXED + len(self.strings)
+        if info > self.max_payload:
+            raise ValueError(
+                f"INFO needs {info} bytes: take shorter strings or a max_payload of {info} or more"
+            )
+
+    @property
+    def strings(self) -> bytes:
+        """Name, firmware and serial as INFO ends with them."""
+        texts = (text.encode() for text in (self.name, self.firmware, self.serial))
+        return b"".join(bytes((len(text),)) + text for text in texts)
+
+
+def _check(what: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise ValueError(f"{what} is {value}: take a number from {low} to {high}")
+
+
+def parse_number(text: str) -> int:
+    """Read a whole number, decimal or with 0x in front.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise ValueError(f"{text!r} is no whole number: write one like 16384") from None
+
+
+def parse_size(text: str) -> tuple[int, int, int]:
+    """Read a grid such as ``128x128x128``.
+
+    Raises
+    ------
+    ValueError
+        If it is not three numbers with an x between them.
+    """
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})x([0-9]{1,9})", text, re.IGNORECASE)
+    if not match:
+        raise ValueError(f"{text!r} is no grid: write three numbers of voxels like 128x128x128")
+    nx, ny, nz = map(int, match.groups())
+    return nx, ny, nz
+
+
+def parse_refresh(text: str) -> int:
+    """Read a refresh rate in hertz.
+
+    Returns
+    -------
+    int
+        Ticks per 1000 seconds.
+
+    Raises
+    ------
+    ValueError
+        If it is not a number from 0 on.
+    """
+    try:
+        return round(float(text) * 1000)
+    except (ValueError, OverflowError):
+        raise ValueError(f"{text!r} is no number of hertz: write one like 30 or 29.97") from None
+
+
+def parse_features(text: str) -> frozenset[str]:
+    """Read names of features with commas between them."""
+    return frozenset(filter(None, text.lower().split(",")))

@@ -1,0 +1,331 @@
+"""The wire face of the device: bytes in, bytes out, and the refresh tick (3 to 13).
+
+No clock, no input or output and no thread inside: all that happens, happens in a call.
+"""
+
+import random
+import re
+import struct
+from typing import TYPE_CHECKING
+
+from firmware_sim import spec
+from firmware_sim.config import FEATURES, Config
+from firmware_sim.memory import Memory
+from firmware_sim.pack import pack
+from firmware_sim.receiver import Receiver
+from firmware_sim.refusal import Refusal
+from firmware_sim.sender import send
+from firmware_sim.session import Session, State, Verdict
+from firmware_sim.unpack import unpack
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+TX_BUFFER = 65_536  # with so many bytes to be sent, the device takes no more packets
+_DATA_FLAGS = spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT
+_HELLO = struct.Struct("<BHBB")
+_INFO = struct.Struct("<BHHBBHHHBBHIII")
+_ACK = struct.Struct("<BHHIIIH")
+_READ = struct.Struct("<BII")
+_PAGE = struct.Struct("<BII")
+_ERROR = struct.Struct("<BHH")
+
+
+class Device:
+    """A volumetric display.
+
+    Parameters
+    ----------
+    config
+        What kind of device.
+
+    Attributes
+    ----------
+    boot : int
+        Boot id.
+    memory : Memory
+        The two pages.
+    session : Session or None
+        The open session.
+    taken : dict of int to int
+        How many packets of each type have been taken.
+    refused : dict of int to int
+        How many ERRORs of each code have been sent.
+    damaged, swaps : int
+        How many damaged segments there have been, and how many swaps.
+    on_swap : callable
+        Is called with nothing after each swap, for who looks on.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        self.boot = random.randrange(0x10000) if config.boot is None else config.boot
+        self.on_swap: Callable[[], object] = lambda: None
+        self._features = sum(1 << FEATURES[name] for name in config.features)
+        self._start()
+
+    def _start(self) -> None:
+        self.memory = Memory(self.config.shape, self.config.pixels)
+        self.taken: dict[int, int] = {}
+        self.refused: dict[int, int] = {}
+        self.damaged = 0
+        self.swaps = 0
+        self.disconnect()
+
+    def power_cycle(self) -> None:
+        """Start again: another boot id, no session, dark pages."""
+        self.boot = (self.boot + 1) % 0x10000
+        self._start()
+
+    def disconnect(self) -> None:
+        """End the session and drop what has not been taken or sent: the carrier is gone (16)."""
+        self.session: Session | None = None
+        self._receiver = Receiver(self.config.max_payload + spec.LIMIT_OVERHEAD)
+        self._ring = bytearray()  # whole segments and a begun one that have not been read
+        self._waiting = b""  # the packet that waits for the tick (6, point 6)
+        self._waiting_size = 0  # its bytes on the wire, which still stand in the ring
+        self._lost = False  # bytes were lost, and the ring has not been read since
+        self._torn = False  # the stream stands in a segment whose begin was lost
+        self._unanswered = 0  # DATA packets whose ACK was left out
+        self._out = bytearray()
+
+    # The wire
+
+    @property
+    def pending(self) -> bool:
+        """Whether a whole frame waits for its tick."""
+        return self.session is not None and self.session.state is State.PENDING
+
+    @property
+    def _stopped(self) -> bool:
+        """Whether the device takes no packet for now.
+
+        Either one waits for the tick, or the host does not read the answers. It stops between
+        two segments, so that the ring begins with a whole one.
+        """
+        return bool(self._waiting) or (len(self._out) >= TX_BUFFER and self._receiver.idle)
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the carrier.
+
+        Parameters
+        ----------
+        data
+            Any bytes. What finds no room in the ring is lost.
+        """
+        if not data:
+            return
+        if self._lost:
+            self._torn = not data.endswith(b"\0")
+            return
+        at = 0
+        if self._torn:
+            at = data.find(0) + 1
+            self._torn = not at
+            if self._torn:
+                return
+        at = self._take(data, at)
+        self._store(data[at:])
+
+    def transmit(self) -> bytes:
+        """Return all that waits to be sent."""
+        out, self._out = self._out, bytearray()
+        if (self._ring or self._lost) and not self._stopped:
+            self._drain()
+        return bytes(out)
+
+    def tick(self) -> None:
+        """Begin a refresh: a whole frame is put on display."""
+        if not self.pending:
+            return
+        self._swap()
+        self._acknowledge()
+        if self._waiting:
+            packet, self._waiting, self._waiting_size = self._waiting, b"", 0
+            self._dispatch(packet)
+            self._drain()
+
+    def _drain(self) -> None:
+        """Go on with what stands in the ring."""
+        ring, self._ring = self._ring, bytearray()
+        self._lost = False
+        self._ring += ring[self._take(ring, 0) :]
+
+    def _take(self, data: bytes | bytearray, at: int) -> int:
+        """Take packets until the data ends or the device stops; return where that is."""
+        receiver = self._receiver
+        while at < len(data) and not self._stopped:
+            at = receiver.read(data, at)
+            if receiver.packet is not None:
+                self._dispatch(receiver.packet)
+            elif receiver.damaged:
+                self._damage()
+        if self._unanswered:
+            self._acknowledge()
+        return at
+
+    def _store(self, data: bytes) -> None:
+        """Keep what cannot be read now in the ring, as far as there is room."""
+        # A 00 behind a 00 says nothing and needs no room: section 9.2 lets the host send it.
+        ends = self._ring.endswith(b"\0") if self._ring else True
+        data = re.sub(rb"\0+", b"\0", data.lstrip(b"\0") if ends else data)
+        room = self.config.rx_buffer - self._waiting_size - len(self._ring)
+        self._ring += data[:room]
+        if len(data) <= room:
+            return
+        # The segment that was cut is a damaged one: nothing of it stays.
+        del self._ring[self._ring.rfind(0) + 1 :]
+        self._lost = True
+        self._torn = not data.endswith(b"\0")
+        self._refuse(0, 0, Refusal(spec.CODE_OVERRUN, 0, "more bytes than credit"))
+        self._damage()
+
+    def _damage(self) -> None:
+        self.damaged += 1
+        if self.session:
+            self._acknowledge()
+
+    def _send(self, kind: int, flags: int, seq: int, frame: int, payload: bytes) -> None:
+        self._out += send(kind, flags, seq, frame, payload)
+
+    # Packets
+
+    def _dispatch(self, packet: bytes) -> None:
+        """Take a packet, or keep it if it must wait."""
+        kind = packet[0] >> 4
+        session = self.session
+        if session and kind == spec.TYPE_DATA and session.must_wait(packet[1], packet[2]):
+            self._waiting = packet
+            self._waiting_size = self._receiver.size + 1
+            return
+        self.taken[kind] = self.taken.get(kind, 0) + 1
+        try:
+            self._answer(packet)
+        except Refusal as refusal:
+            self._refuse(packet[1], packet[2], refusal)
+            if kind == spec.TYPE_DATA:
+                self.session = None
+
+    def _answer(self, packet: bytes) -> None:
+        kind, flags = packet[0] >> 4, packet[0] & 15
+        seq, frame = packet[1:3]
+        if kind == spec.TYPE_HELLO:
+            self._hello(packet)
+        elif not self.session:
+            raise Refusal(spec.CODE_NO_SESSION, 0, "no session is open")
+        elif kind == spec.TYPE_DATA:
+            self._data(self.session, packet, flags, seq, frame)
+        elif kind == spec.TYPE_STATUS:
+            self._status(packet, flags, seq, frame)
+        elif kind == spec.TYPE_READ and self._features >> spec.FEATURE_READ & 1:
+            self._read(packet, flags, seq, frame)
+        else:
+            raise Refusal(spec.CODE_TYPE, 0, f"type {kind} is not one of a host's")
+
+    def _refuse(self, seq: int, frame: int, refusal: Refusal) -> None:
+        self.refused[refusal.code] = self.refused.get(refusal.code, 0) + 1
+        number = self.session.number if self.session else 0
+        error = _ERROR.pack(refusal.code, number, refusal.offset)
+        self._send(spec.TYPE_ERROR, 0, seq, frame, error + refusal.text.encode())
+
+    def _hello(self, packet: bytes) -> None:
+        if len(packet) < 3 + _HELLO.size:
+            raise Refusal(spec.CODE_LENGTH, 0, "a HELLO has 5 bytes of payload")
+        major, number, _minor, _reserved = _HELLO.unpack_from(packet, 3)
+        if not number:
+            raise Refusal(spec.CODE_FIELD, 4, "a session has a number other than 0")
+        if major == spec.VERSION_MAJOR:
+            self.session = Session(number)
+            self._unanswered = 0
+        config = self.config
+        info = _INFO.pack(
+            spec.VERSION_MAJOR,
+            number,
+            self.boot,
+            spec.VERSION_MINOR,
+            config.pixels.code,
+            *config.grid,
+            Memory.PAGES,
+            0,
+            config.max_payload,
+            config.rx_buffer,
+            config.refresh,
+            self._features,
+        )
+        self._send(spec.TYPE_INFO, 0, 0, 0, info + config.strings)
+
+    def _data(self, session: Session, packet: bytes, flags: int, seq: int, frame: int) -> None:
+        if flags & ~_DATA_FLAGS:
+            raise Refusal(spec.CODE_FIELD, 0, "a reserved flag of DATA is not 0")
+        verdict = session.judge(seq, frame, flags)
+        if verdict is Verdict.BEGIN:
+            session.begin(frame, flags)
+            self.memory.begin(dark=bool(flags & spec.DATA_FLAG_CLEAR))
+        if verdict in (Verdict.BEGIN, Verdict.APPLY):
+            unpack(packet, self.config.shape, self.config.pixels, self.memory.back)
+            session.mark(seq, flags)
+        session.last = seq
+        self._unanswered += 1
+        if self.pending and not self.config.refresh:
+            self._swap()
+            self._acknowledge()
+        elif self._unanswered > self.config.silent:
+            self._acknowledge()
+
+    def _swap(self) -> None:
+        if self.session:
+            self.session.swap()
+        self.memory.swap()
+        self.swaps += 1
+        self.on_swap()
+
+    def _acknowledge(self, tag: int | None = None) -> None:
+        """Send an ACK, which answers a STATUS if it has a tag (9)."""
+        session = self.session
+        if not session:
+            return
+        self._unanswered = 0
+        shown = session.shown is not None
+        flags = spec.ACK_FLAG_SHOWN if shown else 0
+        if session.state is State.PENDING:
+            flags |= spec.ACK_FLAG_PENDING
+        if tag is not None:
+            flags |= spec.ACK_FLAG_ASKED
+        ack = _ACK.pack(
+            session.last if tag is None else tag,
+            session.number,
+            self.boot,
+            session.received,
+            self.config.rx_buffer,
+            self.memory.front.digest if self._features >> spec.FEATURE_DIGEST & 1 else 0,
+            self.damaged & 0xFFFF,
+        )
+        self._send(spec.TYPE_ACK, flags, session.next, session.shown or 0, ack)
+
+    def _status(self, packet: bytes, flags: int, seq: int, frame: int) -> None:
+        if len(packet) > 3:
+            raise Refusal(spec.CODE_LENGTH, 0, "a STATUS has no payload")
+        _check_zero((flags, 0), (frame, 2))
+        self._acknowledge(tag=seq)
+
+    def _read(self, packet: bytes, flags: int, seq: int, frame: int) -> None:
+        if len(packet) != 3 + _READ.size:
+            raise Refusal(spec.CODE_LENGTH, 0, f"a READ has {_READ.size} bytes of payload")
+        reserved, start, count = _READ.unpack_from(packet, 3)
+        _check_zero((flags & ~spec.READ_FLAG_BACK, 0), (frame, 2), (reserved, 3))
+        if not count:
+            raise Refusal(spec.CODE_FIELD, 8, "a READ asks for one voxel at least")
+        if start + count > self.config.shape.volume:
+            raise Refusal(spec.CODE_OUTSIDE, 4, f"{count} voxels from {start} on")
+        page = self.memory.back if flags & spec.READ_FLAG_BACK else self.memory.front
+        room = self.config.max_payload - _PAGE.size
+        covered, ops = pack(page, self.config.pixels, start, count, room)
+        shown = (self.session and self.session.shown) or 0
+        self._send(spec.TYPE_PAGE, flags, seq, shown, _PAGE.pack(0, start, covered) + ops)
+
+
+def _check_zero(*fields: tuple[int, int]) -> None:
+    """Refuse the first reserved (value, offset) that is not 0."""
+    for value, offset in fields:
+        if value:
+            raise Refusal(spec.CODE_FIELD, offset, "a reserved flag or field is not 0")

@@ -1,0 +1,107 @@
+"""The shape of the display: sides, scan order, and where the steps of an octant lead (2, 7.1).
+
+It knows nothing of pixels.
+"""
+
+from dataclasses import dataclass, field
+
+from firmware_sim import spec
+
+
+@dataclass(frozen=True)
+class Grid:
+    """nx by ny by nz voxels.
+
+    Parameters
+    ----------
+    nx, ny, nz
+        Voxels along each axis, 1 to 65535, and 0x7FFFFFFF together at most.
+
+    Attributes
+    ----------
+    sides : tuple of int
+        (nx, ny, nz).
+    strides : tuple of int
+        What one step on each axis adds to the index.
+    volume : int
+        Number of voxels, V.
+    coordinate_size : int
+        Bytes of a coordinate in an op, 1 or 2.
+
+    Raises
+    ------
+    ValueError
+        If the protocol has no such grid.
+    """
+
+    nx: int
+    ny: int
+    nz: int
+    sides: tuple[int, int, int] = field(init=False, repr=False, compare=False)
+    strides: tuple[int, int, int] = field(init=False, repr=False, compare=False)
+    volume: int = field(init=False, repr=False, compare=False)
+    coordinate_size: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        sides = (self.nx, self.ny, self.nz)
+        volume = self.nx * self.ny * self.nz
+        if not all(1 <= side <= spec.LIMIT_MAX_SIDE for side in sides):
+            raise ValueError(f"a grid of {self}: take sides from 1 to {spec.LIMIT_MAX_SIDE} voxels")
+        if volume > spec.LIMIT_MAX_VOXELS:
+            raise ValueError(
+                f"a grid of {self}: take one of {spec.LIMIT_MAX_VOXELS} voxels or less"
+            )
+        for name, value in (
+            ("sides", sides),
+            ("strides", (1, self.nx, self.nx * self.ny)),
+            ("volume", volume),
+            ("coordinate_size", 1 if max(sides) <= 256 else 2),
+        ):
+            object.__setattr__(self, name, value)  # the way of a frozen dataclass
+
+    def __str__(self) -> str:
+        return f"{self.nx}x{self.ny}x{self.nz}"
+
+    def index(self, x: int, y: int, z: int) -> int | None:
+        """Return the index of a voxel, or None if it is not on the grid."""
+        if x >= self.nx or y >= self.ny or z >= self.nz:
+            return None
+        return x + self.nx * (y + self.ny * z)
+
+    def leaves(self, index: int, octant: int, moves: tuple[int, int, int]) -> bool:
+        """Tell whether a chain leaves the grid.
+
+        All its steps go in one direction on each axis, so that its last voxel tells for all.
+
+        Parameters
+        ----------
+        index
+            The chain's first voxel.
+        octant
+            0 to 23, section 7.1.
+        moves
+            How many steps move on the main axis, on the one after it, and on the third.
+        """
+        main = octant >> 3
+        for k, count in enumerate(moves):
+            axis = (main + k) % 3
+            place = index // self.strides[axis] % self.sides[axis]
+            place += -count if octant >> axis & 1 else count
+            if not 0 <= place < self.sides[axis]:
+                return True
+        return False
+
+    def steps(self, octant: int) -> tuple[int, int, int, int]:
+        """Return what each crumb adds to the index.
+
+        Parameters
+        ----------
+        octant
+            0 to 23, section 7.1.
+        """
+        main = octant >> 3
+        ahead, second, third = (
+            -self.strides[axis] if octant >> axis & 1 else self.strides[axis]
+            for axis in (main, (main + 1) % 3, (main + 2) % 3)
+        )
+        return ahead, ahead + second, ahead + third, ahead + second + third

@@ -1,0 +1,171 @@
+"""A device in the host's own process, behind a port of the kind ``sim:``.
+
+It moves bytes and lets time pass; it knows nothing of packets.
+"""
+
+import difflib
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Final
+from urllib.parse import parse_qsl
+
+from firmware_sim.bench import Bench
+from firmware_sim.config import Config, parse_features, parse_number, parse_refresh, parse_size
+from firmware_sim.device import Device
+from firmware_sim.faults import parse_faults
+from firmware_sim.wire import Wire
+
+# Key of the URL: field of the config, and how to read its value.
+_FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
+    "size": ("grid", parse_size),
+    "format": ("pixel_format", str.lower),
+    "refresh": ("refresh", parse_refresh),
+    "rx_buffer": ("rx_buffer", parse_number),
+    "max_payload": ("max_payload", parse_number),
+    "boot": ("boot", parse_number),
+    "name": ("name", str),
+    "firmware": ("firmware", str),
+    "serial": ("serial", str),
+    "features": ("features", parse_features),
+    "silent": ("silent", parse_number),
+}
+_KEYS: Final = (*_FIELDS, "fault", "seed")
+
+
+class InProcessPort:
+    """A device that runs while the host reads and writes.
+
+    One thread may read while another one writes.
+
+    Parameters
+    ----------
+    wire
+        The device on its line.
+
+    Attributes
+    ----------
+    bench : Bench
+        The device's bench face.
+    """
+
+    def __init__(self, wire: Wire) -> None:
+        self.bench = Bench(wire.device)
+        self._wire = wire
+        self._changed = threading.Condition()
+        self._closed = False
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what the device has sent.
+
+        Parameters
+        ----------
+        timeout_s
+            How many seconds to wait for the first byte.
+
+        Returns
+        -------
+        bytes
+            What has come; nothing if the time is over.
+
+        Raises
+        ------
+        ConnectionError
+            If the port is closed.
+        """
+        deadline = time.monotonic() + timeout_s
+        with self._changed:
+            while True:
+                self._check_open()
+                data = self._wire.transmit()
+                left = deadline - time.monotonic()
+                if data or left <= 0:
+                    return data
+                tick = self._wire.until_tick()
+                self._changed.wait(left if tick is None else min(left, tick))
+
+    def write(self, data: bytes, timeout_s: float) -> None:  # noqa: ARG002 - it never waits
+        """Send bytes to the device.
+
+        Parameters
+        ----------
+        data
+            Any bytes. What the device has no room for is lost, and it says so.
+        timeout_s
+            Not needed: the device takes bytes at any time.
+
+        Raises
+        ------
+        ConnectionError
+            If the port is closed.
+        """
+        with self._changed:
+            self._check_open()
+            self._wire.receive(bytes(data))
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Close the port; once more does no harm."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ConnectionError("the port is closed")
+
+
+def open_in_process(url: str) -> InProcessPort:
+    """Open a ``sim:`` port: a new device in this process.
+
+    Parameters
+    ----------
+    url
+        ``sim:``, or ``sim:?KEY=VALUE&KEY=VALUE...`` with the keys ``size`` (64x64x64), ``format``
+        (mono1, index8, rgb565, rgb888), ``refresh`` (hertz; 0: at once), ``rx_buffer`` and
+        ``max_payload`` (bytes), ``boot``, ``silent``, ``seed`` (numbers), ``features``
+        (read,digest), ``name``, ``firmware``, ``serial`` (text), ``fault`` (flip:1e-6,drop:1e-6).
+
+    Returns
+    -------
+    InProcessPort
+        The port.
+
+    Raises
+    ------
+    ValueError
+        If a key is not known or a value cannot be; the message names it.
+
+    Examples
+    --------
+    >>> port = open_in_process("sim:?size=64x64x64&format=mono1")
+    >>> port.read(0)
+    b''
+    >>> port.close()
+    """
+    values = _parse_url(url)
+    faults = parse_faults(values.pop("fault", ""))
+    seed = parse_number(values.pop("seed", "0"))
+    fields = {}
+    for key, text in values.items():
+        name, parse = _FIELDS[key]
+        try:
+            fields[name] = parse(text)
+        except ValueError as error:
+            raise ValueError(f"{key} in {url!r}: {error}") from None
+    return InProcessPort(Wire(Device(Config(**fields)), faults, seed))
+
+
+def _parse_url(url: str) -> dict[str, str]:
+    scheme, mark, query = url.partition("?")
+    if scheme != "sim:" or (mark and not query):
+        raise ValueError(f"port {url!r}: write sim: or sim:?KEY=VALUE&KEY=VALUE...")
+    values: dict[str, str] = {}
+    for key, text in parse_qsl(query, keep_blank_values=True):
+        if key not in _KEYS:
+            near = difflib.get_close_matches(key, _KEYS, n=1, cutoff=0)
+            raise ValueError(f"key {key!r} in {url!r} is not known: did you mean {near[0]!r}?")
+        if key in values:
+            raise ValueError(f"key {key!r} in {url!r} stands there twice: write it once")
+        values[key] = text
+    return values

@@ -1,0 +1,82 @@
+"""From a packet to bytes on the wire: check value, COBS, and the 00 that ends it (3, 4).
+
+It knows nothing of what packets mean.
+"""
+
+from firmware_sim import spec
+from firmware_sim.crc import crc32
+
+_GROUP = 254  # section 3: a group ends after so many bytes without a 00
+
+
+def wire_size(packet: int) -> int:
+    """Return how many bytes a packet has on the wire at most.
+
+    Parameters
+    ----------
+    packet
+        Size of the packet in bytes, check value included, at least 1.
+
+    Returns
+    -------
+    int
+        Its bytes, the most code bytes that COBS can need for them, and the 00.
+    """
+    return packet + -(-packet // _GROUP) + 1
+
+
+def encode(packet: bytes) -> bytes:
+    """Undo every 00 of some bytes by COBS and end them with one.
+
+    Parameters
+    ----------
+    packet
+        Any bytes, but not none at all.
+
+    Returns
+    -------
+    bytes
+        What is sent; its only 00 is the last byte.
+    """
+    wire = bytearray()
+    *parts, last = packet.split(b"\0")
+    for part in parts:
+        _groups(wire, part)
+        rest = len(part) % _GROUP
+        wire.append(rest + 1)
+        wire += part[len(part) - rest :]
+    _groups(wire, last)
+    rest = len(last) % _GROUP
+    if rest or not last:  # nothing follows a last group of 254 bytes
+        wire.append(rest + 1)
+        wire += last[len(last) - rest :]
+    wire.append(0)
+    return bytes(wire)
+
+
+def _groups(wire: bytearray, part: bytes) -> None:
+    """Append all groups of 254 bytes of a part without 00."""
+    for start in range(0, len(part) - _GROUP + 1, _GROUP):
+        wire.append(_GROUP + 1)
+        wire += part[start : start + _GROUP]
+
+
+def send(kind: int, flags: int, seq: int, frame: int, payload: bytes) -> bytes:
+    """Make a packet and encode it.
+
+    Parameters
+    ----------
+    kind, flags
+        Type and flags, 0 to 15 each.
+    seq, frame
+        Bytes 1 and 2 of the header.
+    payload
+        What stands between header and check value.
+
+    Returns
+    -------
+    bytes
+        The packet as it is on the wire.
+    """
+    packet = bytes((kind << 4 | flags, seq, frame)) + payload
+    return encode(packet + crc32(packet).to_bytes(spec.CRC_WIDTH // 8, "little"))

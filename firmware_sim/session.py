@@ -1,0 +1,159 @@
+"""What becomes of a DATA packet: sequence numbers, the window, and frames (6, 9.1).
+
+One object from HELLO to HELLO. It decides and remembers; it knows nothing of bytes, pages or
+answers.
+"""
+
+from enum import Enum, auto
+
+from firmware_sim import spec
+from firmware_sim.refusal import Refusal
+
+_NO_FRAME = 255  # section 6, point 6: f before the first frame
+_SEQ, _FRAME, _CLEAR = 1, 2, 0  # offsets in the header that a refusal points at
+
+
+class State(Enum):
+    """States of the back page, section 13."""
+
+    EMPTY = auto()
+    FILLING = auto()
+    PENDING = auto()
+
+
+class Verdict(Enum):
+    """What the device does with a DATA packet that it takes."""
+
+    APPLY = auto()  # draw it
+    BEGIN = auto()  # begin its frame, then draw it
+    DUPLICATE = auto()  # answer it
+    DROP = auto()  # answer it, and do not mark it as received
+
+
+class Session:
+    """The time between one HELLO and the next.
+
+    Parameters
+    ----------
+    number
+        The host's number for it, not 0.
+
+    Attributes
+    ----------
+    next : int
+        The lowest sequence number that has not been received.
+    received : int
+        Bit i is set if the packet `next` + 1 + i has been received.
+    last : int
+        Sequence number of the last DATA packet taken, 255 before the first.
+    shown : int or None
+        Id of the frame on display, if it is one of this session.
+    state : State
+        State of the back page.
+    """
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.next = 0
+        self.received = 0
+        self.last = 255
+        self.shown: int | None = None
+        self.state = State.EMPTY
+        self._newest = _NO_FRAME  # f of section 6
+        self._clear = False  # the CLEAR flag with which f began
+        self._commit: int | None = None  # lowest sequence number of a COMMIT of f
+
+    def _ahead(self, seq: int) -> int:
+        return (seq - self.next) % 256
+
+    def _is_duplicate(self, seq: int) -> bool:
+        ahead = self._ahead(seq)
+        if ahead >= spec.LIMIT_WINDOW:
+            return ahead >= 256 - spec.LIMIT_WINDOW
+        return bool(self.received << 1 >> ahead & 1)  # the bit of `next` itself is never set
+
+    def must_wait(self, seq: int, frame: int) -> bool:
+        """Tell whether a DATA packet must not be taken before the tick (6, points 6 and 7).
+
+        Parameters
+        ----------
+        seq, frame
+            Bytes 1 and 2 of its header.
+        """
+        return self.state is State.PENDING and frame != self._newest and not self._is_duplicate(seq)
+
+    def judge(self, seq: int, frame: int, flags: int) -> Verdict:
+        """Say what to do with a DATA packet that need not wait.
+
+        Parameters
+        ----------
+        seq, frame
+            Bytes 1 and 2 of its header.
+        flags
+            ``spec.DATA_FLAG_*``.
+
+        Returns
+        -------
+        Verdict
+            If it is not refused.
+
+        Raises
+        ------
+        Refusal
+            SEQUENCE or FRAME.
+        """
+        ahead = self._ahead(seq)
+        if self._is_duplicate(seq):
+            return Verdict.DUPLICATE
+        if ahead >= spec.LIMIT_WINDOW:
+            raise Refusal(spec.CODE_SEQUENCE, _SEQ, f"{seq} is not within 32 of {self.next}")
+        if frame == self._newest:
+            self._check_own(seq, flags)
+            return Verdict.APPLY
+        # What is missing may belong to a frame that is not whole, and to none other.
+        if frame == (self._newest + 1) % 256 and (self.state is State.EMPTY or not ahead):
+            return Verdict.BEGIN
+        if ahead:
+            return Verdict.DROP
+        raise Refusal(spec.CODE_FRAME, _FRAME, f"frame {frame} does not follow {self._newest}")
+
+    def _check_own(self, seq: int, flags: int) -> None:
+        """Check a packet of f (6, points 8 and 1)."""
+        if self.state is not State.FILLING:
+            raise Refusal(spec.CODE_FRAME, _FRAME, "the frame is not open")
+        if self._commit is not None and self._ahead(self._commit) < self._ahead(seq):
+            raise Refusal(spec.CODE_FRAME, _FRAME, "the frame has ended before this packet")
+        if bool(flags & spec.DATA_FLAG_CLEAR) != self._clear:
+            raise Refusal(spec.CODE_FRAME, _CLEAR, "the frame began with another CLEAR flag")
+
+    def begin(self, frame: int, flags: int) -> None:
+        """Begin a frame, and drop the one before if it is not on display."""
+        self.state = State.FILLING
+        self._newest = frame
+        self._clear = bool(flags & spec.DATA_FLAG_CLEAR)
+        self._commit = None
+
+    def mark(self, seq: int, flags: int) -> None:
+        """Remember that a packet of f has been received, and see whether f is whole now."""
+        if flags & spec.DATA_FLAG_COMMIT and (
+            self._commit is None or self._ahead(seq) < self._ahead(self._commit)
+        ):
+            self._commit = seq
+        self.received |= 1 << self._ahead(seq) >> 1
+        if seq == self.next:
+            self._advance()
+        if self._commit is not None and self._ahead(self._commit) >= spec.LIMIT_WINDOW:
+            self.state = State.PENDING
+
+    def _advance(self) -> None:
+        while True:
+            self.next = (self.next + 1) % 256
+            present = self.received & 1
+            self.received >>= 1
+            if not present:
+                return
+
+    def swap(self) -> None:
+        """Remember that f has been put on display."""
+        self.shown = self._newest
+        self.state = State.EMPTY

@@ -1,0 +1,149 @@
+"""The literals of the protocol document, transcribed by hand in the document's order.
+
+No logic here. A test compares each constant with the table that it comes from: row NAME of the
+table ``literals: GROUP`` is ``GROUP_NAME``, and the table ``layout: NAME`` is ``LAYOUT_NAME``, a
+tuple of (field, offset, size) for the fields whose place and size are fixed.
+"""
+
+from typing import Final
+
+# 2.1 Pixel formats
+FORMAT_MONO1: Final = 1
+FORMAT_INDEX8: Final = 2
+FORMAT_RGB565: Final = 3
+FORMAT_RGB888: Final = 4
+
+# 4 Packets
+LAYOUT_HEADER: Final = (("kind", 0, 1), ("seq", 1, 1), ("frame", 2, 1))
+
+CRC_WIDTH: Final = 32
+CRC_POLY: Final = 0x04C11DB7
+CRC_INIT: Final = 0xFFFFFFFF
+CRC_REFIN: Final = 1
+CRC_REFOUT: Final = 1
+CRC_XOROUT: Final = 0xFFFFFFFF
+CRC_CHECK: Final = 0xCBF43926
+
+TYPE_DATA: Final = 1
+TYPE_HELLO: Final = 3
+TYPE_STATUS: Final = 4
+TYPE_READ: Final = 5
+TYPE_ACK: Final = 8
+TYPE_INFO: Final = 9
+TYPE_PAGE: Final = 10
+TYPE_ERROR: Final = 11
+
+# 5 HELLO and INFO
+LAYOUT_HELLO: Final = (
+    ("major", 3, 1),
+    ("session", 4, 2),
+    ("minor", 6, 1),
+    ("reserved", 7, 1),
+)
+
+LAYOUT_INFO: Final = (
+    ("major", 3, 1),
+    ("session", 4, 2),
+    ("boot", 6, 2),
+    ("minor", 8, 1),
+    ("format", 9, 1),
+    ("nx", 10, 2),
+    ("ny", 12, 2),
+    ("nz", 14, 2),
+    ("pages", 16, 1),
+    ("reserved", 17, 1),
+    ("max_payload", 18, 2),
+    ("rx_buffer", 20, 4),
+    ("refresh", 24, 4),
+    ("features", 28, 4),
+)
+
+FEATURE_LINE: Final = 0
+FEATURE_BOX: Final = 1
+FEATURE_DOTS: Final = 2
+FEATURE_OCT: Final = 3
+FEATURE_DIFF: Final = 4
+FEATURE_ARC: Final = 5
+FEATURE_PALETTE: Final = 6
+FEATURE_READ: Final = 7
+FEATURE_DIGEST: Final = 8
+
+# 6 DATA, frames and pages
+DATA_FLAG_CLEAR: Final = 1
+DATA_FLAG_COMMIT: Final = 4
+
+# 7 Ops
+OP_END: Final = 0x00
+OP_PEN: Final = 0x01
+OP_MOVE: Final = 0x02
+OP_STEP: Final = 0x20
+OP_FROM: Final = 0x40
+OP_SKIP: Final = 0x80
+OP_RUN: Final = 0xA0
+OP_LIT: Final = 0xC0
+
+# 8 The digest
+DIGEST_MUL_INDEX: Final = 0x9E3779B1
+DIGEST_MUL_VALUE: Final = 0x85EBCA77
+DIGEST_SHIFT_1: Final = 15
+DIGEST_MUL_1: Final = 0x2C1B3C6D
+DIGEST_SHIFT_2: Final = 12
+DIGEST_MUL_2: Final = 0x297A2D39
+DIGEST_SHIFT_3: Final = 15
+
+# 9 ACK: what the device has, and what it has room for
+LAYOUT_ACK: Final = (
+    ("last", 3, 1),
+    ("session", 4, 2),
+    ("boot", 6, 2),
+    ("received", 8, 4),
+    ("credit", 12, 4),
+    ("digest", 16, 4),
+    ("damaged", 20, 2),
+)
+
+ACK_FLAG_SHOWN: Final = 1
+ACK_FLAG_PENDING: Final = 2
+ACK_FLAG_ASKED: Final = 4
+
+# 10 READ and PAGE
+LAYOUT_READ: Final = (("reserved", 3, 1), ("start", 4, 4), ("count", 8, 4))
+
+READ_FLAG_BACK: Final = 1
+
+LAYOUT_PAGE: Final = (("reserved", 3, 1), ("start", 4, 4), ("count", 8, 4))
+
+# 11 ERROR: what the device refuses
+LAYOUT_ERROR: Final = (("code", 3, 1), ("session", 4, 2), ("offset", 6, 2))
+
+CODE_NO_SESSION: Final = 1
+CODE_TYPE: Final = 2
+CODE_LENGTH: Final = 3
+CODE_FIELD: Final = 4
+CODE_SEQUENCE: Final = 5
+CODE_FRAME: Final = 6
+CODE_OP: Final = 7
+CODE_COUNT: Final = 8
+CODE_TRUNCATED: Final = 9
+CODE_PADDING: Final = 10
+CODE_PIXEL: Final = 11
+CODE_OUTSIDE: Final = 12
+CODE_OVERRUN: Final = 13
+
+# 14 Limits
+LIMIT_WINDOW: Final = 32
+LIMIT_MIN_SEGMENT: Final = 8
+LIMIT_OVERHEAD: Final = 7
+LIMIT_RESERVE: Final = 64
+LIMIT_MIN_PAYLOAD: Final = 64
+LIMIT_MAX_PAYLOAD: Final = 65535
+LIMIT_MAX_SIDE: Final = 65535
+LIMIT_MAX_VOXELS: Final = 0x7FFFFFFF
+LIMIT_MAX_STEPS: Final = 256
+LIMIT_MAX_OCTANT: Final = 23
+LIMIT_MAX_STATUS: Final = 4
+LIMIT_MAX_SILENT: Final = 8
+
+# 15 Versions
+VERSION_MAJOR: Final = 1
+VERSION_MINOR: Final = 0
