@@ -1,0 +1,79 @@
+"""The emulator as a process of its own, and the command line as one."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DEADLINE_S = 60  # for a program that hangs; nothing is measured by it
+
+
+@dataclass
+class Emulator:
+    """A running emulator."""
+
+    process: subprocess.Popen
+    port: str
+
+    def stop(self):
+        self.process.terminate()
+        return self.process.wait(DEADLINE_S)
+
+
+@pytest.fixture
+def emulator():
+    """Start emulators by their arguments; end them after the test."""
+    running = []
+
+    def start(*arguments):
+        command = [sys.executable, "-m", "firmware_sim", *map(str, arguments)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        running.append(process)
+        return Emulator(process, json.loads(process.stdout.readline())["port"])
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.fixture
+def run():
+    """Run ``voxdisplay``; give the finished process."""
+
+    def run(*arguments, stdin="", cwd=ROOT, **environment):
+        variables = {**os.environ, **environment}
+        if "VOXDISPLAY_PORT" not in environment:
+            variables.pop("VOXDISPLAY_PORT", None)
+        return subprocess.run(
+            [sys.executable, "-m", "voxdisplay", *map(str, arguments)],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            cwd=cwd,
+            env=variables,
+            timeout=DEADLINE_S,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """Write a scene file; give its path."""
+
+    def write(content, name="scene.json"):
+        path = tmp_path / name
+        path.write_text(content if isinstance(content, str) else json.dumps(content))
+        return path
+
+    return write

@@ -1,0 +1,71 @@
+"""Whatever a scene file holds, it is a scene or a SceneError."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from voxdisplay.errors import SceneError
+from voxdisplay.scene import read_scene
+from voxdisplay.scene.objects import TYPES
+
+FOLDER = Path(__file__).parents[2] / "examples"
+EXAMPLES = [json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))]
+KEYS = sorted({key for thing in TYPES.values() for key in thing.__struct_fields__} | {"from", "to"})
+
+values = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.floats()
+    | st.integers()
+    | st.text(max_size=9)
+    | st.sampled_from(["t", "1e308*10", "2*pi", "red", "sphere.csv", "../examples/sphere.csv"]),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from(KEYS), inner),
+    max_leaves=8,
+)
+
+
+def read(data: str | bytes) -> None:
+    try:
+        scene = read_scene(data, folder=FOLDER)
+    except SceneError as error:
+        message = f"{error} {error.hint} {error.path}"
+        assert len(message.encode()) < 2000
+    else:
+        for item in scene.items:
+            t = np.linspace(*item.curve.t_range, 3)
+            with np.errstate(all="ignore"):
+                assert item.curve.position(t).shape == (3, 3)
+
+
+@settings(deadline=None)
+@given(st.binary() | st.text())
+def test_any_bytes(data: bytes | str) -> None:
+    read(data)
+
+
+@settings(deadline=None)
+@given(st.sampled_from(sorted(TYPES)), st.dictionaries(st.sampled_from(KEYS), values))
+def test_any_keys_and_values(kind: str, content: dict[str, Any]) -> None:
+    read(json.dumps(content | {"type": kind}))
+    read(json.dumps({"objects": [content | {"type": kind}]}))
+
+
+@settings(deadline=None)
+@given(st.data())
+def test_examples_with_a_part_replaced(data: st.DataObject) -> None:
+    scene = json.loads(json.dumps(data.draw(st.sampled_from(EXAMPLES))))
+    part, depth = scene, data.draw(st.integers(0, 4))
+    while True:
+        keys = list(part) if isinstance(part, dict) else list(range(len(part)))
+        key = data.draw(st.sampled_from(keys))
+        if depth == 0 or not isinstance(part[key], dict | list) or not part[key]:
+            break
+        part, depth = part[key], depth - 1
+    part[key] = data.draw(values)
+    read(json.dumps(scene))

@@ -1,0 +1,100 @@
+"""The command ``voxdisplay``, and what its exit codes mean."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import Final
+
+import click
+
+from voxdisplay import __version__
+from voxdisplay.cli.device import clear, info, ports, read
+from voxdisplay.cli.push import push
+from voxdisplay.cli.voxelize import voxelize
+from voxdisplay.errors import (
+    CurveError,
+    ProtocolError,
+    SceneError,
+    TransportError,
+    VoxDisplayError,
+)
+
+EXIT_REFUSED: Final = 1
+EXIT_USAGE: Final = 2
+EXIT_PIPE: Final = 3
+EXIT_PROTOCOL: Final = 4
+EXIT_INTERNAL: Final = 70
+EXIT_INTERRUPT: Final = 130
+
+_EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
+    (SceneError, EXIT_USAGE),
+    (CurveError, EXIT_USAGE),
+    (TransportError, EXIT_PIPE),
+    (ProtocolError, EXIT_PROTOCOL),
+    (VoxDisplayError, EXIT_REFUSED),
+)
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""Exit codes: 0 done; 1 the device refused, or shows something else; 2 usage or scene;
+    3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted.
+
+    Shell completion: eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)", likewise zsh_source
+    and fish_source.""",
+)
+@click.version_option(__version__, prog_name="voxdisplay")
+@click.option("--debug", is_flag=True, help="Show a traceback with an error.")
+def cli(*, debug: bool) -> None:
+    """Draw on a volumetric display.
+
+    \b
+    voxdisplay push examples/paper-curve.json                      the built-in emulator
+    voxdisplay push examples/paper-curve.json --port /dev/ttyUSB0  a display
+    """  # noqa: D301 - \b keeps click from filling the lines
+    del debug  # read where errors are caught
+
+
+for command in (push, voxelize, info, ports, clear, read):
+    cli.add_command(command)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command line; give its exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in arguments
+    try:
+        cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
+    except click.exceptions.Exit as error:
+        return error.exit_code
+    except click.ClickException as error:
+        error.show()
+        return EXIT_USAGE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; the display keeps its last whole picture", err=True)
+        return EXIT_INTERRUPT
+    except BrokenPipeError:  # whoever read our output has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except VoxDisplayError as error:
+        if debug:
+            traceback.print_exc()
+        click.echo(f"voxdisplay: {error}", err=True)
+        if error.hint:
+            click.echo(f"  {error.hint}", err=True)
+        return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+    except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
+        if debug:
+            traceback.print_exc()
+        click.echo(
+            f"voxdisplay: a fault of this program: {type(error).__name__}: {error}", err=True
+        )
+        click.echo("  please report it with what voxdisplay --debug ... prints", err=True)
+        return EXIT_INTERNAL
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+"""What several commands share: options, and how things are printed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+import voxdisplay as vd
+from voxdisplay.transport.discovery import all_ports
+
+_C = TypeVar("_C", bound=Callable[..., Any])
+DEFAULT_PORT = "sim:"
+
+
+def _complete_port(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
+    del context, parameter
+    return [found.port for found in all_ports() if found.port.startswith(typed)]
+
+
+def port_options(function: _C) -> _C:
+    """Add ``--port``, ``--baud`` and ``--timeout``."""
+    for option in (
+        click.option(
+            "--timeout",
+            "timeout_s",
+            type=click.FloatRange(min=0.1),
+            default=5.0,
+            metavar="SECONDS",
+            show_default=True,
+            help="How long the device may be silent.",
+        ),
+        click.option(
+            "--baud",
+            type=click.IntRange(min=50),
+            default=115200,
+            metavar="RATE",
+            show_default=True,
+            help="Bits per second of a serial line.",
+        ),
+        click.option(
+            "--port",
+            "-p",
+            envvar="VOXDISPLAY_PORT",
+            metavar="PORT",
+            shell_complete=_complete_port,
+            help="sim: | /dev/ttyUSB0 | COM3 | tcp://host:port | a pyserial URL. "
+            "Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+def open_display(port: str | None, baud: int, timeout_s: float) -> vd.Display:
+    """Open what ``--port`` names, or the emulator, and say so."""
+    if not port:
+        note("no --port: using the built-in emulator, sim:")
+        port = DEFAULT_PORT
+    return vd.open(port, baud=baud, timeout_s=timeout_s)
+
+
+def note(text: str) -> None:
+    """Tell a person something on stderr."""
+    click.echo(text, err=True)
+
+
+def print_json(result: dict[str, Any]) -> None:
+    """Print the result for a script."""
+    click.echo(json.dumps(result, allow_nan=False))
+
+
+def device_json(info: vd.DeviceInfo) -> dict[str, Any]:
+    """Give what a script wants to know of a device."""
+    return {
+        "size": list(info.grid),
+        "format": info.format.value,
+        "protocol": info.protocol,
+        "firmware": info.firmware,
+    }
+
+
+def plural(count: int, thing: str) -> str:
+    """Write a count: "1 voxel", "2 voxels"."""
+    return f"{count:,} {thing}{'' if count == 1 else 's'}".replace(",", " ")
+
+
+class SizeType(click.ParamType[vd.Grid]):
+    """A size such as 128x128x128 or 128,128,128."""
+
+    name = "size"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> vd.Grid:
+        """Read it, or fail with a message."""
+        try:
+            return vd.Grid.parse(str(value).replace(",", "x"))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)

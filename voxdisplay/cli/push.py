@@ -1,0 +1,146 @@
+"""``voxdisplay push``: a scene becomes a proved picture."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from typing import Literal
+
+import click
+import numpy as np
+
+import voxdisplay as vd
+from voxdisplay.cli.options import (
+    device_json,
+    json_option,
+    note,
+    open_display,
+    plural,
+    port_options,
+    print_json,
+)
+from voxdisplay.cli.scenes import voxelize_scene
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay push examples/paper-curve.json
+      voxdisplay push curve.json --port /dev/ttyUSB0 --verify
+      cat curve.json | voxdisplay push - --port tcp://127.0.0.1:5000 --json
+    """
+)
+@click.argument("scene", type=click.Path())
+@port_options
+@click.option(
+    "--fit",
+    type=click.Choice(["contain", "none"]),
+    default="contain",
+    show_default=True,
+    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
+    "and clip.",
+)
+@click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
+@json_option
+def push(
+    *,
+    scene: str,
+    port: str | None,
+    baud: int,
+    timeout_s: float,
+    fit: Literal["contain", "none"],
+    verify: bool,
+    as_json: bool,
+) -> None:
+    """Show SCENE, a JSON file or - for stdin, on a display.
+
+    Waits until the device has shown it and its digest agrees.
+    """
+    loaded = vd.load_scene(scene)
+    with open_display(port, baud, timeout_s) as display:
+        fitted, remark = loaded.fitted(display.info.grid, fit)
+        if remark:
+            note(remark)
+        frame = draw(fitted, display)
+        with _progress("sending") as progress:
+            receipt = display.present(frame, progress=progress)
+        assert receipt is not None  # noqa: S101 - it waited
+        if verify:
+            _verify(display, frame)
+        if as_json:
+            print_json(
+                {
+                    "port": display.port,
+                    "device": device_json(display.info),
+                    "frame": receipt.frame,
+                    "voxels": receipt.voxels,
+                    "packets": receipt.packets,
+                    "wire_bytes": receipt.wire_bytes,
+                    "retransmitted": receipt.retransmitted,
+                    "elapsed_s": round(receipt.elapsed_s, 6),
+                    "digest": None if receipt.digest is None else f"{receipt.digest:08x}",
+                    "verified": verify or None,
+                }
+            )
+        else:
+            click.echo(_summary(display, receipt, verify=verify))
+
+
+def draw(scene: vd.Scene, display: vd.Display) -> vd.Frame:
+    """Draw a scene, and say on stderr what the display cannot show."""
+    frame = display.frame()
+    drawings = [
+        frame.draw(sequence, item.color)
+        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
+    ]
+    total = sum(drawing.voxels for drawing in drawings)
+    clipped = sum(drawing.clipped for drawing in drawings)
+    if total and clipped == total:
+        note(f"warning: all {total} voxels are outside the display: the picture is empty")
+    elif clipped:
+        note(f"{clipped} of {total} voxels are outside the display, and not shown")
+    if not all(drawing.exact_color for drawing in drawings):
+        note(f"this is a {display.info.format.value} display: colours are the nearest it has")
+    return frame
+
+
+def _verify(display: vd.Display, frame: vd.Frame) -> None:
+    with _progress("reading back") as progress:
+        got = display.read(progress=progress)
+    if not np.array_equal(got, frame.array()):
+        raise vd.DesyncError("the page that was read back is not the frame that was sent")
+
+
+@contextlib.contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a bar on a terminal, once there is more than one step to wait for."""
+    stream = sys.stderr
+    if not stream.isatty():
+        yield None
+        return
+    with click.progressbar(length=1, label=what, file=stream) as bar:
+        bar.hidden = True
+
+        def update(done: int, total: int) -> None:
+            bar.length, bar.hidden = total, total <= 1
+            bar.update(done - bar.pos)
+
+        yield update
+
+
+def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
+    info = display.info
+    again = f", {receipt.retransmitted} sent again" if receipt.retransmitted else ""
+    device = f"{info.name or 'a display'} {info.firmware}".strip()
+    cost = f"{plural(receipt.packets, 'packet')}, {plural(receipt.wire_bytes, 'byte')}"
+    took = f"{receipt.elapsed_s * 1000:.1f} ms"
+    lines = [
+        f"{display.port}  {device}, {info.grid} {info.format.value}, protocol {info.protocol}",
+        f"{plural(receipt.voxels, 'voxel')} shown: {cost}, {took}{again}",
+    ]
+    if receipt.digest is not None:
+        lines.append(f"proved: the display's digest {receipt.digest:08x} is the frame's")
+    if verify:
+        lines.append(f"verified: all {info.grid.voxels} voxels read back as they were meant")
+    return "\n".join(lines)

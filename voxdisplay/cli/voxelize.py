@@ -1,0 +1,134 @@
+"""``voxdisplay voxelize``: the sequences alone, without a display."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+import voxdisplay as vd
+from voxdisplay.cli.options import SizeType, json_option, note, plural, print_json
+from voxdisplay.cli.scenes import voxelize_scene
+
+_COLUMNS = ("object", "x", "y", "z")
+
+
+@click.command(
+    name="voxelize",
+    epilog="""\b
+    Examples:
+      voxdisplay voxelize curve.json > voxels.csv
+      voxdisplay voxelize curve.json -o voxels.npy --clip 128,128,128
+      voxdisplay voxelize curve.json --json
+    """,
+)
+@click.argument("scene", type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write a .csv, .npy (int32, N x 4) or .json file. Columns: object, x, y, z.",
+)
+@click.option(
+    "--clip",
+    type=SizeType(),
+    metavar="NX,NY,NZ",
+    help="Leave out voxels outside this size.",
+)
+@json_option
+def voxelize(*, scene: str, output: Path | None, clip: vd.Grid | None, as_json: bool) -> None:
+    """Write the voxels along the curves of SCENE, in order.
+
+    SCENE is a JSON file, or - for stdin. Without -o and --json the voxels are printed as CSV.
+    """
+    if output and output.suffix not in _WRITERS:
+        raise click.BadParameter(
+            f"{output} should end in {', '.join(_WRITERS)}", param_hint="--output"
+        )
+    loaded = vd.load_scene(scene)
+    items = loaded.items
+    began_s = time.perf_counter()
+    sequences = voxelize_scene(loaded)
+    seconds = time.perf_counter() - began_s
+    kept = [_kept(sequence, clip) for sequence in sequences]
+    rows = _rows(kept)
+    if output:
+        try:
+            _WRITERS[output.suffix](output, rows)
+        except OSError as error:
+            raise click.ClickException(f"{output} cannot be written: {error.strerror}") from error
+    if as_json:
+        objects = [
+            _report(number, item, sequence, len(sequence) - len(voxels))
+            for number, (item, sequence, voxels) in enumerate(
+                zip(items, sequences, kept, strict=True)
+            )
+        ]
+        print_json({"objects": objects, "voxels": len(rows), "seconds": round(seconds, 6)})
+    elif output:
+        note(f"{output}: {plural(len(rows), 'voxel')} of {plural(len(items), 'object')}")
+    else:
+        _write_csv(sys.stdout, rows)
+
+
+def _kept(sequence: vd.Sequence, clip: vd.Grid | None) -> NDArray[np.int32]:
+    return sequence.voxels if clip is None else sequence.voxels[clip.inside(sequence.voxels)]
+
+
+def _rows(kept: list[NDArray[np.int32]]) -> NDArray[np.int32]:
+    """Columns object, x, y, z: (N, 4)."""
+    counts = [len(voxels) for voxels in kept]
+    numbers = np.repeat(np.arange(len(kept), dtype=np.int32), counts)
+    return np.column_stack((numbers, np.concatenate([np.empty((0, 3), np.int32), *kept])))
+
+
+def _report(number: int, item: Any, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:
+    report = sequence.report
+    return {
+        "object": number,
+        "type": item.type,
+        "voxels": report.voxels,
+        "closed": report.closed,
+        "pieces": report.pieces,
+        "e_max": round(report.e_max, 6),
+        "e_av": round(report.e_av, 6),
+        "gaps": report.gaps,
+        "contacts": report.contacts,
+        "clipped": clipped,
+        "seconds": round(report.seconds, 6),
+    }
+
+
+def _write_csv(stream: Any, rows: NDArray[np.int32]) -> None:
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    writer.writerows(rows.tolist())
+
+
+def _save_csv(path: Path, rows: NDArray[np.int32]) -> None:
+    with path.open("w", encoding="ascii") as stream:
+        _write_csv(stream, rows)
+
+
+def _save_npy(path: Path, rows: NDArray[np.int32]) -> None:
+    np.save(path, rows)
+
+
+def _save_json(path: Path, rows: NDArray[np.int32]) -> None:
+    path.write_text(json.dumps({"columns": _COLUMNS, "voxels": rows.tolist()}), encoding="ascii")
+
+
+_WRITERS: dict[str, Callable[[Path, NDArray[np.int32]], None]] = {
+    ".csv": _save_csv,
+    ".npy": _save_npy,
+    ".json": _save_json,
+}

@@ -1,0 +1,494 @@
+"""A display as its user sees it: frames in, proof out.
+
+`Display` pumps one `Link` over one `Transport`, blocking, in the caller's thread: the only one.
+It writes only what the device has room for, so that writing cannot block against the device's
+answers. It knows when to wait and what to compare; how bytes are made is the business of others.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.errors import (
+    DesyncError,
+    DeviceError,
+    IncompatibleDevice,
+    LocalProtocolError,
+    TransportTimeout,
+)
+from voxdisplay.frame import Frame
+from voxdisplay.grid import Grid
+from voxdisplay.link import Link, PageRead, Ready, Refused, Shown
+from voxdisplay.pixel import PixelFormat, Pixels
+from voxdisplay.transport import Transport, open_transport
+from voxdisplay.wire import spec
+from voxdisplay.wire.packet import Error, Info, Page
+from voxdisplay.wire.spans import decode_spans
+
+TIMEOUT_S = 5.0
+_LONGEST_WAIT_S = 0.5
+_CODES = {
+    value: name.removeprefix("CODE_")
+    for name, value in vars(spec).items()
+    if name.startswith("CODE_")
+}
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What a display says of itself.
+
+    Attributes
+    ----------
+    grid : Grid
+        Its shape.
+    format : PixelFormat
+    protocol : str
+        Version, such as ``"1.0"``.
+    name, firmware, serial : str
+    refresh_hz : float
+        Refresh ticks per second; 0: it shows a frame at once.
+    max_payload_bytes, rx_buffer_bytes : int
+        Longest payload of a packet; room for what is on its way.
+    features : tuple of str
+        What it announced, in lower case.
+    boot : int
+        Another number after each start of the device.
+
+    """
+
+    grid: Grid
+    format: PixelFormat
+    protocol: str
+    name: str
+    firmware: str
+    serial: str
+    refresh_hz: float
+    max_payload_bytes: int
+    rx_buffer_bytes: int
+    features: tuple[str, ...]
+    boot: int
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What it took to show a frame.
+
+    Attributes
+    ----------
+    frame : int
+        Number of the frame on this display handle, from 1.
+    voxels : int
+        Lit voxels.
+    packets, retransmitted : int
+        DATA packets, and how many had to be sent again.
+    wire_bytes : int
+        All bytes sent.
+    elapsed_s : float
+        From handing the frame over to the device's word that it is on display.
+    digest : int or None
+        What the device says it shows; it has been compared. None if the device gives none.
+
+    """
+
+    frame: int
+    voxels: int
+    packets: int
+    wire_bytes: int
+    retransmitted: int
+    elapsed_s: float
+    digest: int | None
+
+
+def open(  # noqa: A001 - as the built-in: vd.open(port)
+    port: str | Transport, *, baud: int = 115200, timeout_s: float = TIMEOUT_S
+) -> Display:
+    """Open a display: the port, and a session with the device behind it.
+
+    Parameters
+    ----------
+    port : str or Transport
+        ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, or an open
+        pipe, which is closed with the display.
+    baud : int
+        Bits per second of a serial line.
+    timeout_s : float
+        How long the device may be silent.
+
+    Raises
+    ------
+    OpenError
+        If the port cannot be opened.
+    TransportTimeout
+        If nothing behind it answers HELLO.
+    IncompatibleDevice
+        If it speaks another protocol major, or has a pixel format we do not know.
+
+    """
+    transport = open_transport(port, baud=baud) if isinstance(port, str) else port
+    try:
+        return Display(transport, timeout_s=timeout_s)
+    except BaseException:
+        transport.close()
+        raise
+
+
+class Display:
+    """An open display. Use it as a context manager, or `close` it.
+
+    Parameters
+    ----------
+    transport : Transport
+        An open pipe to the device.
+    timeout_s : float
+        How long the device may be silent.
+
+    Attributes
+    ----------
+    info : DeviceInfo
+        What the device said of itself.
+    port : str
+        The name the pipe was opened by.
+
+    """
+
+    def __init__(self, transport: Transport, *, timeout_s: float = TIMEOUT_S) -> None:
+        self.port = transport.port
+        self._transport = transport
+        self._timeout_s = timeout_s
+        self._closed = False
+        self._frames = 0
+        self._shown: dict[int, int | None] = {}  # ticket -> digest
+        self._unwaited: dict[int, int] = {}  # ticket -> digest that is meant
+        self._pages: list[Page] = []
+        self._greeted = False
+        self._link = Link(_new_session(), time.monotonic(), patience_s=timeout_s)
+        self.info = self._greet()
+
+    # -- the session
+
+    def _greet(self) -> DeviceInfo:
+        deadline_s = time.monotonic() + self._timeout_s
+        while not self._link.ready:
+            if time.monotonic() > deadline_s:
+                raise self._no_answer()
+            self._turn(deadline_s)
+        self._greeted = True
+        assert self._link.info is not None  # noqa: S101 - ready
+        return _device_info(self._link.info)
+
+    def _no_answer(self) -> TransportTimeout:
+        noise = self._link.stream.noise
+        heard = f"what came was no packet: {noise[:24]!r}" if noise else "nothing came at all"
+        return TransportTimeout(
+            f"nothing on {self.port} answered HELLO within {self._timeout_s:g} s; {heard}",
+            hint="is this the display's port, and its baud rate right?"
+            if noise
+            else "is the display switched on, and this its port?",
+        )
+
+    def _turn(self, deadline_s: float | None = None) -> None:
+        """Write what may be written, wait for an answer or the time to ask, take what comes."""
+        now = time.monotonic()
+        if out := self._link.transmit(now):
+            self._transport.write(out, self._timeout_s)
+        wait_s = self._link.next_timeout(time.monotonic())
+        wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
+        if deadline_s is not None:
+            wait_s = max(0.0, min(wait_s, deadline_s - time.monotonic()))
+        self._take(self._transport.read(wait_s))
+
+    def _take(self, data: bytes) -> None:
+        for event in self._link.receive(data, time.monotonic()):
+            match event:
+                case Ready(info) if self._greeted:
+                    self._check_same(info)
+                case Shown(ticket, digest) if ticket in self._unwaited:
+                    self._settle(ticket, digest)
+                case Shown(ticket, digest):
+                    self._shown[ticket] = digest
+                case PageRead(page):
+                    self._pages.append(page)
+                case Refused(error):
+                    raise _device_error(error)
+
+    def _check_same(self, info: Info) -> None:
+        again = _device_info(info)
+        if (again.grid, again.format) != (self.info.grid, self.info.format):
+            raise IncompatibleDevice(
+                f"the device came back as another: {again.grid} {again.format.value}, "
+                f"it was {self.info.grid} {self.info.format.value}"
+            )
+
+    # -- frames
+
+    def frame(self) -> Frame:
+        """Give a blank frame of the display's grid and format."""
+        return Frame(self.info.grid, self.info.format)
+
+    def present(
+        self, frame: Frame, *, wait: bool = True, progress: Progress | None = None
+    ) -> Receipt | None:
+        """Show a frame.
+
+        Parameters
+        ----------
+        frame : Frame
+            Of this display's grid and format.
+        wait : bool
+            Whether to wait until the frame is on display and its digest has been compared. If not,
+            only the newest frame is kept while an earlier one is on its way: a display that is
+            slower than its caller skips frames, and never lags behind.
+        progress : callable, optional
+            Called with (packets received, packets in all) while it waits.
+
+        Returns
+        -------
+        Receipt or None
+            None if it did not wait.
+
+        Raises
+        ------
+        DesyncError
+            If the device shows something else, also after the frame has been sent again.
+        DeviceError
+            If the device refused the frame.
+        TransportError
+            If the pipe failed.
+
+        """
+        self._check_open()
+        if (frame.grid, frame.format) != (self.info.grid, self.info.format):
+            raise LocalProtocolError(
+                f"the frame is {frame.grid} {frame.format.value}, the display "
+                f"{self.info.grid} {self.info.format.value}",
+                hint="make frames by display.frame()",
+            )
+        if not wait:
+            self._present_newest(frame)
+            return None
+        self.flush()
+        return self._present_and_wait(frame, progress)
+
+    def _present_and_wait(self, frame: Frame, progress: Progress | None) -> Receipt:
+        began_s = time.monotonic()
+        before = _Sent.of(self._link)
+        meant = frame.digest()
+        payloads = frame.payloads(self.info.max_payload_bytes)
+        digest = self._show(payloads, progress)
+        if digest is not None and digest != meant:
+            self._repair(frame, payloads, meant, digest)
+            digest = meant
+        self._frames += 1
+        sent = _Sent.of(self._link)
+        return Receipt(
+            frame=self._frames,
+            voxels=len(frame.lit()[0]),
+            packets=sent.packets - before.packets,
+            wire_bytes=sent.wire_bytes - before.wire_bytes,
+            retransmitted=sent.retransmitted - before.retransmitted,
+            elapsed_s=time.monotonic() - began_s,
+            digest=digest,
+        )
+
+    def _show(self, payloads: list[bytes], progress: Progress | None = None) -> int | None:
+        """Send payloads as one frame that starts dark; give the digest when it is on display."""
+        ticket = self._link.present(payloads)
+        total = max(1, len(payloads))
+        while ticket not in self._shown:
+            self._turn()
+            if progress:
+                progress(total - min(total, self._link.payloads_left), total)
+        return self._shown.pop(ticket)
+
+    def _repair(self, frame: Frame, payloads: list[bytes], meant: int, digest: int) -> None:
+        """Find out what the display shows instead, and send the frame once more."""
+        what = f"the display's digest is {digest:08x}, the frame's {meant:08x}"
+        if "read" in self.info.features:
+            what += f"; {_difference(frame.array(), self.read())}"
+        again = self._show(payloads)
+        if again != meant:
+            raise DesyncError(
+                f"{what}; sent once more, it is {again or 0:08x}",
+                hint="the device does not draw what protocol.md says, or its memory is faulty",
+            )
+
+    def _present_newest(self, frame: Frame) -> None:
+        for ticket in list(self._unwaited):
+            if self._link.withdraw(ticket):
+                del self._unwaited[ticket]
+        ticket = self._link.present(frame.payloads(self.info.max_payload_bytes))
+        self._unwaited[ticket] = frame.digest()
+        self.poll()
+
+    def _settle(self, ticket: int, digest: int | None) -> None:
+        """Note that a frame which nobody waited for is on display, and all before it are over."""
+        meant = self._unwaited[ticket]
+        self._unwaited = {later: d for later, d in self._unwaited.items() if later > ticket}
+        self._frames += 1
+        if digest is not None and digest != meant:
+            raise DesyncError(f"the display's digest is {digest:08x}, the frame's {meant:08x}")
+
+    def poll(self) -> None:
+        """Do what can be done without waiting; for callers of ``present(wait=False)``."""
+        self._check_open()
+        self._turn(time.monotonic())
+
+    def flush(self) -> None:
+        """Wait until every frame that was handed over is on display, or was skipped."""
+        self._check_open()
+        while self._link.backlog:
+            self._turn()
+
+    def clear(self) -> Receipt:
+        """Make the display dark."""
+        self._check_open()
+        self.flush()
+        return self._present_and_wait(self.frame(), None)
+
+    # -- reading back
+
+    def read(self, *, back: bool = False, progress: Progress | None = None) -> Pixels:
+        """Read a page of the device's memory.
+
+        Parameters
+        ----------
+        back : bool
+            The back page, which is being written, instead of the front page.
+        progress : callable, optional
+            Called with (voxels read, voxels in all).
+
+        Returns
+        -------
+        ndarray
+            Indexed [z, y, x], as `Frame.array`.
+
+        Raises
+        ------
+        IncompatibleDevice
+            If the device cannot read.
+
+        """
+        self._check_open()
+        if "read" not in self.info.features:
+            raise IncompatibleDevice(
+                "this display cannot read its memory back",
+                hint="its digest still proves what it shows",
+            )
+        total = self.info.grid.voxels
+        values = np.zeros(total, dtype=np.uint32)
+        at = 0
+        while at < total:
+            self._link.read(at, total - at, back=back)
+            while not self._pages:
+                self._turn()
+            page = self._pages.pop()
+            values[at : at + page.count] = decode_spans(page.ops, page.count, self.info.format)
+            at += page.count
+            if progress:
+                progress(at, total)
+        shape = self.info.format.shape(self.info.grid.array_shape)
+        return self.info.format.pixels(values).reshape(shape)
+
+    # -- the end
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise LocalProtocolError("the display is closed")
+
+    def close(self) -> None:
+        """Close the port. The display keeps its picture. Twice is fine."""
+        if not self._closed:
+            self._closed = True
+            self._transport.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    packets: int
+    wire_bytes: int
+    retransmitted: int
+
+    @classmethod
+    def of(cls, link: Link) -> _Sent:
+        counters = link.counters
+        return cls(counters.packets, counters.wire_bytes, counters.retransmitted)
+
+
+def _new_session() -> int:
+    return 1 + secrets.randbelow(0xFFFF)
+
+
+def _device_info(info: Info) -> DeviceInfo:
+    if info.major != spec.VERSION_MAJOR:
+        raise IncompatibleDevice(
+            f"the device speaks protocol {info.major}.{info.minor}, this driver "
+            f"{spec.VERSION_MAJOR}.{spec.VERSION_MINOR}",
+            hint="update the older of the two",
+        )
+    format_ = PixelFormat.of_wire(info.format)
+    if format_ is None:
+        raise IncompatibleDevice(f"the device has the unknown pixel format {info.format}")
+    return DeviceInfo(
+        grid=Grid(info.nx, info.ny, info.nz),
+        format=format_,
+        protocol=f"{info.major}.{info.minor}",
+        name=info.name,
+        firmware=info.firmware,
+        serial=info.serial,
+        refresh_hz=info.refresh / 1000,
+        max_payload_bytes=info.max_payload,
+        rx_buffer_bytes=info.rx_buffer,
+        features=tuple(
+            name.removeprefix("FEATURE_").lower()
+            for name, bit in vars(spec).items()
+            if name.startswith("FEATURE_") and info.has(bit)
+        ),
+        boot=info.boot,
+    )
+
+
+def _device_error(error: Error) -> DeviceError:
+    name = _CODES.get(error.code, "an unknown code")
+    text = f": {error.text}" if error.text else ""
+    return DeviceError(
+        f"the device refused a packet: {name} ({error.code}) at byte {error.offset}{text}",
+        code=error.code,
+        hint="protocol.md, section 11, says what it means; driver or device has a fault",
+    )
+
+
+def _difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:
+    """Say where two arrays [z, y, x] differ, in one line."""
+    differs = meant != got
+    if differs.ndim == 4:
+        differs = differs.any(axis=-1)
+    places = np.argwhere(differs)
+    if len(places) == 0:
+        return "but its memory reads back as it was meant"
+    z, y, x = places[0].tolist()
+    return (
+        f"{len(places)} voxels differ, the first at ({x}, {y}, {z}): "
+        f"{got[z, y, x]} instead of {meant[z, y, x]}"
+    )

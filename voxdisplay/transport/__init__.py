@@ -1,0 +1,53 @@
+"""Byte pipes, and how a port's name finds one. Knows no packet.
+
+A port is ``kind:rest``: ``sim:``, ``tcp://127.0.0.1:5000``; anything else is pyserial's. Further
+kinds come as entry points of the group ``voxdisplay.transport``: callables that take the whole name
+and give an object with ``read``, ``write`` and ``close`` as of `Transport`. They raise `ValueError`
+for a name that is wrong and `OSError` for a pipe that fails, and need nothing of this package.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import entry_points
+
+from voxdisplay.errors import OpenError
+from voxdisplay.transport.base import Transport
+
+__all__ = ["Transport", "open_transport"]
+
+_GROUP = "voxdisplay.transport"
+
+
+def open_transport(port: str, *, baud: int = 115200) -> Transport:
+    """Open a port.
+
+    Parameters
+    ----------
+    port : str
+        ``sim:``, ``tcp://host:port``, a serial device such as ``/dev/ttyUSB0`` or ``COM3``, or any
+        URL of pyserial.
+    baud : int
+        Bits per second of a serial line.
+
+    Raises
+    ------
+    OpenError
+        If it cannot be opened; the message says why, ``hint`` what to do.
+
+    """
+    kind = match[1] if (match := re.match(r"([a-z][a-z0-9+]+):", port)) else ""
+    if kind == "tcp":
+        from voxdisplay.transport.tcp import TcpTransport  # noqa: PLC0415 - only what is needed
+
+        return TcpTransport(port)
+    for entry in entry_points(group=_GROUP):
+        if entry.name == kind:
+            from voxdisplay.transport.plugin import PluginTransport  # noqa: PLC0415
+
+            return PluginTransport(port, entry.load())
+    if not port.strip():
+        raise OpenError("no port was named", port=port, hint="try sim: for the built-in emulator")
+    from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415
+
+    return SerialTransport(port, baud=baud)

@@ -1,0 +1,70 @@
+"""``tcp://host:port``: a device behind a TCP socket."""
+
+from __future__ import annotations
+
+import socket
+import time
+from urllib.parse import urlsplit
+
+from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+
+_READ_BYTES = 1 << 16
+_CONNECT_S = 5.0
+
+
+class TcpTransport:
+    """A pipe over TCP; small packets leave at once."""
+
+    def __init__(self, port: str) -> None:
+        self.port = port
+        try:
+            url = urlsplit(port)
+            host, number = url.hostname, url.port
+        except ValueError as error:
+            raise OpenError(f"{port}: {error}", port=port) from error
+        if not host or not number or url.path or url.query:
+            raise OpenError(
+                f"{port} is not a TCP port", port=port, hint="write it like tcp://127.0.0.1:5000"
+            )
+        try:
+            self._socket = socket.create_connection((host, number), timeout=_CONNECT_S)
+        except OSError as error:
+            raise OpenError(
+                f"{port} cannot be opened: {error}",
+                port=port,
+                hint="is the device, or voxdisplay-sim --tcp, running there?",
+            ) from error
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self, timeout_s: float) -> bytes:
+        """See `Transport.read`."""
+        try:
+            self._socket.settimeout(max(timeout_s, 0.0))
+            data = self._socket.recv(_READ_BYTES)
+        except (TimeoutError, BlockingIOError):
+            return b""
+        except OSError as error:
+            raise TransportClosed(f"{self.port} is gone: {error}") from error
+        if not data:
+            raise TransportClosed(f"{self.port} was closed by the device")
+        return data
+
+    def write(self, data: bytes, timeout_s: float) -> None:
+        """See `Transport.write`."""
+        deadline_s = time.monotonic() + timeout_s
+        view = memoryview(data)
+        while view:
+            try:
+                self._socket.settimeout(max(deadline_s - time.monotonic(), 1e-3))
+                view = view[self._socket.send(view) :]
+            except TimeoutError as error:
+                raise TransportTimeout(
+                    f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
+                    f"in {timeout_s:.1f} s"
+                ) from error
+            except OSError as error:
+                raise TransportClosed(f"{self.port} is gone: {error}") from error
+
+    def close(self) -> None:
+        """See `Transport.close`."""
+        self._socket.close()
