@@ -27,7 +27,8 @@ from voxdisplay.curves import (
     Segment,
     TorusKnot,
 )
-from voxdisplay.display import DeviceInfo, Display, Receipt, open  # noqa: A004 - vd.open(port)
+from voxdisplay.device import DeviceInfo
+from voxdisplay.display import Display, Receipt, open  # noqa: A004 - vd.open(port)
 from voxdisplay.errors import (
     CurveError,
     DesyncError,

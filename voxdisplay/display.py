@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -17,67 +18,23 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.device import DeviceInfo, device_error, device_info
 from voxdisplay.errors import (
     DesyncError,
-    DeviceError,
     IncompatibleDevice,
     LocalProtocolError,
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
-from voxdisplay.grid import Grid
-from voxdisplay.link import Link, PageRead, Ready, Refused, Shown
-from voxdisplay.pixel import PixelFormat, Pixels
+from voxdisplay.link import Event, Link, PageRead, Ready, Refused, Shown
+from voxdisplay.pixel import Pixels
 from voxdisplay.transport import Transport, open_transport
-from voxdisplay.wire import spec
-from voxdisplay.wire.packet import Error, Info, Page
+from voxdisplay.wire.packet import Info, Page
 from voxdisplay.wire.spans import decode_spans
 
 TIMEOUT_S = 5.0
 _LONGEST_WAIT_S = 0.5
-_CODES = {
-    value: name.removeprefix("CODE_")
-    for name, value in vars(spec).items()
-    if name.startswith("CODE_")
-}
-
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceInfo:
-    """What a display says of itself.
-
-    Attributes
-    ----------
-    grid : Grid
-        Its shape.
-    format : PixelFormat
-    protocol : str
-        Version, such as ``"1.0"``.
-    name, firmware, serial : str
-    refresh_hz : float
-        Refresh ticks per second; 0: it shows a frame at once.
-    max_payload_bytes, rx_buffer_bytes : int
-        Longest payload of a packet; room for what is on its way.
-    features : tuple of str
-        What it announced, in lower case.
-    boot : int
-        Another number after each start of the device.
-
-    """
-
-    grid: Grid
-    format: PixelFormat
-    protocol: str
-    name: str
-    firmware: str
-    serial: str
-    refresh_hz: float
-    max_payload_bytes: int
-    rx_buffer_bytes: int
-    features: tuple[str, ...]
-    boot: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,64 +128,52 @@ class Display:
         self._shown: dict[int, int | None] = {}  # ticket -> digest
         self._unwaited: dict[int, int] = {}  # ticket -> digest that is meant
         self._pages: list[Page] = []
-        self._greeted = False
+        self._events: deque[Event] = deque()
         self._link = Link(_new_session(), time.monotonic(), patience_s=timeout_s)
         self.info = self._greet()
 
     # -- the session
 
     def _greet(self) -> DeviceInfo:
-        deadline_s = time.monotonic() + self._timeout_s
-        while not self._link.ready:
-            if time.monotonic() > deadline_s:
-                raise self._no_answer()
-            self._turn(deadline_s)
-        self._greeted = True
+        try:
+            while not self._link.ready:
+                self._turn()
+        except TransportTimeout as error:
+            raise TransportTimeout(f"{self.port}: {error}", hint=error.hint) from error
         assert self._link.info is not None  # noqa: S101 - ready
-        return _device_info(self._link.info)
+        return device_info(self._link.info)
 
-    def _no_answer(self) -> TransportTimeout:
-        noise = self._link.stream.noise
-        heard = f"what came was no packet: {noise[:24]!r}" if noise else "nothing came at all"
-        return TransportTimeout(
-            f"nothing on {self.port} answered HELLO within {self._timeout_s:g} s; {heard}",
-            hint="is this the display's port, and its baud rate right?"
-            if noise
-            else "is the display switched on, and this its port?",
-        )
-
-    def _turn(self, deadline_s: float | None = None) -> None:
+    def _turn(self, *, wait: bool = True) -> None:
         """Write what may be written, wait for an answer or the time to ask, take what comes."""
-        now = time.monotonic()
-        if out := self._link.transmit(now):
+        if out := self._link.transmit(time.monotonic()):
             self._transport.write(out, self._timeout_s)
-        wait_s = self._link.next_timeout(time.monotonic())
+        wait_s = self._link.next_timeout(time.monotonic()) if wait else 0.0
         wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
-        if deadline_s is not None:
-            wait_s = max(0.0, min(wait_s, deadline_s - time.monotonic()))
-        self._take(self._transport.read(wait_s))
+        data = self._transport.read(wait_s)
+        self._events += self._link.receive(data, time.monotonic())
+        while self._events:
+            self._take(self._events.popleft())
 
-    def _take(self, data: bytes) -> None:
-        for event in self._link.receive(data, time.monotonic()):
-            match event:
-                case Ready(info) if self._greeted:
-                    self._check_same(info)
-                case Shown(ticket, digest) if ticket in self._unwaited:
-                    self._settle(ticket, digest)
-                case Shown(ticket, digest):
-                    self._shown[ticket] = digest
-                case PageRead(page):
-                    self._pages.append(page)
-                case Refused(error):
-                    raise _device_error(error)
+    def _take(self, event: Event) -> None:
+        match event:
+            case Ready(info) if self._link.counters.sessions > 1:
+                self._check_same(info)
+            case Shown(ticket, digest) if ticket in self._unwaited:
+                self._settle(ticket, digest)
+            case Shown(ticket, digest):
+                self._shown[ticket] = digest
+            case PageRead(page):
+                self._pages.append(page)
+            case Refused(error):
+                raise device_error(error)
 
     def _check_same(self, info: Info) -> None:
-        again = _device_info(info)
-        if (again.grid, again.format) != (self.info.grid, self.info.format):
-            raise IncompatibleDevice(
-                f"the device came back as another: {again.grid} {again.format.value}, "
-                f"it was {self.info.grid} {self.info.format.value}"
-            )
+        """Refuse another device behind the same port: what waits to be sent is not for it."""
+        try:
+            self.info = _same(self.info, device_info(info))
+        except IncompatibleDevice:
+            self.close()
+            raise
 
     # -- frames
 
@@ -342,7 +287,7 @@ class Display:
     def poll(self) -> None:
         """Do what can be done without waiting; for callers of ``present(wait=False)``."""
         self._check_open()
-        self._turn(time.monotonic())
+        self._turn(wait=False)
 
     def flush(self) -> None:
         """Wait until every frame that was handed over is on display, or was skipped."""
@@ -385,6 +330,8 @@ class Display:
                 "this display cannot read its memory back",
                 hint="its digest still proves what it shows",
             )
+        self._link.forget_reads()  # of a call that was interrupted
+        self._pages.clear()
         total = self.info.grid.voxels
         values = np.zeros(total, dtype=np.uint32)
         at = 0
@@ -440,43 +387,15 @@ def _new_session() -> int:
     return 1 + secrets.randbelow(0xFFFF)
 
 
-def _device_info(info: Info) -> DeviceInfo:
-    if info.major != spec.VERSION_MAJOR:
+def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:
+    if (now.grid, now.format) != (before.grid, before.format):
         raise IncompatibleDevice(
-            f"the device speaks protocol {info.major}.{info.minor}, this driver "
-            f"{spec.VERSION_MAJOR}.{spec.VERSION_MINOR}",
-            hint="update the older of the two",
+            f"the device came back as another: {now.grid} {now.format.value}, "
+            f"it was {before.grid} {before.format.value}"
         )
-    format_ = PixelFormat.of_wire(info.format)
-    if format_ is None:
-        raise IncompatibleDevice(f"the device has the unknown pixel format {info.format}")
-    return DeviceInfo(
-        grid=Grid(info.nx, info.ny, info.nz),
-        format=format_,
-        protocol=f"{info.major}.{info.minor}",
-        name=info.name,
-        firmware=info.firmware,
-        serial=info.serial,
-        refresh_hz=info.refresh / 1000,
-        max_payload_bytes=info.max_payload,
-        rx_buffer_bytes=info.rx_buffer,
-        features=tuple(
-            name.removeprefix("FEATURE_").lower()
-            for name, bit in vars(spec).items()
-            if name.startswith("FEATURE_") and info.has(bit)
-        ),
-        boot=info.boot,
-    )
-
-
-def _device_error(error: Error) -> DeviceError:
-    name = _CODES.get(error.code, "an unknown code")
-    text = f": {error.text}" if error.text else ""
-    return DeviceError(
-        f"the device refused a packet: {name} ({error.code}) at byte {error.offset}{text}",
-        code=error.code,
-        hint="protocol.md, section 11, says what it means; driver or device has a fault",
-    )
+    if now.max_payload_bytes < before.max_payload_bytes:
+        raise IncompatibleDevice("the device came back with less room for a packet")
+    return now
 
 
 def _difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:

@@ -180,14 +180,20 @@ class Frame:
         coding = Coding(self.grid, self.format, max_payload)
         if self._has_base:
             return encode_spans(self.format.values(self._raster), coding)
-        if not self._items:
+        # Order does not matter any more: a pen that many items share is set once.
+        items = sorted((item for item in self._items if len(item.values)), key=_first_value)
+        if not items:
             return []
-        voxels = np.concatenate([item.voxels for item in self._items])
-        index = np.concatenate([item.index for item in self._items])
-        values = np.concatenate([item.values for item in self._items])
+        voxels = np.concatenate([item.voxels for item in items])
+        index = np.concatenate([item.index for item in items])
+        values = np.concatenate([item.values for item in items])
         # The painter's order, settled here: what a later item covers is not sent at all.
         seen = (self.format.values(self._raster[index]) == values) & (values != 0)
         return encode_chains(voxels[seen], values[seen], coding)
+
+
+def _first_value(item: _Drawn) -> int:
+    return int(item.values[0])
 
 
 def _as_voxels(what: ArrayLike) -> NDArray[np.integer]:

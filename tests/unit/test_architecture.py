@@ -23,7 +23,8 @@ MAY_IMPORT = {
     "scene": {"color", "curves", "errors", "grid", "scene"},
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
-    "display": {"errors", "frame", "grid", "link", "pixel", "transport", "wire"},
+    "device": {"errors", "grid", "pixel", "wire"},
+    "display": {"device", "errors", "frame", "link", "pixel", "transport", "wire"},
 }
 
 

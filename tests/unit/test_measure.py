@@ -42,6 +42,16 @@ def test_few_voxels(size: int, closed: bool) -> None:
     assert violations.tolist() == ([0, 2] if expected else [])
 
 
+def test_no_voxels() -> None:
+    none = np.empty((0, 3), dtype=np.int32)
+    assert measure.contacts(none).shape == (0, 2)
+    assert measure.count_contacts(none) == 0
+    assert measure.gaps(none, closed=True).size == 0
+    assert measure.neighbour_violations(none).size == 0
+    assert measure.distances(none, Function(line)).size == 0
+    assert measure.coverage(none, Function(line)) == np.inf
+
+
 def test_contacts_of_voxels_far_apart() -> None:
     voxels = np.array([[-(2**30), 2**30, 0], [0, 0, 0], [-(2**30), 2**30 - 1, 1]], dtype=np.int32)
     assert measure.contacts(voxels).tolist() == [[0, 2]]
@@ -120,7 +130,12 @@ def test_own_figures_of_a_marched_curve() -> None:
     expected = [
         np.sqrt(((points - (voxel + 0.5)[:, None]) ** 2).sum(axis=0).min()) for voxel in some
     ]
-    assert measure.distances(some, curve) == pytest.approx(expected, abs=1e-6)
+    assert measure.distances(some, curve) == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_curve_without_points_is_not_measured() -> None:
+    with pytest.raises(ValueError, match=r"no point at t = 0\.0"):
+        measure.distances(np.zeros((1, 3), dtype=int), Function(lambda t: (t, t, np.log(t))))
 
 
 def test_a_curve_without_end_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:

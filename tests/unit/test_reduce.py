@@ -32,10 +32,6 @@ def test_corners_are_cut() -> None:
         (0, 0, 0),
         (1, 1, 0),
         (2, 1, 0),
-    ] or thinned([(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]) == [
-        (0, 0, 0),
-        (1, 0, 0),
-        (2, 1, 0),
     ]
 
 
@@ -56,7 +52,7 @@ def test_a_hairpin_stays() -> None:
     assert thinned(hairpin) == hairpin
     # Legs that touch are cut back by no more than what both ends of the cut see.
     narrow = [*up, *[(1, y, 0) for y in range(8, -1, -1)]]
-    assert thinned(narrow)[:8] == up[:8]
+    assert thinned(narrow)[:7] == up[:7]
 
 
 def test_straight_runs_need_no_look() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -77,7 +78,11 @@ def voxelize(*, scene: str, output: Path | None, clip: vd.Grid | None, as_json: 
     elif output:
         note(f"{output}: {plural(len(rows), 'voxel')} of {plural(len(items), 'object')}")
     else:
-        _write_csv(sys.stdout, rows)
+        try:
+            _write_csv(sys.stdout, rows)
+            sys.stdout.flush()
+        except BrokenPipeError:  # whoever reads has enough; so has the flush at exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _kept(sequence: vd.Sequence, clip: vd.Grid | None) -> NDArray[np.int32]:

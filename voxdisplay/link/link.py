@@ -1,26 +1,28 @@
 """The host's end of protocol.md: session, frames, reads, and when to ask.
 
 A `Link` does no I/O and reads no clock: `receive` takes what a pipe brought, `transmit` gives what
-to write, `next_timeout` says when to come back if nothing happens. It knows frames only as payloads
-and an expected digest, and no pipe at all.
+to write, `next_timeout` says when to come back if nothing happens. It knows frames only as
+payloads, and no pipe at all.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown
+from voxdisplay.link.info import check_info
+from voxdisplay.link.silence import Silence
 from voxdisplay.link.window import Window
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.stream import PacketStream
 
 HELLO_INTERVAL_S = 0.25
-FIRST_TIMEOUT_S = 0.25  # before a round trip has been measured
-LEAST_TIMEOUT_S = 0.05  # section 9.3
+MOST_LATE_S = 0.25  # a caller that comes back later than this was away
 MOST_TRANSMISSIONS = 30
 MOST_RESTARTS = 3
 _MODULUS = 256
@@ -68,17 +70,6 @@ class _Request:
     ordinal: int = 0  # 0: to be sent
 
 
-@dataclass(slots=True)
-class _Silence:
-    """When something was last heard, and what has been asked since."""
-
-    heard_s: float
-    asked_s: float
-    progress_s: float
-    backoff: int = 1
-    asked: dict[int, float] = field(default_factory=dict)  # tag -> when
-
-
 class Link:
     """One host talking to one device.
 
@@ -89,7 +80,7 @@ class Link:
     now : float
         Seconds on any steady clock; later calls take the same clock.
     patience_s : float
-        How long silence, or talk without progress, lasts before `TransportTimeout`.
+        How long silence lasts before `TransportTimeout`; talk without progress, twice as long.
 
     """
 
@@ -107,8 +98,9 @@ class Link:
         self._tickets = 0
         self._restarts = 0
         self._hello_due_s = now
-        self._round_trip_s: float | None = None
-        self._silence = _Silence(now, now, now)
+        self._silence = Silence(now, patience_s)
+        self._back_s = math.inf  # when the caller should be back
+        self._starved = False  # something is to be sent, and there is no credit for it
         self._ask_at_once = False
 
     # -- what the caller wants
@@ -161,9 +153,13 @@ class Link:
         """Ask for pixels; `PageRead` brings them, or the first of them."""
         self._requests.append(_Request(start, count, back))
 
-    def reopen(self, session: int, now: float) -> None:
+    def forget_reads(self) -> None:
+        """Want no pixels any more that have been asked for."""
+        self._requests.clear()
+
+    def _reopen(self, now: float) -> None:
         """Begin a new session; frames that are not shown yet are sent again, whole."""
-        self._session = session
+        self._session = self._session % 0xFFFF + 1
         self.info = None
         self._window = Window(0)
         self._next_frame_id = 0
@@ -171,8 +167,9 @@ class Link:
             frame.frame_id, frame.entered = -1, 0
         for request in self._requests:
             request.ordinal = 0
+        self._starved = self._ask_at_once = False
+        self._silence.forget()
         self._hello_due_s = now
-        self._silence = _Silence(now, now, now)
 
     # -- what goes out
 
@@ -186,56 +183,85 @@ class Link:
             lost too often.
 
         """
-        if self.info is None:
-            return self._greet(now)
-        if self._waiting:
-            self._check_patience(now)
-        else:  # nothing was on its way: silence so far says nothing
-            self._silence.heard_s = self._silence.progress_s = now
-        out = bytearray()
-        for wire in self._outgoing(now):
-            out += wire
-        out += self._ask(now)
+        if (late_s := now - self._back_s) > MOST_LATE_S:
+            self._silence.excuse(late_s)
+        out = self._greet(now) if self.info is None else self._converse(now)
         self.counters.wire_bytes += len(out)
-        return bytes(out)
+        timeout_s = self.next_timeout(now)
+        self._back_s = math.inf if timeout_s is None else now + timeout_s
+        return out
+
+    def _converse(self, now: float) -> bytes:
+        if self._waiting:
+            self._silence.check(now)
+        else:  # nothing was on its way: silence so far says nothing
+            self._silence.progress(now)
+        return b"".join(self._outgoing(now)) + self._ask(now)
 
     def _greet(self, now: float) -> bytes:
+        if now >= self._silence.end_s:
+            raise self._silence.error(now) if self.counters.sessions else self._no_answer()
         if now < self._hello_due_s:
             return b""
         self._hello_due_s = now + HELLO_INTERVAL_S
-        wire = b"\0" + packets.encode(packets.Hello(session=self._session))
-        self.counters.wire_bytes += len(wire)
-        return wire
+        return b"\0" + packets.encode(packets.Hello(session=self._session))
+
+    def _no_answer(self) -> TransportTimeout:
+        noise = self.stream.noise
+        heard = f"what came was no packet: {noise[:24]!r}" if noise else "nothing came at all"
+        return TransportTimeout(
+            f"nothing answered HELLO within {self._patience_s:g} s; {heard}",
+            hint="is this the display's port, and its baud rate right?"
+            if noise
+            else "is the display switched on, and this its port?",
+        )
 
     def _outgoing(self, now: float) -> Iterator[bytes]:
-        window = self._window
-        while (seq := window.lost()) is not None:
-            flight = window.flights[seq]
-            if not window.fits(len(flight.wire)):
+        """Give what window and credit allow: what is lost comes first, as all waits for it."""
+        self._starved = False
+        for part in (self._lost_packets(now), self._new_packets(now), self._reads()):
+            yield from part
+            if self._starved:
                 return
+
+    def _lost_packets(self, now: float) -> Iterator[bytes]:
+        while (seq := self._window.lost()) is not None:
+            flight = self._window.flights[seq]
             if flight.transmissions >= MOST_TRANSMISSIONS:
                 raise TransportTimeout(
                     f"packet {seq} did not arrive in {flight.transmissions} tries; the device "
                     f"counts {self.counters.device_damaged} damaged packets",
                     hint="the line is too noisy: lower the baud rate, or look at cable and ground",
                 )
+            if self._starves(len(flight.wire)):
+                return
             self.counters.retransmitted += 1
-            yield window.send(seq, now)
+            yield self._window.send(seq, now)
+
+    def _new_packets(self, now: float) -> Iterator[bytes]:
         for frame in self._frames:
             while not frame.all_entered:
-                size = self._wire_bound(frame)
-                if not (window.has_room and window.fits(size)):
+                if not self._window.has_room or self._starves(self._wire_bound(frame)):
                     return
-                yield window.send(self._enter(frame), now)
                 self.counters.packets += 1
+                yield self._window.send(self._enter(frame), now)
+
+    def _reads(self) -> Iterator[bytes]:
         for request in self._requests:
             if not request.ordinal:
-                yield from self._send_read(request)
+                wire = self._read_packet(request)
+                if self._starves(len(wire)):
+                    return
+                self._tag = request.tag
+                request.ordinal = self._window.send_tagged(request.tag, len(wire))
+                yield wire
+
+    def _starves(self, size: int) -> bool:
+        self._starved = not self._window.fits(size)
+        return self._starved
 
     def _wire_bound(self, frame: _Frame) -> int:
-        payload = frame.payloads[frame.entered] if frame.begun else frame.payloads[0]
-        size = len(payload) + spec.LIMIT_OVERHEAD
-        return size + size // 254 + 2
+        return packets.wire_size(len(frame.payloads[frame.entered]) + spec.LIMIT_OVERHEAD)
 
     def _enter(self, frame: _Frame) -> int:
         """Put the next packet of a frame into the window."""
@@ -251,77 +277,61 @@ class Link:
         )
         return self._window.add(packets.encode(data))
 
-    def _send_read(self, request: _Request) -> Iterator[bytes]:
-        self._tag = request.tag = (self._tag + 1) % _MODULUS
+    def _read_packet(self, request: _Request) -> bytes:
+        request.tag = (self._tag + 1) % _MODULUS
         flags = spec.READ_FLAG_BACK * request.back
-        wire = packets.encode(
+        return packets.encode(
             packets.Read(seq=request.tag, flags=flags, start=request.start, count=request.count)
         )
-        if self._window.fits(len(wire)):
-            request.ordinal = self._window.send_tagged(request.tag, len(wire))
-            yield wire
 
     # -- silence
+
+    @property
+    def _on_its_way(self) -> bool:
+        """Whether an answer comes by itself that brings credit, or pixels."""
+        return bool(
+            self._window.flights
+            or self._silence.asking
+            or any(request.ordinal for request in self._requests)
+        )
 
     @property
     def _waiting(self) -> bool:
         return bool(
             self._window.flights
+            or self._starved
             or any(frame.all_entered for frame in self._frames)
             or any(request.ordinal for request in self._requests)
         )
 
-    @property
-    def _timeout_s(self) -> float:
-        if self._round_trip_s is None:
-            return FIRST_TIMEOUT_S * self._silence.backoff
-        assert self.info is not None  # noqa: S101 - a session is open, or nobody asks
-        tick_s = 1000 / self.info.refresh if self.info.refresh else 0.0
-        least = max(LEAST_TIMEOUT_S, 2 * self._round_trip_s + tick_s)
-        return least * self._silence.backoff
-
-    def _check_patience(self, now: float) -> None:
-        silence = self._silence
-        if now - silence.heard_s > self._patience_s and silence.asked:
-            raise TransportTimeout(
-                f"the device has been silent for {now - silence.heard_s:.1f} s",
-                hint="is it still plugged in and switched on?",
-            )
-        if now - silence.progress_s > 2 * self._patience_s:
-            raise TransportTimeout(
-                f"the device answers, but nothing has moved for {now - silence.progress_s:.1f} s",
-                hint="its firmware may be stuck: switch it off and on",
-            )
-
     def _ask(self, now: float) -> bytes:
         """Give a STATUS if it is time for one."""
         silence = self._silence
-        due = max(silence.heard_s, silence.asked_s) + self._timeout_s <= now
-        if not self._waiting or not (due or self._ask_at_once):
+        if not self._waiting:
             return b""
+        due = silence.ask_due_s <= now
+        at_once = self._ask_at_once or (self._starved and not self._on_its_way)
         self._ask_at_once = False
-        self._tag = (self._tag + 1) % _MODULUS
-        wire = packets.encode(packets.Status(seq=self._tag))
-        if len(silence.asked) >= spec.LIMIT_MAX_STATUS or not self._window.fits(
-            len(wire), reserved=True
-        ):
-            silence.asked_s = now
-            return b""
-        self._window.send_tagged(self._tag, len(wire))
-        silence.asked[self._tag] = silence.asked_s = now
-        silence.backoff *= 2
-        self.counters.statuses += 1
-        return wire
+        if silence.may_ask and (due or at_once):
+            self._tag = (self._tag + 1) % _MODULUS
+            wire = packets.encode(packets.Status(seq=self._tag))
+            self._window.send_tagged(self._tag, len(wire))
+            silence.ask(self._tag, now)
+            self.counters.statuses += 1
+            return b"\0" + wire  # the 00 costs no credit, and ends what a lost 00 has left open
+        if due:  # nothing more may be asked; HELLO always may
+            self._restart(now)
+            return self._greet(now)
+        return b""
 
     def next_timeout(self, now: float) -> float | None:
         """Seconds until `transmit` has something to do even if nothing comes; None: never."""
+        silence = self._silence
         if self.info is None:
-            return max(0.0, self._hello_due_s - now)
+            return max(0.0, min(self._hello_due_s, silence.end_s) - now)
         if not self._waiting:
             return None
-        silence = self._silence
-        ask_s = max(silence.heard_s, silence.asked_s) + self._timeout_s
-        return max(0.0, min(ask_s, silence.heard_s + self._patience_s) - now)
+        return max(0.0, min(silence.ask_due_s, silence.end_s) - now)
 
     # -- what comes in
 
@@ -335,78 +345,78 @@ class Link:
 
         """
         events: list[Event] = []
-        for packet in self.stream.feed(data):
+        for packet in self._packets(data):
             events += self._take(packet, now)
         return events
 
+    def _packets(self, data: bytes) -> Iterator[packets.Packet]:
+        while True:
+            try:
+                yield from self.stream.feed(data)
+            except RemoteProtocolError as error:
+                # Before a session only INFO counts: the rest may be of any version.
+                if self.info or error.section == packets.Info.SECTION:
+                    raise
+                data = b""
+            else:
+                return
+
     def _take(self, packet: packets.Packet, now: float) -> Iterator[Event]:
+        info = self.info
+        if info:
+            self._silence.heard(now)
         match packet:
-            case packets.Info():
+            case packets.Info() if packet.session == self._session:
                 yield from self._take_info(packet, now)
-            case packets.Ack() if self.info and packet.session == self._session:
-                yield from self._take_ack(packet, now)
-            case packets.Page() if self.info:
+            case packets.Ack() if info and packet.session == self._session:
+                yield from self._take_ack(info, packet, now)
+            case packets.Page() if info:
                 yield from self._take_page(packet, now)
-            case packets.Error() if self.info and packet.session in (0, self._session):
+            case packets.Error() if info and packet.session in (0, self._session):
                 yield from self._take_error(packet, now)
 
     def _take_info(self, info: packets.Info, now: float) -> Iterator[Event]:
-        if self.info is not None:
+        if self.info:
             if info.boot != self.info.boot:
                 yield self._restart(now)
-            return
-        if info.session != self._session:
             return
         if info.major == spec.VERSION_MAJOR:
             check_info(info)
         self.info = info
         self.counters.sessions += 1
         self._window = Window(info.rx_buffer)
-        self._silence = _Silence(now, now, now)
+        self._silence.begin(now, info.refresh)
         yield Ready(info)
 
-    def _take_ack(self, ack: packets.Ack, now: float) -> Iterator[Event]:
-        assert self.info is not None  # noqa: S101 - the caller looked
-        if ack.boot != self.info.boot:
+    def _take_ack(self, info: packets.Info, ack: packets.Ack, now: float) -> Iterator[Event]:
+        if ack.boot != info.boot:
             yield self._restart(now)
             return
         silence = self._silence
-        silence.heard_s = now
-        if ack.flags & spec.ACK_FLAG_ASKED and ack.last in silence.asked:
-            self._measure(now - silence.asked[ack.last])
-            silence.asked.clear()
-            silence.backoff = 1
-        done = self._window.acknowledge(ack)
-        if done:
-            silence.progress_s = now
-            silence.backoff = 1
-            self._measure(now - done[-1].sent_s)
-        self._find_lost_reads(ack)
+        if ack.flags & spec.ACK_FLAG_ASKED:
+            silence.answered(ack.last, now)
+        if done := self._window.acknowledge(ack):
+            silence.progress(now)
+            silence.measure(now - done[-1].sent_s)
+        self._find_lost_reads()
         if ack.damaged != self.counters.device_damaged:
             self.counters.device_damaged = ack.damaged
             self._ask_at_once = self._waiting
-        yield from self._note_shown(ack, now)
+        yield from self._note_shown(info, ack, now)
 
-    def _measure(self, seconds: float) -> None:
-        before = self._round_trip_s
-        self._round_trip_s = seconds if before is None else before + (seconds - before) / 8
+    def _find_lost_reads(self) -> None:
+        """Send a READ again whose PAGE did not come before the answer to something later."""
+        for request in self._requests:
+            if request.ordinal < self._window.taken:
+                request.ordinal = 0
 
-    def _find_lost_reads(self, ack: packets.Ack) -> None:
-        """Send a READ again whose PAGE did not come before the answer to a later STATUS."""
-        if ack.flags & spec.ACK_FLAG_ASKED:
-            taken = self._window.taken_tag(ack.last)
-            for request in self._requests:
-                if request.ordinal < taken:
-                    request.ordinal = 0
-
-    def _note_shown(self, ack: packets.Ack, now: float) -> Iterator[Event]:
+    def _note_shown(self, info: packets.Info, ack: packets.Ack, now: float) -> Iterator[Event]:
         if ack.shown is None or not any(
             frame.all_entered and frame.frame_id == ack.shown for frame in self._frames
         ):
             return
-        assert self.info is not None  # noqa: S101 - the caller looked
-        digest = ack.digest if self.info.has(spec.FEATURE_DIGEST) else None
-        self._silence.progress_s = now
+        digest = ack.digest if info.has(spec.FEATURE_DIGEST) else None
+        self._silence.progress(now)
         self._restarts = 0
         while True:
             frame = self._frames.popleft()
@@ -425,10 +435,8 @@ class Link:
                 section="10",
                 offset=4,
             )
-        self._window.taken_tag(page.seq)
         self._requests.remove(request)
-        self._silence.heard_s = self._silence.progress_s = now
-        self._silence.backoff = 1
+        self._silence.progress(now)
         yield PageRead(page)
 
     def _take_error(self, error: packets.Error, now: float) -> Iterator[Event]:
@@ -437,6 +445,7 @@ class Link:
         else:
             self._frames.clear()
             self._requests.clear()
+            self._reopen(now)  # a refused DATA has ended the session
             yield Refused(error)
 
     def _restart(self, now: float) -> Restarted:
@@ -446,30 +455,5 @@ class Link:
                 f"the device has lost the session {self._restarts} times without showing a frame",
                 hint="does it restart by itself? Look at its power supply",
             )
-        self.reopen(self._session % 0xFFFF + 1, now)
+        self._reopen(now)
         return Restarted()
-
-
-def check_info(info: packets.Info) -> None:
-    """Refuse an INFO that contradicts protocol.md.
-
-    Raises
-    ------
-    RemoteProtocolError
-        Naming the field.
-
-    """
-    longest = info.max_payload + spec.LIMIT_OVERHEAD
-    wrong = {
-        "nx, ny, nz": not all((info.nx, info.ny, info.nz))
-        or info.nx * info.ny * info.nz > spec.LIMIT_MAX_VOXELS,
-        "pages": info.pages < 2,
-        "max_payload": info.max_payload < spec.LIMIT_MIN_PAYLOAD,
-        "rx_buffer": info.rx_buffer < longest + longest // 254 + 2 + spec.LIMIT_RESERVE,
-        "session": info.session == 0,
-    }
-    for name, is_wrong in wrong.items():
-        if is_wrong:
-            raise RemoteProtocolError(
-                f"INFO announces a value of {name} that is not allowed", section="5"
-            )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import spec
 from voxdisplay.wire.packet import Ack
 
@@ -45,7 +46,7 @@ class Window:
         self._ordinal = 0
         self._position = 0
         self._limit = credit  # absolute: bytes of the stream up to here fit
-        self._taken = 0  # the newest ordinal that the device has taken
+        self.taken = 0  # the newest ordinal that the device has taken
         self._data_marks: dict[int, _Mark] = {}
         self._tag_marks: dict[int, _Mark] = {}
 
@@ -54,10 +55,12 @@ class Window:
         """Whether another sequence number fits the window."""
         return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
 
-    def fits(self, size: int, *, reserved: bool = False) -> bool:
-        """Tell whether credit allows another ``size`` bytes; STATUS may use the reserve."""
-        reserve = 0 if reserved else spec.LIMIT_RESERVE
-        return self._position + size <= self._limit - reserve
+    def fits(self, size: int) -> bool:
+        """Tell whether credit allows another ``size`` bytes of DATA or READ.
+
+        Four STATUS packets, and there are never more without answer, always fit the reserve.
+        """
+        return self._position + size <= self._limit - spec.LIMIT_RESERVE
 
     def lost(self) -> int | None:
         """Give the oldest packet that is known to be lost, or None."""
@@ -89,32 +92,46 @@ class Window:
         self._position += size
         return _Mark(self._ordinal, self._position)
 
-    def taken_tag(self, tag: int) -> int:
-        """Note that the device has taken what carried a tag; give its ordinal."""
-        mark = self._tag_marks.get(tag)
-        return self._take(mark) if mark else 0
-
     def acknowledge(self, ack: Ack) -> list[Flight]:
-        """Take an ACK; give the packets that it reports as received."""
-        marks = self._tag_marks if ack.flags & spec.ACK_FLAG_ASKED else self._data_marks
-        if mark := marks.get(ack.last):
-            self._limit = max(self._limit, mark.end + ack.credit)
+        """Take an ACK; give the packets that it reports as received.
+
+        Raises
+        ------
+        RemoteProtocolError
+            If it reports as received what was never sent.
+
+        """
+        if (ack.next - self._base) % _MODULUS > (self.next_seq - self._base) % _MODULUS:
+            raise RemoteProtocolError(
+                f"ACK: next is {ack.next}, which is not from {self._base} to {self.next_seq}",
+                section="9",
+                offset=1,
+            )
         received = [seq for seq in self.flights if self._is_received(seq, ack)]
         done = [self.flights.pop(seq) for seq in received]
-        if (ack.next - self._base) % _MODULUS <= spec.LIMIT_WINDOW:
-            self._base = ack.next
-        if mark:
-            self._take(mark)
+        self._base = ack.next
+        if mark := self._named(ack):
+            self._limit = max(self._limit, mark.end + ack.credit)
+            self.taken = max(self.taken, mark.ordinal)
+            for flight in self.flights.values():
+                flight.lost = flight.lost or flight.ordinal <= self.taken
         return done
+
+    def _named(self, ack: Ack) -> _Mark | None:
+        """Give what ``last`` names, if that is certain.
+
+        Of a packet that was taken but dropped (section 6, point 6) and has been sent again, it may
+        name either transmission: an ACK for damage repeats the ``last`` before.
+        """
+        if ack.flags & spec.ACK_FLAG_ASKED:
+            return self._tag_marks.get(ack.last)
+        flight = self.flights.get(ack.last)
+        if flight and flight.transmissions > 1:
+            return None
+        return self._data_marks.get(ack.last)
 
     def _is_received(self, seq: int, ack: Ack) -> bool:
         ahead = (seq - ack.next) % _MODULUS
         if ahead >= _MODULUS // 2:
             return True
         return ahead > 0 and bool(ack.received >> (ahead - 1) & 1)
-
-    def _take(self, mark: _Mark) -> int:
-        self._taken = max(self._taken, mark.ordinal)
-        for flight in self.flights.values():
-            flight.lost = flight.lost or flight.ordinal <= self._taken
-        return mark.ordinal

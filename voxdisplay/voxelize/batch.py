@@ -71,6 +71,8 @@ class Batch:
     ----------
     curves : iterable of Curve
         Each with a finite range a < b.
+    number : int, optional
+        What messages call the first of them; without it they take the curve for the only one.
 
     Raises
     ------
@@ -79,8 +81,9 @@ class Batch:
 
     """
 
-    def __init__(self, curves: Iterable[Curve]) -> None:
+    def __init__(self, curves: Iterable[Curve], number: int | None = None) -> None:
         self.curves = list(curves)
+        self._number = number
         ranges = np.array([curve.t_range for curve in self.curves], dtype=float).reshape(-1, 2)
         self.first, self.last = ranges.T
         good = np.isfinite(ranges).all(axis=1) & (self.first < self.last)
@@ -94,8 +97,8 @@ class Batch:
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
     def name(self, index: int) -> str:
-        """Give the beginning of a message about a curve: nothing if there is only one."""
-        return f"curve {index}: " if len(self.curves) > 1 else ""
+        """Give the beginning of a message about a curve: nothing if it is the only one."""
+        return "" if self._number is None else f"curve {self._number + index}: "
 
     def evaluate(self, curve: Ints, t: Floats) -> Floats:
         """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).

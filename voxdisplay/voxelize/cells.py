@@ -15,7 +15,7 @@ from voxdisplay.voxelize.ranges import spread
 Ints = NDArray[np.int64]
 
 # Pairs that are worked on at once: what bounds the memory of a search.
-PAIRS = 1 << 19
+PAIRS = 1 << 17
 
 # Offsets (dx, dy) of the columns of cells around a cell; the first five with no pair twice.
 COLUMNS = ((0, 0), (0, 1), (1, -1), (1, 0), (1, 1), (0, -1), (-1, 1), (-1, 0), (-1, -1))

@@ -20,9 +20,11 @@ from voxdisplay.voxelize.roots import TOLERANCE, cross
 
 # Knot intervals handled at once. What is computed per crossing then stays in a core's cache.
 BLOCK = 1 << 12
-# A corner must be better by this much, in square voxels, to be preferred to the nearest one:
-# ties are not to be decided by the last bit.
-MARGIN = 1e-9
+# So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
+# the last bit, or lines along edges and diagonals waver.
+NUDGE = 1e-9
+# A corner must be better by this much, in square voxels, to be preferred to the nearest one.
+MARGIN = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,8 @@ def _crossing_steps(knots: Samples, low: int, high: int) -> _Steps:
     points = knots.points[:, low:stop]
     cells = np.floor(points - 0.5)
     length = np.abs(points[:, 1:] - points[:, :-1])
+    length[0] *= 1 + NUDGE
+    length[2] *= 1 - NUDGE
     axis = np.where(
         (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
     ).astype(np.int8)
@@ -157,14 +161,14 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, steps: _Steps) -
         )
         tau[off] = (t[off] - t_left[off]) / h[off]
 
-    nearest = np.floor(points)
+    nearest = np.floor(points + NUDGE)
     for row in range(3):
         np.copyto(nearest[row], level - 0.5, where=axis == row)
     tangent = slope_left[:, of]
     tangent += tau * (slope_right[:, of] - tangent)
     better, gain, foot = _better_corners(nearest, points, tangent, axis)
-    check = np.flatnonzero(foot != 0)
-    if check.size:
+    check = np.flatnonzero(np.isfinite(foot))
+    if check.size:  # at the foot of the perpendicular the curve must be near enough
         t_foot = np.clip(
             t[check] + foot[check] * h[check], batch.first[curve[check]], batch.last[curve[check]]
         )
@@ -229,12 +233,12 @@ def _better_corners(
         ``nearest`` is the best.
     foot : (n,) float64 array
         Where the corner is further than sqrt(1/2) from the crossing: the way along ``tangent``,
-        in its lengths, to the foot of the perpendicular. 0 elsewhere.
+        in its lengths, to the foot of the perpendicular. Infinite elsewhere.
 
     """
     apart = nearest + 0.5 - points
-    length = np.sqrt((tangent * tangent).sum(axis=0))
-    along = tangent / np.maximum(length, np.finfo(float).tiny)
+    length = np.maximum(np.sqrt((tangent * tangent).sum(axis=0)), np.finfo(float).tiny)
+    along = tangent / length
     project = (apart * along).sum(axis=0)
     # The other corner along axis b is a unit step e_b away, towards the crossing. With w the
     # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
@@ -259,8 +263,8 @@ def _better_corners(
     better = nearest + step
     apart += step
     far = (best < 0) & ((apart * apart).sum(axis=0) > 0.5)
-    with np.errstate(all="ignore"):
-        foot = np.where(far, (apart * along).sum(axis=0) / length, 0.0)
+    foot = np.full(axis.size, np.inf)
+    foot[far] = (apart[:, far] * along[:, far]).sum(axis=0) / length[far]
     return better, gain, foot
 
 

@@ -6,7 +6,6 @@ This module only puts the steps in order; it must not know how they are done.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import islice
 from time import perf_counter
 
 import numpy as np
@@ -21,17 +20,23 @@ from voxdisplay.voxelize.reduce import reduce
 from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
 
-# Curves handled at once: enough to forget what a batch costs, few enough to bound the memory.
+# Curves handled at once: enough to forget what a batch costs, but not many if they are long.
 CURVES = 1024
-# Ends this near to each other, in voxels, are one point if the curve does not say.
+VOXELS = 2_000_000
+# Ends this near to each other, in voxels, are one point, if the curve does not say.
 TOUCH = 1e-3
 
 
-def digitise(curves: Iterable[Curve]) -> Iterator[Sequence]:
+def digitise(curves: Iterable[Curve]) -> list[Sequence]:
     """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
-    rest = iter(curves)
-    while batch := list(islice(rest, CURVES)):
-        yield from _digitise(Batch(batch))
+    curves = list(curves)
+    sequences: list[Sequence] = []
+    size = 16
+    while rest := curves[len(sequences) : len(sequences) + size]:
+        fresh = list(_digitise(Batch(rest, len(sequences) if len(curves) > 1 else None)))
+        sequences += fresh
+        size = min(CURVES, VOXELS * len(fresh) // sum(map(len, fresh)) + 1)
+    return sequences
 
 
 def _digitise(batch: Batch) -> Iterator[Sequence]:
@@ -79,6 +84,8 @@ def _closed(batch: Batch, samples: Samples) -> Bools:
     first = np.searchsorted(samples.curve[samples.piece], np.arange(len(batch.curves)))
     last = np.append(first[1:], samples.t.size) - 1
     apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
+    way = np.abs(samples.points - samples.points[:, np.repeat(first, last + 1 - first)])
+    extent = np.maximum.reduceat(way.max(axis=0), first)  # a mere point is not closed
     meet = near(
         np.floor(samples.points[:, first]).astype(np.int32),
         np.floor(samples.points[:, last]).astype(np.int32),
@@ -91,6 +98,7 @@ def _closed(batch: Batch, samples: Samples) -> Bools:
                 f"{apart[index]:.6g} voxels apart",
                 hint="leave out `closed`, or complete the curve",
             )
+    found = (apart <= TOUCH) & (extent > TOUCH)
     return np.array(
-        [apart[index] <= TOUCH if claim is None else claim for index, claim in enumerate(said)]
+        [own if claim is None else claim for own, claim in zip(found, said, strict=True)]
     )

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
-from voxdisplay.voxelize.crossings import Crossings, dominant_crossings
+from voxdisplay.voxelize.crossings import NUDGE, Crossings, dominant_crossings
 from voxdisplay.voxelize.events import OTHER, Events, Voxels, near
 from voxdisplay.voxelize.knots import refine
 from voxdisplay.voxelize.roots import cross
@@ -143,7 +143,7 @@ def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels
     bracket = np.stack((samples.t[step], samples.t[step + 1]))
     ends = np.stack((samples.points[axis, step], samples.points[axis, step + 1])) - level
     t, points, found = cross(batch, samples.curve[piece], axis, level, bracket, ends)
-    voxels = np.floor(points)
+    voxels = np.floor(points + NUDGE)
     voxels[axis, np.arange(axis.size)] = level - 0.5
     order = np.lexsort((t, piece))
     order = order[found[order]]

@@ -25,10 +25,10 @@ PARTS = 16
 # from a step between adjacent voxels.
 JUMP = 1.0
 
-# The first look at a curve: 65 parameters, jittered so that no oscillation can hide between
-# them by having their period. Fixed, so that the same curve always gives the same voxels.
+# The first look at a curve: 65 parameters, evenly spread but for a jitter (multiples of the golden
+# ratio, modulo 1), so that no oscillation can hide between them by having their period.
 _LOOK = np.linspace(0.0, 1.0, 65)
-_LOOK[1:-1] += np.random.default_rng(65).uniform(-0.3, 0.3, 63) / 64
+_LOOK[1:-1] += (np.arange(1, 64) * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6 / 64
 
 
 def knots(batch: Batch) -> Samples:

@@ -187,10 +187,11 @@ def distances(voxels: Voxels, curve: Curve) -> Floats:
         for of, segment in cells.around(np.floor(centres[:, todo] / size)):
             centre = centres[:, todo[of]]
             rough = _from_segment(centre, begin[:, segment], end[:, segment])
-            close = rough <= _least(of, rough, todo.size)[of] + SLACK
+            voxel, nearest = _least(of, rough)
+            close = rough <= nearest[np.searchsorted(voxel, of)] + SLACK
             arc = segment[close]
             exact = _from_arc(curve, centre[:, close], t[arc], t_end[arc])
-            best[todo] = np.minimum(best[todo], _least(of[close], exact, todo.size))
+            _, best[todo[voxel]] = _least(of[close], exact)
         # Whatever was not looked at is further off than a cell, less half a segment.
         todo = todo[best[todo] > size - SEGMENT / 2 - SLACK]
         size *= 4
@@ -203,7 +204,7 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     Parameters
     ----------
     voxels : (N, 3) integer array
-        Any voxels, N > 0.
+        Any voxels.
     curve : Curve
         The curve.
 
@@ -211,9 +212,11 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     -------
     float
         The largest distance of a point of the curve (of a fine polyline's vertices) from the
-        nearest voxel centre, in voxels.
+        nearest voxel centre, in voxels; infinite if there are no voxels.
 
     """
+    if not len(voxels):
+        return float("inf")
     centres = np.asarray(voxels, dtype=float).T + 0.5
     _, points, _ = _polyline(curve)
     best = np.full(points.shape[1], np.inf)
@@ -223,8 +226,8 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
         cells = Cells(np.floor(centres / size))
         for of, voxel in cells.around(np.floor(points[:, todo] / size)):
             apart = points[:, todo[of]] - centres[:, voxel]
-            least = _least(of, np.sqrt((apart * apart).sum(axis=0)), todo.size)
-            best[todo] = np.minimum(best[todo], least)
+            point, nearest = _least(of, np.sqrt((apart * apart).sum(axis=0)))
+            best[todo[point]] = nearest
         todo = todo[best[todo] > size]
         size *= 4
     return float(best.max())
@@ -268,7 +271,11 @@ def _polyline(curve: Curve) -> tuple[Floats, Floats, Bools]:
 
 def _position(curve: Curve, t: Floats) -> Floats:
     with np.errstate(all="ignore"):
-        return np.asarray(curve.position(t), dtype=float)
+        points = np.asarray(curve.position(t), dtype=float)
+    good = np.isfinite(points).all(axis=0)
+    if not good.all():
+        raise ValueError(f"the curve has no point at t = {float(t[np.argmin(good)])!r}")
+    return points
 
 
 def _from_segment(point: Floats, begin: Floats, end: Floats) -> Floats:
@@ -310,10 +317,7 @@ def _from_arc(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
     return np.asarray(np.sqrt(best))
 
 
-def _least(group: Ints, values: Floats, size: int) -> Floats:
-    """Least value of each group, (size,); ``group`` ascends. Infinite where there is none."""
-    least = np.full(size, np.inf)
-    if group.size:
-        first = np.flatnonzero(np.diff(group, prepend=-1))
-        least[group[first]] = np.minimum.reduceat(values, first)
-    return least
+def _least(group: Ints, values: Floats) -> tuple[Ints, Floats]:
+    """Give the groups there are, of an ascending list (n,), and the least value of each."""
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    return group[first], np.minimum.reduceat(values, first) if first.size else values

@@ -18,8 +18,6 @@ WINDOW = 12
 def without_repeats(events: Events) -> Events:
     """Drop events whose voxel is that of the event before them in the piece."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    if not same.any():
-        return events
     keep = np.concatenate(([True], ~same))
     return events.take(keep)
 
@@ -43,12 +41,18 @@ def reduce(events: Events) -> Events:
         Of which no two consecutive ones of a piece are equal. First and last stay.
 
     """
-    events = without_repeats(events)
+    if not events.t.size:
+        return events
+    full, events = events, without_repeats(events)
     start, stop = _short_cuts(events)
     change = np.zeros(events.t.size, dtype=np.int8)
     change[start + 1] += 1
     change[stop] -= 1
-    return without_repeats(events.take(np.cumsum(change, dtype=np.int8) == 0))
+    thin = without_repeats(events.take(np.cumsum(change, dtype=np.int8) == 0))
+    # A piece ends where it ends, even if its last voxel was reached before.
+    last, thin_last = (np.flatnonzero(np.append(~each.joined, True)) for each in (full, thin))
+    thin.t[thin_last] = full.t[last]
+    return thin
 
 
 def runs_on(events: Events) -> NDArray[np.bool_]:

@@ -91,41 +91,22 @@ def _lead_through(
     ring: Events, loop: Events, position: Callable[[Floats], Floats], end: float
 ) -> Events | None:
     """Lead a ring through the first voxel of ``loop``, without chords; None if there is no way."""
-    start: Voxel = _as_voxels(loop.voxels[:, :1])[0]
     size = ring.t.size
     if size == loop.t.size:
         return None  # a chord, but what is between its ends goes its own way
     reach = min(REACH, size // 2 - 1)
     if reach < 1:
         return None
+    start = _as_voxels(loop.voxels[:, :1])[0]
     after = _as_voxels(ring.voxels[:, :reach])
     before = _as_voxels(ring.voxels[:, : -reach - 1 : -1])
-
-    here = np.concatenate(
-        (
-            np.linspace(ring.t[-reach], end, DENSE * reach),
-            np.linspace(loop.t[0], ring.t[reach - 1], DENSE * reach),
-        )
-    )
-    square = _square_distances(position(here), {*after, *before})
-    best: tuple[float, list[Voxel], int, list[Voxel], int] | None = None
-    near_by = [voxel for voxel, far in square.items() if far <= 0.5]
-    ways_after = list(_ways(start, after, near_by))
-    ways_before = list(_ways(start, before, near_by))
-    for (out, j), (back, i) in product(ways_after, ways_before):
-        fresh = [*out, *back]
-        if any(_near(a, b) for a in [*out, after[j]] for b in [*back, before[i]]):
-            continue
-        if any(_near(a, b) for a in out for b in before[i:]):
-            continue
-        if any(_near(a, b) for a in back for b in after[j:]):
-            continue
-        cost = sum(square[voxel] for voxel in [*fresh, *after[j:], *before[i:]])
-        if best is None or cost < best[0]:
-            best = cost, out, j, back, i
-    if best is None:
+    t_before = np.linspace(ring.t[-reach], end, DENSE * reach)
+    t_after = np.linspace(loop.t[0], ring.t[reach - 1], DENSE * reach)
+    square = _square_distances(position(np.concatenate((t_before, t_after))), {*after, *before})
+    detour = _best_detour(start, after, before, square)
+    if detour is None:
         return None
-    _, out, j, back, i = best
+    out, j, back, i = detour
     kept = ring.take(np.arange(j, size - i))
     lead = np.array([start, *out], dtype=np.int32).T
     tail = np.array(back[::-1], dtype=np.int32).reshape(-1, 3).T
@@ -138,6 +119,33 @@ def _lead_through(
     )
     voxels = np.concatenate((lead, kept.voxels, tail), axis=1)
     return Events(np.full(t.size, loop.piece[0]), t, voxels, np.full(t.size, OTHER))
+
+
+def _best_detour(
+    start: Voxel, after: list[Voxel], before: list[Voxel], square: dict[Voxel, float]
+) -> tuple[list[Voxel], int, list[Voxel], int] | None:
+    """Choose ways from ``start`` to both sides of a ring, as near to the curve as can be.
+
+    Returns
+    -------
+    out, j, back, i
+        Over the voxels ``out`` to ``after[j]``, over ``back`` to ``before[i]``.
+
+    """
+    near_by = [voxel for voxel, far in square.items() if far <= 0.5]
+    best, least = None, np.inf
+    for (out, j), (back, i) in product(
+        list(_ways(start, after, near_by)), list(_ways(start, before, near_by))
+    ):
+        touching = (
+            any(_near(a, b) for a in [*out, after[j]] for b in [*back, before[i]])
+            or any(_near(a, b) for a in out for b in before[i:])
+            or any(_near(a, b) for a in back for b in after[j:])
+        )
+        cost = sum(square[voxel] for voxel in [*out, *back, *after[j:], *before[i:]])
+        if not touching and cost < least:
+            best, least = (out, j, back, i), cost
+    return best
 
 
 def _ways(

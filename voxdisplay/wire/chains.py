@@ -159,7 +159,6 @@ def _assemble(
     )
     op = offset + new_pen * coding.pen_bytes
     out[op] = np.where(lone, spec.OP_MOVE, np.where(fresh, spec.OP_FROM, spec.OP_STEP) + octant)
-    out[op[lone]] = spec.OP_MOVE
     place = little_endian(voxels[begin[fresh]].reshape(-1), coding.coordinate_bytes)
     out[op[fresh][:, None] + 1 + np.arange(coding.move_bytes)] = place.reshape(
         -1, coding.move_bytes

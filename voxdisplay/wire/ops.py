@@ -2,8 +2,8 @@
 
 This is protocol.md, sections 2 and 7.2.
 Coders produce *pieces*: ops that may begin a packet, in which case they must say where they are and
-set their pen, or go on from the piece before. `fill` decides which is which. Nothing here knows what
-a piece draws.
+set their pen, or go on from the piece before. `fill` decides which is which. Nothing here knows
+what a piece draws.
 """
 
 from __future__ import annotations
@@ -51,15 +51,6 @@ def little_endian(values: NDArray[np.integer], size: int) -> Bytes:
     """Give values, (n,), as an (n, size) array of bytes, lowest first."""
     shifts = np.arange(size, dtype=np.uint64) * np.uint64(8)
     return (values.astype(np.uint64)[:, None] >> shifts).astype(np.uint8)
-
-
-def count_size(counts: Ints) -> Ints:
-    """Bytes of ops that carry counts (section 7.2): op byte and LEB128."""
-    rest = counts - 1 - SHORT_COUNT
-    size = 1 + (rest >= 0).astype(np.int64)
-    for bits in (7, 14, 21, 28):
-        size += rest >= 1 << bits
-    return size
 
 
 def count_op(op: int, count: int) -> bytes:

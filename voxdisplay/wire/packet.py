@@ -1,8 +1,8 @@
 """Packets as values, and those values as bytes (protocol.md, sections 3 to 5 and 9 to 11).
 
 Each type of packet is a frozen dataclass whose fields have the document's names. ``encode`` gives
-what goes on the wire; ``decode`` takes what ``stream`` has found between two delimiters and checked.
-Knows nothing of what is on its way, nor of what the ops of a packet draw.
+what goes on the wire; ``decode`` takes what ``stream`` has found between two delimiters and
+checked. Knows nothing of what is on its way, nor of what the ops of a packet draw.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from voxdisplay.wire import spec
 _CODES = {1: "B", 2: "H", 4: "I"}
 _CRC = struct.Struct("<I")
 _HEADER_BYTES = 3
+# Of an INFO of another major only this much is known: up to its boot id (section 15).
+_FOREIGN_BYTES = 8 - _HEADER_BYTES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,10 +70,12 @@ class Data(Packet):
     ops: bytes = b""
 
     def tail(self) -> bytes:
+        """See `Packet.tail`."""
         return self.ops
 
     @classmethod
     def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        """See `Packet.read_tail`."""
         del offset
         return {"ops": tail}
 
@@ -152,11 +156,13 @@ class Info(Packet):
         return bool(self.features >> feature & 1)
 
     def tail(self) -> bytes:
+        """See `Packet.tail`."""
         texts = (text.encode() for text in (self.name, self.firmware, self.serial))
         return b"".join(bytes((len(text),)) + text for text in texts)
 
     @classmethod
     def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        """See `Packet.read_tail`."""
         texts = {}
         at = 0
         for name in ("name", "firmware", "serial"):
@@ -180,10 +186,12 @@ class Page(Packet):
     ops: bytes = b""
 
     def tail(self) -> bytes:
+        """See `Packet.tail`."""
         return self.ops
 
     @classmethod
     def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        """See `Packet.read_tail`."""
         del offset
         return {"ops": tail}
 
@@ -199,10 +207,12 @@ class Error(Packet):
     text: str = ""
 
     def tail(self) -> bytes:
+        """See `Packet.tail`."""
         return self.text.encode()
 
     @classmethod
     def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
+        """See `Packet.read_tail`."""
         del offset
         return {"text": tail.decode(errors="replace")}
 
@@ -224,6 +234,14 @@ def pack(packet: Packet) -> bytes:
 def encode(packet: Packet) -> bytes:
     """Give what goes on the wire for a packet: COBS, and the 00 that ends it (section 3)."""
     return bytes(cobs.encode(pack(packet))) + b"\0"
+
+
+def wire_size(size: int) -> int:
+    """Give the most bytes that a packet of ``size`` bytes, check value included, has on the wire.
+
+    That is the packet, COBS's code byte for each 254 bytes of it, and the 00.
+    """
+    return size + -(-size // 254) + 1
 
 
 def intact(raw: bytes) -> bool:
@@ -249,6 +267,8 @@ def decode(raw: bytes) -> Packet:
         raise RemoteProtocolError(f"packet of unknown type {kind}", section="4", raw=raw)
     payload = raw[_HEADER_BYTES : -_CRC.size]
     size = cls.BODY.size
+    if cls is Info and len(payload) >= _FOREIGN_BYTES and payload[0] != spec.VERSION_MAJOR:
+        payload = payload[:_FOREIGN_BYTES].ljust(size + 3, b"\0")  # 3: its strings, empty
     if len(payload) < size:
         raise RemoteProtocolError(
             f"{cls.__name__.upper()} has {len(payload)} bytes of payload, fewer than {size}",

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.pixel import PixelFormat, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import SHORT_COUNT, Bytes, Coding, Ints, count_op
+from voxdisplay.wire.ops import SHORT_COUNT, Coding, Ints, count_op
 
 # A dark gap of at most this many pixel bytes inside a LIT is cheaper than SKIP and a new LIT.
 _GAP_BYTES = 2
+# Where the ops of a PAGE begin in its packet.
+_PAGE_OPS = 12
 
 
 @dataclass(frozen=True)
@@ -153,18 +155,21 @@ class _Payloads:
         return bytes((spec.OP_MOVE,)) + b"".join(c.to_bytes(size, "little") for c in place)
 
     def _add_run(self, start: int, length: int) -> None:
-        value = int(self._values[start])
-        for _ in range(2):
-            op = self._goto(start)
-            if value != self._pen:
-                op += bytes((spec.OP_PEN,)) + value.to_bytes(self._coding.format.bytes, "little")
-            op += count_op(spec.OP_RUN, length)
-            if len(self._open) + len(op) <= self._coding.max_payload:
-                break
+        op = self._run(start, length)
+        if len(self._open) + len(op) > self._coding.max_payload:
             self._close()
+            op = self._run(start, length)
         self._open += op
         self._cursor = start + length
-        self._pen = value
+        self._pen = int(self._values[start])
+
+    def _run(self, start: int, length: int) -> bytes:
+        """Give what draws a RUN from where cursor and pen are now."""
+        value = int(self._values[start])
+        op = self._goto(start)
+        if value != self._pen:
+            op += bytes((spec.OP_PEN,)) + value.to_bytes(self._coding.format.bytes, "little")
+        return op + count_op(spec.OP_RUN, length)
 
     def _add_literal(self, start: int, length: int) -> None:
         end = start + length
@@ -182,14 +187,17 @@ class _Payloads:
 
     def _most_pixels(self, room: int) -> int:
         """Pixels of the longest LIT in ``room`` bytes."""
-        for overhead in (1, 2, 3, 4):
-            if self._coding.format is PixelFormat.MONO1:
-                count = 8 * (room - overhead)
-            else:
-                count = (room - overhead) // self._coding.format.bytes
-            if count <= 0 or len(count_op(spec.OP_LIT, count)) <= overhead:
+        overhead = 1
+        while (count := self._pixels_in(room - overhead)) > 0:
+            if len(count_op(spec.OP_LIT, count)) <= overhead:
                 break
+            overhead += 1
         return count
+
+    def _pixels_in(self, room: int) -> int:
+        if self._coding.format is PixelFormat.MONO1:
+            return 8 * room
+        return room // self._coding.format.bytes
 
     def _pixel_run(self, start: int, count: int) -> bytes:
         if isinstance(self._pixels, bytes):
@@ -220,47 +228,77 @@ def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
         If an op is not allowed there, is cut off, or the ops do not cover exactly ``count``.
 
     """
-    out = np.zeros(count, dtype=np.uint32)
-    pen, cursor, at = format_.full, 0, 0
+    reader = _Reader(ops, count, format_)
+    while reader.at < len(ops):
+        reader.read_op()
+    if reader.cursor != count:
+        raise reader.wrong(f"the ops cover {reader.cursor} voxels, not {count}")
+    return reader.values
 
-    def wrong(what: str) -> RemoteProtocolError:
-        return RemoteProtocolError(f"PAGE: {what}", section="10", offset=12 + at, raw=ops)
 
-    while at < len(ops):
-        op = ops[at]
+class _Reader:
+    """The ops of a PAGE, one after another, into an array."""
+
+    def __init__(self, ops: bytes, count: int, format_: PixelFormat) -> None:
+        self.values = np.zeros(count, dtype=np.uint32)
+        self.at = 0
+        self.cursor = 0
+        self._ops = ops
+        self._format = format_
+        self._pen = format_.full
+
+    def wrong(self, what: str) -> RemoteProtocolError:
+        """Give the error that says what is wrong with the op at `at`."""
+        return RemoteProtocolError(
+            f"PAGE: {what}", section="10", offset=_PAGE_OPS + self.at, raw=self._ops
+        )
+
+    def read_op(self) -> None:
+        """Read the op at `at`, and go behind it."""
+        op = self._ops[self.at]
         if op == spec.OP_END:
-            if any(ops[at:]):
-                raise wrong("bytes behind END are not 0")
-            break
-        if op == spec.OP_PEN:
-            behind = at + 1 + format_.bytes
-            if behind > len(ops):
-                raise wrong("PEN is cut off")
-            pen = int.from_bytes(ops[at + 1 : behind], "little")
+            if any(self._ops[self.at :]):
+                raise self.wrong("bytes behind END are not 0")
+            self.at = len(self._ops)
+        elif op == spec.OP_PEN:
+            run, behind = self._pixels(self.at + 1, 1)
+            self._pen = int(run[0])
+            self.at = behind
         elif (kind := op & 0xE0) in (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT):
-            try:
-                n, behind = _read_count(ops, at)
-            except (IndexError, ValueError) as error:
-                raise wrong("a count is malformed") from error
-            if cursor + n > count:
-                raise wrong(f"the ops cover more than {count} voxels")
-            if kind == spec.OP_RUN:
-                out[cursor : cursor + n] = pen
-            elif kind == spec.OP_LIT:
-                size = -(-n // 8) if format_ is PixelFormat.MONO1 else n * format_.bytes
-                run = np.frombuffer(ops[behind : behind + size], dtype=np.uint8)
-                if len(run) < size:
-                    raise wrong("LIT is cut off")
-                out[cursor : cursor + n] = _pixel_values(run, n, format_)
-                pen = int(out[cursor + n - 1])
-                behind += size
-            cursor += n
+            self._draw(kind)
         else:
-            raise wrong(f"op {op:02X} is not allowed there")
-        at = behind
-    if cursor != count:
-        raise wrong(f"the ops cover {cursor} voxels, not {count}")
-    return out
+            raise self.wrong(f"op {op:02X} is not allowed there")
+
+    def _draw(self, kind: int) -> None:
+        try:
+            n, behind = _read_count(self._ops, self.at)
+        except (IndexError, ValueError) as error:
+            raise self.wrong("a count is malformed") from error
+        end = self.cursor + n
+        if end > len(self.values):
+            raise self.wrong(f"the ops cover more than {len(self.values)} voxels")
+        if kind == spec.OP_RUN:
+            self.values[self.cursor : end] = self._pen
+        elif kind == spec.OP_LIT:
+            self.values[self.cursor : end], behind = self._pixels(behind, n)
+            self._pen = int(self.values[end - 1])
+        self.cursor, self.at = end, behind
+
+    def _pixels(self, at: int, n: int) -> tuple[Values, int]:
+        """Read the pixel run (section 2.1) of n pixels at a place; give where it ends, too."""
+        mono = self._format is PixelFormat.MONO1
+        behind = at + (-(-n // 8) if mono else n * self._format.bytes)
+        if behind > len(self._ops):
+            raise self.wrong("a pixel is cut off")
+        run = np.frombuffer(self._ops[at:behind], dtype=np.uint8)
+        if not mono:
+            channels = run.reshape(n, self._format.bytes).astype(np.uint32)
+            shifts = np.arange(self._format.bytes, dtype=np.uint32) * np.uint32(8)
+            return np.asarray((channels << shifts).sum(axis=1, dtype=np.uint32)), behind
+        bits = np.unpackbits(run, bitorder="little")
+        if bits[n:].any():
+            raise self.wrong("unused bits are not 0")
+        return bits[:n].astype(np.uint32), behind
 
 
 def _read_count(ops: bytes, at: int) -> tuple[int, int]:
@@ -279,12 +317,3 @@ def _read_count(ops: bytes, at: int) -> tuple[int, int]:
                 break
             return SHORT_COUNT + 1 + rest, at
     raise ValueError("not the shortest LEB128")
-
-
-def _pixel_values(run: Bytes, n: int, format_: PixelFormat) -> NDArray[np.uint32]:
-    """Values of the n pixels of a pixel run (section 2.1)."""
-    if format_ is PixelFormat.MONO1:
-        return np.unpackbits(run, count=n, bitorder="little").astype(np.uint32)
-    channels = run.reshape(n, format_.bytes).astype(np.uint32)
-    shifts = np.arange(format_.bytes, dtype=np.uint32) * np.uint32(8)
-    return np.asarray((channels << shifts).sum(axis=1, dtype=np.uint32))

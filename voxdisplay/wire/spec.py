@@ -1,8 +1,8 @@
 """Every literal of protocol.md, in its order. No logic, and no knowledge of who uses it.
 
-A table of the document that is headed ``literals: GROUP`` gives constants ``GROUP_NAME``; one headed
-``layout: NAME`` gives ``LAYOUT_NAME``, a tuple of (field, offset, size in bytes). The emulator has a
-transcription of its own; a test holds both against the document.
+A table of the document that is headed ``literals: GROUP`` gives constants ``GROUP_NAME``; one
+headed ``layout: NAME`` gives ``LAYOUT_NAME``, a tuple of (field, offset, size in bytes). The
+emulator has a transcription of its own; a test holds both against the document.
 """
 
 from typing import Final

@@ -25,6 +25,7 @@ class StreamCounters:
     """What a `PacketStream` has seen. ``noise_bytes`` are all bytes that made no packet."""
 
     packets: int = 0
+    unknown: int = 0
     damaged: int = 0
     noise_bytes: int = 0
 
@@ -36,16 +37,19 @@ class PacketStream:
     ----------
     counters : StreamCounters
         What has come so far.
-    noise : bytes
-        The first bytes that were no packet, at most 64: they tell a person what is really there.
-
     """
 
     def __init__(self) -> None:
         self.counters = StreamCounters()
-        self.noise = b""
+        self._noise = b""
         self._segment = bytearray()
+        self._searched = 0  # so many bytes of it are known to have no 00
         self._overlong = 0
+
+    @property
+    def noise(self) -> bytes:
+        """The first bytes that made no packet, at most 64; those that wait for a 00 included."""
+        return (self._noise + bytes(self._segment[:_KEPT_NOISE]))[:_KEPT_NOISE]
 
     def feed(self, data: bytes) -> Iterator[packets.Packet]:
         """Take bytes, give the packets that they complete, one by one.
@@ -61,21 +65,27 @@ class PacketStream:
         return self._packets()
 
     def _packets(self) -> Iterator[packets.Packet]:
-        while (end := self._segment.find(0)) >= 0:
+        while (end := self._segment.find(0, self._searched)) >= 0:
             segment = bytes(self._segment[:end])
             del self._segment[: end + 1]
+            self._searched = 0
             if self._overlong:
                 self._drop(segment, self._overlong + end)
                 self._overlong = 0
                 continue
             raw = self._unpack(segment)
-            if raw is not None:
-                self.counters.packets += 1
-                yield packets.decode(raw)
+            if raw is None:
+                continue
+            if raw[0] >> 4 not in packets.TYPES:  # section 12: of a later version, perhaps
+                self.counters.unknown += 1
+                continue
+            self.counters.packets += 1
+            yield packets.decode(raw)
         if len(self._segment) > _LONGEST_SEGMENT:
             self._keep_noise(self._segment)
             self._overlong += len(self._segment)
             self._segment.clear()
+        self._searched = len(self._segment)
 
     def _unpack(self, segment: bytes) -> bytes | None:
         if len(segment) < spec.LIMIT_MIN_SEGMENT:
@@ -97,4 +107,4 @@ class PacketStream:
         self._keep_noise(segment)
 
     def _keep_noise(self, data: bytes | bytearray) -> None:
-        self.noise = (self.noise + bytes(data[:_KEPT_NOISE]))[:_KEPT_NOISE]
+        self._noise = (self._noise + bytes(data[:_KEPT_NOISE]))[:_KEPT_NOISE]

@@ -1,0 +1,93 @@
+"""Bad scenes: an error that names place and remedy, exit code 2, never a traceback."""
+
+import json
+
+import pytest
+
+
+def refused(done, *words, code=2):
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    for word in words:
+        assert word in done.stderr, done.stderr
+    return done
+
+
+def curve(**keys):
+    return {"type": "parametric", "x": "t", "y": "1", "z": "2", "t": [0, 1], **keys}
+
+
+SCENES = {
+    "unknown key": ({**curve(), "colour": "red"}, ["$", "colour", "color"]),
+    "unknown key deep": ({"objects": [curve(), curve(closd=True)]}, ["$.objects[1]", "closed"]),
+    "unknown type": ({"type": "circel"}, ["circel", "circle"]),
+    "unknown function": (curve(x="sine(t)"), ["$.x", "sine", "sin"]),
+    "unknown name": (curve(y="radius*t"), ["$.y", "radius"]),
+    "python name": (curve(z="__import__('os')"), ["$.z"]),
+    "reversed range": (curve(t=[1, 0]), ["$.t"]),
+    "infinite range": (curve(t=[0, "exp(1000)"]), ["$.t", "finite"]),
+    "pole": (curve(x="1/(t - 0.5)"), ["$", "x = ", "t = 0.4999"]),
+    "not finite": (curve(y="log(t)"), ["$", "y", "t = 0"]),
+    "endless power": (curve(x="9**9**9"), ["$.x"]),
+    "endless curve": (curve(x="1e7*t"), ["$"]),
+    "too rough": (curve(x="sin(1e12*t)"), ["$"]),
+    "huge size": ({"size": [10**9, 10**9, 10**9], "objects": []}, ["$.size"]),
+    "unknown colour": (curve(color="oragne"), ["$.color", "orange"]),
+    "missing key": ({"type": "segment", "from": [0, 0, 0]}, ["$", "to"]),
+    "text for a list": ({"objects": "all"}, ["$.objects"]),
+    "a file outside": ({"type": "points", "file": "../secret.csv"}, ["$.file"]),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_bad_scenes(run, scene, name):
+    content, words = SCENES[name]
+    refused(run("push", scene(content), "--port", "sim:"), *words)
+    refused(run("voxelize", scene(content)), *words)
+
+
+TEXTS = {
+    "broken": '{"objects": [',
+    "empty": "",
+    "nan": '{"type": "segment", "from": [NaN, 0, 0], "to": [1, 1, 1]}',
+    "infinity": '{"type": "segment", "from": [Infinity, 0, 0], "to": [1, 1, 1]}',
+    "a list": "[1, 2]",
+    "deep": "[" * 100_000,
+    "deep expression": json.dumps(curve(x="(" * 4000)),
+    "long expression": json.dumps(curve(x="1+" * 5_000_000 + "1")),
+    "many digits": '{"size": [' + "9" * 100_000 + ", 1, 1]}",
+    "null bytes": '{"objects": []}\0\0',
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_hostile_text(run, scene, name):
+    done = refused(run("push", scene(TEXTS[name]), "--port", "sim:"), "$")
+    assert len(done.stderr) < 1000, "an error is no copy of the file"
+
+
+def test_files_that_cannot_be_read(run, tmp_path):
+    refused(run("push", tmp_path / "curve.json"), "curve.json")
+    refused(run("push", tmp_path), "directory")
+    (tmp_path / "scene.bin").write_bytes(b"\xff\xfe\x00\x80" * 10)
+    refused(run("push", tmp_path / "scene.bin"), "UTF-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["push"], ["SCENE"]),
+        (["psuh", "x"], ["psuh"]),
+        (["push", "x", "--fitt", "none"], ["--fit"]),
+        (["push", "x", "--fit", "cover"], ["contain"]),
+        (["push", "x", "--timeout", "0"], ["--timeout"]),
+        (["voxelize", "examples/paper-curve.json", "-o", "x.obj"], [".npy"]),
+        (["voxelize", "examples/paper-curve.json", "--clip", "0x5x7"], ["128x128x128"]),
+        (["voxelize", "examples/paper-curve.json", "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),
+        (["read", "--port", "sim:?size=3x5x7", "-o", "/nowhere/x.npy"], ["/nowhere/x.npy"]),
+        (["read", "--port", "sim:", "-o", "x.csv"], [".npy"]),
+    ],
+)
+def test_usage(run, arguments, words):
+    refused(run(*arguments), *words)

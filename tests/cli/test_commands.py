@@ -1,0 +1,156 @@
+"""What the commands print, and where."""
+
+import csv
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+PUSH_KEYS = {
+    "port", "device", "frame", "voxels", "packets", "wire_bytes", "retransmitted", "elapsed_s",
+    "digest", "verified",
+}  # fmt: skip
+OBJECT_KEYS = {
+    "object", "type", "voxels", "closed", "pieces", "e_max", "e_av", "gaps", "contacts", "clipped",
+    "seconds",
+}  # fmt: skip
+PAPER = "examples/paper-curve.json"
+
+
+def test_push_without_a_port_says_that_it_uses_the_emulator(run):
+    pushed = run("push", PAPER, "--verify")
+    assert pushed.returncode == 0
+    assert "built-in emulator" in pushed.stderr
+    assert "proved" in pushed.stdout
+    assert "verified" in pushed.stdout
+
+
+def test_push_json_is_one_object_with_stable_keys(run):
+    pushed = run("push", PAPER, "--port", "sim:", "--json")
+    result = json.loads(pushed.stdout)
+    assert set(result) == PUSH_KEYS
+    assert result["device"]["size"] == [128, 128, 128]
+    assert result["verified"] is None, "nothing was read back"
+    assert len(result["digest"]) == 8
+
+
+def test_the_port_may_come_from_the_environment(run):
+    pushed = run("info", "--json", VOXDISPLAY_PORT="sim:?size=3x5x7&format=index8")
+    facts = json.loads(pushed.stdout)
+    assert facts["size"] == [3, 5, 7]
+    assert facts["format"] == "index8"
+    assert facts["features"] == ["read", "digest"]
+    assert pushed.stderr == ""
+
+
+def test_info_for_people(run):
+    said = run("info", "--port", "sim:?size=3x5x7").stdout
+    assert "3x5x7" in said
+    assert "read, digest" in said
+
+
+def test_a_scene_from_stdin(run):
+    scene = {"type": "segment", "from": [0, 0, 0], "to": [2.5, 4.5, 6.5]}
+    pushed = run("push", "-", "--port", "sim:?size=3x5x7", "--json", stdin=json.dumps(scene))
+    assert pushed.returncode == 0, pushed.stderr
+    assert json.loads(pushed.stdout)["voxels"] == 7
+
+
+def test_another_size_is_fitted_and_said(run):
+    pushed = run("push", PAPER, "--port", "sim:?size=17x64x40")
+    assert "scaled by" in pushed.stderr
+    kept = run("push", PAPER, "--port", "sim:?size=17x64x40", "--fit", "none")
+    assert "scaled" not in kept.stderr
+    assert "outside the display" in kept.stderr
+
+
+def test_a_poorer_display_takes_the_nearest_colour_and_says_so_once(run):
+    pushed = run("push", "examples/lissajous.json", "--port", "sim:?format=mono1")
+    assert pushed.stderr.count("nearest") == 1
+
+
+def test_a_curve_outside_is_a_warning_and_an_empty_picture(run, scene):
+    path = scene({"type": "segment", "from": [-9, -9, -9], "to": [-2, -2, -2]})
+    pushed = run("push", path, "--port", "sim:?size=3x5x7", "--json")
+    assert pushed.returncode == 0
+    assert "warning" in pushed.stderr
+    assert json.loads(pushed.stdout)["voxels"] == 0
+
+
+def test_an_empty_scene_is_an_empty_picture(run, scene):
+    pushed = run("push", scene({"objects": []}), "--port", "sim:?size=3x5x7", "--verify")
+    assert pushed.returncode == 0, pushed.stderr
+    assert "0 voxels shown" in pushed.stdout
+
+
+def test_voxelize_prints_csv(run, scene):
+    path = scene(
+        {
+            "objects": [
+                {"type": "segment", "from": [0.5, 0.5, 0.5], "to": [2.5, 0.5, 0.5]},
+                {"type": "segment", "from": [-0.5, 4.5, 6.5], "to": [1.5, 4.5, 6.5]},
+            ]
+        }
+    )
+    rows = list(csv.reader(io.StringIO(run("voxelize", path).stdout)))
+    assert rows[0] == ["object", "x", "y", "z"]
+    assert rows[1:4] == [["0", "0", "0", "0"], ["0", "1", "0", "0"], ["0", "2", "0", "0"]]
+    assert rows[4] == ["1", "-1", "4", "6"], "not clipped"
+    clipped = run("voxelize", path, "--clip", "2,5,7").stdout.splitlines()
+    assert clipped == ["object,x,y,z", "0,0,0,0", "0,1,0,0", "1,0,4,6", "1,1,4,6"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npy", ".json"])
+def test_voxelize_writes_files(run, tmp_path, suffix):
+    output = tmp_path / f"voxels{suffix}"
+    done = run("voxelize", PAPER, "-o", output, "--json")
+    report = json.loads(done.stdout)
+    assert set(report) == {"objects", "voxels", "seconds"}
+    assert [set(entry) for entry in report["objects"]] == [OBJECT_KEYS]
+    match suffix:
+        case ".csv":
+            rows = np.loadtxt(output, delimiter=",", skiprows=1, dtype=int)
+        case ".npy":
+            rows = np.load(output)
+            assert rows.dtype == np.int32
+        case ".json":
+            rows = np.array(json.loads(output.read_text())["voxels"])
+    assert rows.shape == (report["voxels"], 4)
+    assert np.abs(np.diff(rows[:, 1:], axis=0)).max() == 1, "26-connected"
+
+
+def test_ports_lists_the_emulator(run):
+    assert "sim:" in run("ports").stdout
+    assert json.loads(run("ports", "--json").stdout)["ports"][0]["port"] == "sim:"
+
+
+def test_clear_and_read(run, tmp_path):
+    output = tmp_path / "page.npy"
+    assert "dark" in run("clear", "--port", "sim:?size=3x5x7").stdout
+    done = run("read", "--port", "sim:?size=3x5x7&format=rgb565", "-o", output, "--json")
+    assert json.loads(done.stdout)["voxels"] == 0
+    assert np.load(output).shape == (7, 5, 3)
+    assert np.load(output).dtype == np.uint16
+
+
+def test_help_has_examples_and_the_exit_codes(run):
+    assert "examples/paper-curve.json" in run("push", "--help").stdout
+    assert "130 interrupted" in run("--help").stdout
+    assert run("--version").stdout.startswith("voxdisplay, version")
+
+
+def test_shell_completion(run):
+    script = run(_VOXDISPLAY_COMPLETE="bash_source")
+    assert "complete" in script.stdout
+
+
+def test_a_reader_that_has_enough_is_no_error():
+    command = f"{sys.executable} -m voxdisplay voxelize {PAPER} | head -n 1"
+    bash = ["/bin/bash", "-o", "pipefail", "-c", command]
+    piped = subprocess.run(bash, capture_output=True, text=True, check=False)
+    assert piped.stdout == "object,x,y,z\n"
+    assert piped.stderr == ""
+    assert piped.returncode == 0

@@ -1,0 +1,207 @@
+"""Ports as they are in the world: missing, busy, forbidden, silent, foreign, gone."""
+
+import contextlib
+import grp  # noqa: F401 - it must be there before the test gives its rights away
+import os
+import signal
+import subprocess
+import sys
+import threading
+import tty
+from pathlib import Path
+
+import document
+import pytest
+import serial
+
+import voxdisplay as vd
+
+PAPER = "examples/paper-curve.json"
+
+
+class Tty:
+    """A tty with the test at its other end."""
+
+    def __init__(self):
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.port = os.ttyname(slave)
+        self._slave = slave
+
+    def read_packets(self):
+        """Give header and payload of each packet that comes, until the tty is gone."""
+        data = b""
+        while True:
+            try:
+                data += os.read(self.master, 4096)
+            except OSError:
+                return
+            *segments, data = data.split(b"\0")
+            yield from (document.cobs_decode(segment)[:-4] for segment in segments if segment)
+
+    def answer_hello(self, hello, *, major=1):
+        session = hello[4:6]
+        info = bytes((0x90, 0, 0, major)) + session + bytes.fromhex("01 00 00 02 03 00 05 00 07 00")
+        info += bytes.fromhex("02 00 00 04 00 40 00 00 00 00 00 00 80 01 00 00 00 00 00")
+        os.write(self.master, document.on_wire(info))
+
+    def close(self):
+        for descriptor in (self.master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+        self.master = self._slave = -1
+
+
+@pytest.fixture
+def line():
+    line = Tty()
+    yield line
+    line.close()
+
+
+def pushed(run, port, *arguments, code):
+    done = run("push", PAPER, "--port", port, *arguments)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    return done.stderr
+
+
+def test_a_port_that_does_not_exist(run):
+    said = pushed(run, "/dev/ttyNOWHERE", code=3)
+    assert "/dev/ttyNOWHERE does not exist" in said
+    assert "sim:" in said
+
+
+@pytest.mark.parametrize(
+    "port", ["tcp://127.0.0.1:1", "tcp://nonsense", "socket://127.0.0.1:1", "nothing://x"]
+)
+def test_ports_that_cannot_be_opened(run, port):
+    assert port in pushed(run, port, code=3)
+
+
+@pytest.mark.parametrize(
+    ("port", "word"), [("sim:?sise=3x5x7", "size"), ("sim:?format=rgb", "rgb888"), ("sim:x", "x")]
+)
+def test_emulators_that_there_are_not(run, port, word):
+    assert word in pushed(run, port, code=3)
+
+
+def test_a_busy_port(run, line):
+    with serial.Serial(line.port, exclusive=True):
+        assert "busy" in pushed(run, line.port, code=3)
+
+
+def test_a_forbidden_port(line):
+    Path(line.port).chmod(0o060)  # the group may, and we are not in it
+    before = os.geteuid(), os.getgroups()
+    if before[0] == 0:
+        os.setgroups([])
+        os.setegid(65534)
+        os.seteuid(65534)
+    try:
+        with pytest.raises(vd.OpenError) as error:
+            vd.open(line.port)
+    finally:
+        if before[0] == 0:
+            os.seteuid(0)
+            os.setegid(0)
+            os.setgroups(before[1])
+    assert "may not be opened" in str(error.value)
+    assert "usermod -aG" in error.value.hint
+
+
+def test_nobody_answers(run, line):
+    assert "answered HELLO" in pushed(run, line.port, "--timeout", "0.6", code=3)
+
+
+def test_something_else_answers(run, line):
+    def web_server():
+        for _ in line.read_packets():
+            os.write(line.master, b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+    threading.Thread(target=web_server, daemon=True).start()
+    assert "HTTP/1.1" in pushed(run, line.port, "--timeout", "0.6", code=3)
+
+
+def test_a_device_of_another_major(run, line):
+    def device():
+        for packet in line.read_packets():
+            line.answer_hello(packet, major=2)
+
+    threading.Thread(target=device, daemon=True).start()
+    assert "protocol 2" in pushed(run, line.port, code=1)
+
+
+def test_a_device_that_goes_away_in_mid_push(run, line):
+    def device():
+        for packet in line.read_packets():
+            if packet[0] >> 4 == 3:
+                line.answer_hello(packet)
+            else:
+                line.close()
+
+    threading.Thread(target=device, daemon=True).start()
+    assert "is gone" in pushed(run, line.port, code=3)
+
+
+def test_a_device_that_falls_silent_in_mid_push(run, line):
+    statuses = []
+
+    def device():
+        for packet in line.read_packets():
+            if packet[0] >> 4 == 3:
+                line.answer_hello(packet)
+            elif packet[0] >> 4 == 4:
+                statuses.append(packet)
+
+    threading.Thread(target=device, daemon=True).start()
+    assert "silent" in pushed(run, line.port, "--timeout", "0.8", code=3)
+    assert 1 <= len(statuses) <= 4
+
+
+def test_interrupted_in_mid_push(line):
+    command = [sys.executable, "-m", "voxdisplay", "push", PAPER, "--port", line.port]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        for packet in line.read_packets():
+            if packet[0] >> 4 == 3:
+                line.answer_hello(packet)
+            elif packet[0] >> 4 == 1:
+                process.send_signal(signal.SIGINT)
+                break
+        _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
+
+
+def test_boot_text_and_a_late_start_are_waited_out(run, line):
+    """A board that restarts when its port is opened misses the first HELLO, and talks first."""
+
+    def device():
+        os.write(line.master, b"\r\nrst:0x1 (POWERON)\r\nboot: 0x13\r\n")
+        hellos = 0
+        for packet in line.read_packets():
+            if packet[0] >> 4 == 3 and (hellos := hellos + 1) == 3:
+                line.answer_hello(packet)
+
+    threading.Thread(target=device, daemon=True).start()
+    done = run("info", "--port", line.port)
+    assert done.returncode == 0, done.stderr
+    assert "3x5x7" in done.stdout
+
+
+def test_the_emulator_outlives_its_hosts(emulator, run):
+    device = emulator("--pty", "--size", "17x64x40")
+    for _ in range(3):
+        assert run("push", PAPER, "--port", device.port).returncode == 0
+    assert device.stop() == 0
+
+
+def test_the_emulator_pulled_out_under_an_open_display(emulator):
+    device = emulator("--pty", "--size", "17x64x40")
+    with vd.open(device.port) as display:
+        device.process.kill()
+        device.process.wait()
+        with pytest.raises(vd.TransportClosed):
+            display.clear()

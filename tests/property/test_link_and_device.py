@@ -1,0 +1,231 @@
+"""A link and an emulated device over a bad line: what is shown is whole, and in the end right."""
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig import Faults, Rig, frames, random_frame
+from voxdisplay.errors import TransportTimeout
+from voxdisplay.link import PageRead, Refused
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.wire import spec
+from voxdisplay.wire.spans import decode_spans
+
+seeds = st.integers(0, 2**32 - 1)
+devices = st.fixed_dictionaries(
+    {
+        "refresh": st.sampled_from([0, 0, 30_000, 1_000_000, 2_000, 150]),
+        "max_payload": st.sampled_from([64, 65, 100, 247, 300]),
+        "silent": st.sampled_from([0, 8]),
+        "room": st.sampled_from([0, 1, 64, 1000, 20_000]),
+        "pixel_format": st.sampled_from([format_.value for format_ in PixelFormat]),
+        "delay_s": st.sampled_from([0.0, 0.0001, 0.01, 0.3, 1.0]),
+        "jitter_s": st.sampled_from([0.0, 0.02]),
+    }
+)
+
+
+def rig_of(seed, device):
+    """A device whose receive buffer has so much room above the least that is allowed."""
+    longest = device["max_payload"] + spec.LIMIT_OVERHEAD
+    least = longest + -(-longest // 254) + 1 + spec.LIMIT_RESERVE
+    config = {key: value for key, value in device.items() if key != "room"}
+    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=20, **config)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, devices)
+def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, device):
+    """9.3: "Then, and only then, the host sends it again"."""
+    rig = rig_of(seed, device)
+    drawn = frames(rig.rng, rig.rng.randrange(1, 5), device["pixel_format"])
+    tickets = [rig.present(frame) for frame in drawn]
+    rig.run()
+    rig.assert_shows(drawn[-1])
+    rig.assert_told(tickets[-1])
+    assert rig.link.counters.retransmitted == 0
+    assert rig.link.counters.sessions == 1
+    data = [body for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA]
+    assert len(data) == sum(max(1, len(f.payloads(device["max_payload"]))) for f in drawn)
+
+
+def faults_of(rng):
+    kind = rng.choice(["flip", "drop", "packet", "delimiter", "all"])
+    rates = {"flip": 0.002, "drop": 0.002, "packet": 0.15, "delimiter": 0.15}
+    return Faults(rng.getrandbits(32), **(rates if kind == "all" else {kind: rates[kind]}))
+
+
+@settings(max_examples=120, deadline=None)
+@given(seeds, devices, st.sampled_from(["down", "up", "both"]))
+def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
+    """5: "A frame that is not whole MUST NOT be shown" is checked after every step."""
+    rig = rig_of(seed, device)
+    if where != "up":
+        rig.down.faults = faults_of(rig.rng)
+    if where != "down":
+        rig.up.faults = faults_of(rig.rng)
+    drawn = frames(rig.rng, 4, device["pixel_format"])
+    for frame in drawn[:2]:
+        rig.present(frame)
+    for _ in range(rig.rng.randrange(80)):
+        rig.step()
+    rig.down.faults = rig.up.faults = None
+    tickets = [rig.present(frame) for frame in drawn[2:]]
+    rig.run()
+    rig.assert_shows(drawn[-1])
+    rig.assert_told(tickets[-1])
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, devices, st.integers(0, 60), st.integers(1, 3))
+def test_a_device_that_loses_its_power(seed, device, when, times):
+    rig = rig_of(seed, device)
+    drawn = frames(rig.rng, 3, device["pixel_format"])
+    tickets = [rig.present(frame) for frame in drawn]
+    for _ in range(times):
+        for _ in range(when):
+            rig.step()
+        rig.power_cycle()
+    tickets.append(rig.present(drawn[0]))
+    rig.run()
+    rig.assert_shows(drawn[0])
+    rig.assert_told(tickets[-1])
+    assert rig.restarts <= times
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, devices, st.floats(0.01, 8), st.integers(1, 50))
+def test_a_line_that_stalls(seed, device, stall_s, when):
+    rig = rig_of(seed, device)
+    drawn = frames(rig.rng, 3, device["pixel_format"])
+    for frame in drawn:
+        rig.present(frame)
+    for _ in range(when):
+        rig.step()
+    rig.rng.choice([rig.down, rig.up]).stalled_until_s = rig.now + stall_s
+    last = rig.present(drawn[0])
+    rig.run()
+    rig.assert_shows(drawn[0])
+    rig.assert_told(last)
+    if stall_s < 0.7:  # fewer than four questions long: it is sat out
+        assert rig.link.counters.sessions == 1
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, devices, st.booleans())
+def test_a_page_is_read_through_a_bad_line(seed, device, bad):
+    rig = rig_of(seed, device)
+    frame = random_frame(rig.rng, device["pixel_format"], 0.9)
+    rig.present(frame)
+    rig.run()
+    if bad:
+        rig.down.faults, rig.up.faults = (Faults(seed + k, packet=0.1) for k in (0, 1))
+    total, at, values = frame.grid.voxels, 0, []
+    while at < total:
+        rig.events.clear()
+        rig.link.read(at, total - at)
+        rig.run(lambda: any(isinstance(event, PageRead) for event in rig.events))
+        (page,) = (event.page for event in rig.events if isinstance(event, PageRead))
+        values += decode_spans(page.ops, page.count, frame.format).tolist()
+        at += page.count
+    assert values == frame.format.values(frame.array()).tolist()
+
+
+def test_numbers_wrap_around():
+    """Sequence numbers and frame ids are modulo 256, also with losses on the way."""
+    rig = Rig(refresh=0, rx_buffer=2000)
+    rig.down.faults = Faults(1, packet=0.02)
+    drawn = frames(random.Random(5), 6)
+    for number in range(700):
+        last = rig.present(drawn[number % 6])
+        if number % 8 == 0:
+            rig.run()
+    rig.down.faults = None
+    rig.run()
+    rig.assert_shows(drawn[699 % 6])
+    rig.assert_told(last)
+    assert rig.link.counters.packets > 5 * 256
+    assert rig.link.counters.sessions == 1
+    assert len({body[2] for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA}) == 256
+
+
+def test_a_frame_on_top_of_what_is_shown():
+    """6: without CLEAR a frame starts as a copy of the front page."""
+    rig = Rig()
+    frame = random_frame(rig.rng)
+    rig.present(frame)
+    rig.run()
+    rig.link.present([], clear=False)
+    rig.run()
+    rig.assert_shows(frame)
+    assert len(rig.shown) == 2
+
+
+@pytest.mark.parametrize("features", [frozenset(), frozenset({"read"})])
+def test_a_device_without_digest_gives_none(features):
+    rig = Rig(features=features)
+    rig.present(random_frame(rig.rng))
+    rig.run()
+    assert rig.events[-1].digest is None
+
+
+@pytest.mark.parametrize("refresh", [0, 30_000, 150])
+@pytest.mark.parametrize("moment", [0, 1, 3, 8])
+def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
+    rig = Rig(refresh=refresh, patience_s=3)
+    for _ in range(4):
+        rig.present(random_frame(rig.rng))
+    for _ in range(moment):
+        rig.step()
+    rig.alive = False
+    died_s = rig.now
+    with pytest.raises(TransportTimeout, match="silent|nothing answered HELLO"):
+        rig.run()
+    assert rig.now - died_s <= 3 + (1000 / refresh if refresh else 0) + 0.01
+
+
+def test_a_device_that_talks_but_never_shows_anything():
+    rig = Rig(refresh=1, patience_s=3)  # a tick in 1000 s; what it says of itself is a lie
+    rig.device.config = rig.device.config.__class__(
+        grid=(17, 9, 5), pixel_format="index8", refresh=30_000, max_payload=64, name="",
+        firmware="", rx_buffer=512,
+    )
+    rig._tick = lambda: None
+    rig._tick_after = lambda now: float("inf")
+    rig.present(random_frame(rig.rng, density=0.02))
+    with pytest.raises(TransportTimeout, match="nothing has moved"):
+        rig.run()
+    assert rig.now < 8
+
+
+def test_a_device_that_is_slower_than_patience_is_waited_for():
+    """A device that waits for its tick cannot answer: 6, point 6."""
+    rig = Rig(refresh=50, patience_s=2)  # a tick in 20 s
+    drawn = [random_frame(rig.rng) for _ in range(3)]
+    for frame in drawn:
+        rig.present(frame)
+    rig.run()
+    rig.assert_shows(drawn[-1])
+    assert rig.link.counters.sessions == 1
+
+
+def test_a_refused_frame_is_told_and_the_next_is_shown():
+    rig = Rig()
+    rig.link.present([b"\xe0"])
+    rig.run(lambda: any(isinstance(event, Refused) for event in rig.events))
+    rig.bench._device.refused.clear()
+    for _ in range(2):
+        frame = random_frame(rig.rng)
+        ticket = rig.present(frame)
+        rig.run()
+        rig.assert_shows(frame)
+        rig.assert_told(ticket)
+    assert rig.restarts == 0
+
+
+@pytest.mark.slow
+@settings(max_examples=3000, deadline=None)
+@given(seeds, devices, st.sampled_from(["down", "up", "both"]))
+def test_after_many_more_faults(seed, device, where):
+    test_after_the_last_fault_the_last_frame_is_shown.hypothesis.inner_test(seed, device, where)
