@@ -136,9 +136,9 @@ class Device:
 
     def tick(self) -> None:
         """Begin a refresh: a whole frame is put on display."""
-        if not self.pending:
+        if not self.session or not self.pending:
             return
-        self._swap()
+        self._swap(self.session)
         self._acknowledge()
         if self._waiting:
             packet, self._waiting, self._waiting_size = self._waiting, b"", 0
@@ -182,8 +182,7 @@ class Device:
 
     def _damage(self) -> None:
         self.damaged += 1
-        if self.session:
-            self._acknowledge()
+        self._acknowledge()
 
     def _send(self, kind: int, flags: int, seq: int, frame: int, payload: bytes) -> None:
         self._out += send(kind, flags, seq, frame, payload)
@@ -267,20 +266,19 @@ class Device:
         session.last = seq
         self._unanswered += 1
         if self.pending and not self.config.refresh:
-            self._swap()
+            self._swap(session)
             self._acknowledge()
         elif self._unanswered > self.config.silent:
             self._acknowledge()
 
-    def _swap(self) -> None:
-        if self.session:
-            self.session.swap()
+    def _swap(self, session: Session) -> None:
+        session.swap()
         self.memory.swap()
         self.swaps += 1
         self.on_swap()
 
     def _acknowledge(self, tag: int | None = None) -> None:
-        """Send an ACK, which answers a STATUS if it has a tag (9)."""
+        """Send an ACK if a session is open; it answers a STATUS if it has a tag (9)."""
         session = self.session
         if not session:
             return

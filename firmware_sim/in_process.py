@@ -16,8 +16,8 @@ from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.wire import Wire
 
-# Key of the URL: field of the config, and how to read its value.
-_FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
+# Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
+_KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "size": ("grid", parse_size),
     "format": ("pixel_format", str.lower),
     "refresh": ("refresh", parse_refresh),
@@ -29,8 +29,9 @@ _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "serial": ("serial", str),
     "features": ("features", parse_features),
     "silent": ("silent", parse_number),
+    "fault": ("faults", parse_faults),
+    "seed": ("seed", parse_number),
 }
-_KEYS: Final = (*_FIELDS, "fault", "seed")
 
 
 class InProcessPort:
@@ -143,29 +144,26 @@ def open_in_process(url: str) -> InProcessPort:
     b''
     >>> port.close()
     """
-    values = _parse_url(url)
-    faults = parse_faults(values.pop("fault", ""))
-    seed = parse_number(values.pop("seed", "0"))
-    fields = {}
-    for key, text in values.items():
-        name, parse = _FIELDS[key]
-        try:
-            fields[name] = parse(text)
-        except ValueError as error:
-            raise ValueError(f"{key} in {url!r}: {error}") from None
+    fields = _parse_url(url)
+    faults = fields.pop("faults", ())
+    seed = fields.pop("seed", 0)
     return InProcessPort(Wire(Device(Config(**fields)), faults, seed))
 
 
-def _parse_url(url: str) -> dict[str, str]:
+def _parse_url(url: str) -> dict[str, Any]:
     scheme, mark, query = url.partition("?")
     if scheme != "sim:" or (mark and not query):
         raise ValueError(f"port {url!r}: write sim: or sim:?KEY=VALUE&KEY=VALUE...")
-    values: dict[str, str] = {}
+    fields: dict[str, Any] = {}
     for key, text in parse_qsl(query, keep_blank_values=True):
         if key not in _KEYS:
             near = difflib.get_close_matches(key, _KEYS, n=1, cutoff=0)
             raise ValueError(f"key {key!r} in {url!r} is not known: did you mean {near[0]!r}?")
-        if key in values:
+        name, parse = _KEYS[key]
+        if name in fields:
             raise ValueError(f"key {key!r} in {url!r} stands there twice: write it once")
-        values[key] = text
-    return values
+        try:
+            fields[name] = parse(text)
+        except ValueError as error:
+            raise ValueError(f"{key} in {url!r}: {error}") from None
+    return fields

@@ -4,13 +4,15 @@ A pixel stands in memory as it does on the wire; MONO1 has a byte for each voxel
 nothing of packets and ops: its callers give it voxels that are on the grid.
 """
 
-from array import array
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from firmware_sim import spec
 from firmware_sim.digest import terms
 from firmware_sim.grid import Grid
+
+if TYPE_CHECKING:
+    from array import array
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,6 @@ class Page:
         size = self.pixel_size
         at = start * size
         old = self.pixels[at : at + len(pixels)]
-        if old == pixels:
-            return
         self.pixels[at : at + len(pixels)] = pixels
         self._account(range(start, start + len(pixels) // size), old, pixels)
 
@@ -109,13 +109,17 @@ class Page:
         """
         pixels = self.pixels
         size = self.pixel_size
-        places = [slice(at, at + size) for at in (i * size for i in indices)]
-        old = b"".join([pixels[place] for place in places])
-        for place in places:
+        old = bytearray()
+        for index in indices:
+            at = index * size
+            place = slice(at, at + size)
+            old += pixels[place]
             pixels[place] = pixel
         self._account(indices, old, pixel * len(indices))
 
     def _account(self, indices: "array[int] | range", old: bytes | bytearray, new: bytes) -> None:
+        if old == new:
+            return
         gain = terms(indices, new, self.pixel_size) - terms(indices, old, self.pixel_size)
         self.digest = (self.digest + gain) & 0xFFFFFFFF
 

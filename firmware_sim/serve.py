@@ -49,8 +49,10 @@ def serve_wire(wire: Wire, line: int, stop: int) -> bool:
     """
     out = bytearray()
     while True:
-        out += wire.transmit()
-        readers = [stop] if len(out) >= _CLOGGED else [stop, line]
+        readers = [stop]
+        if len(out) < _CLOGGED:
+            out += wire.transmit()
+            readers.append(line)
         writers = [line] if out else []
         readable, writable, _ = select.select(readers, writers, [], wire.until_tick())
         if stop in readable:

@@ -61,15 +61,14 @@ class Wire:
         Only those that swap matter. They are counted from the start, so that none drifts.
         """
         device = self.device
-        if not device.pending:
-            self._due = None
-            return
         tick = int((self._clock() - self._epoch) * device.config.refresh / 1000)
         if self._due is None:
-            self._due = tick + 1
+            self._due = tick + 1  # at first, or when the frame has just become whole
         while device.pending and self._due <= tick:
             device.tick()
             self._due += 1
+        if not device.pending:
+            self._due = None
 
     def until_tick(self) -> float | None:
         """Return the seconds until the next tick that swaps; None if none is in sight."""

@@ -144,5 +144,6 @@ def off_wire(data: bytes) -> list[bytes]:
     segments = data.split(b"\0")
     assert segments.pop() == b""
     packets = [cobs_decode(segment) for segment in segments]
+    assert [cobs_encode(raw) for raw in packets] == segments
     assert all(zlib.crc32(raw[:-4]).to_bytes(4, "little") == raw[-4:] for raw in packets)
     return [raw[:-4] for raw in packets]

@@ -208,8 +208,17 @@ def _as_voxels(what: ArrayLike) -> NDArray[np.integer]:
 
 def _as_colors(color: Color) -> NDArray[np.uint8]:
     if isinstance(color, np.ndarray):
-        if color.ndim != 2 or color.shape[1] != 3 or len(color) == 0:
-            raise ValueError(f"colours are a (k, 3) uint8 array, k >= 1; this is {color.shape}")
+        if (
+            color.ndim != 2
+            or color.shape[1] != 3
+            or len(color) == 0
+            or color.dtype.kind not in "iu"
+            or not 0 <= color.min() <= color.max() <= 255
+        ):
+            raise ValueError(
+                f"colours are a (k, 3) array of 0 to 255, k >= 1; this is {color.shape} of "
+                f"{color.dtype}"
+            )
         return color.astype(np.uint8)
     return parse_colors(color)
 

@@ -212,9 +212,9 @@ def test_a_device_that_is_slower_than_patience_is_waited_for():
 
 def test_a_refused_frame_is_told_and_the_next_is_shown():
     rig = Rig()
+    rig.refusals.add("OP")
     rig.link.present([b"\xe0"])
     rig.run(lambda: any(isinstance(event, Refused) for event in rig.events))
-    rig.bench._device.refused.clear()
     for _ in range(2):
         frame = random_frame(rig.rng)
         ticket = rig.present(frame)

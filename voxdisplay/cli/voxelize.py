@@ -40,13 +40,41 @@ _COLUMNS = ("object", "x", "y", "z")
     help="Write a .csv, .npy (int32, N x 4) or .json file. Columns: object, x, y, z.",
 )
 @click.option(
+    "--method",
+    type=click.Choice(["grid-plane", "march"]),
+    default="grid-plane",
+    show_default=True,
+    help="Grid-plane intersection, which guarantees connectivity and error, or the paper's march.",
+)
+@click.option(
+    "--variant",
+    type=click.IntRange(1, 3),
+    default=3,
+    show_default=True,
+    help="How the march finds distances: by a search, a finer one, or a parabola.",
+)
+@click.option(
+    "--tangent",
+    type=click.Choice(["analytic", "difference"]),
+    help="Where the march takes tangents from.  [default: analytic, if there is a derivative]",
+)
+@click.option(
     "--clip",
     type=SizeType(),
     metavar="NX,NY,NZ",
     help="Leave out voxels outside this size.",
 )
 @json_option
-def voxelize(*, scene: str, output: Path | None, clip: vd.Grid | None, as_json: bool) -> None:
+def voxelize(
+    *,
+    scene: str,
+    output: Path | None,
+    method: str,
+    variant: int,
+    tangent: str | None,
+    clip: vd.Grid | None,
+    as_json: bool,
+) -> None:
     """Write the voxels along the curves of SCENE, in order.
 
     SCENE is a JSON file, or - for stdin. Without -o and --json the voxels are printed as CSV.
@@ -58,7 +86,7 @@ def voxelize(*, scene: str, output: Path | None, clip: vd.Grid | None, as_json: 
     loaded = vd.load_scene(scene)
     items = loaded.items
     began_s = time.perf_counter()
-    sequences = voxelize_scene(loaded)
+    sequences = voxelize_scene(loaded, method=method, variant=variant, tangent=tangent)
     seconds = time.perf_counter() - began_s
     kept = [_kept(sequence, clip) for sequence in sequences]
     rows = _rows(kept)

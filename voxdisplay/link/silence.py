@@ -27,6 +27,7 @@ class Silence:
     def __init__(self, now: float, patience_s: float) -> None:
         self._patience_s = patience_s
         self._tick_s = 0.0
+        self._first_timeout_s = FIRST_TIMEOUT_S
         self._round_trip_s: float | None = None
         self._heard_s = self._progress_s = self._asked_s = now
         self._backoff = 1
@@ -35,6 +36,9 @@ class Silence:
     def begin(self, now: float, refresh: int) -> None:
         """Begin a session with a device of ``refresh`` ticks per 1000 seconds."""
         self._tick_s = 1000 / refresh if refresh else 0.0
+        # At most a round trip: the device may have had to start first.
+        greeted_s = min(now - self._heard_s, self._patience_s / 4)
+        self._first_timeout_s = max(FIRST_TIMEOUT_S, 2 * greeted_s)
         self.forget()
         self.progress(now)
 
@@ -69,11 +73,12 @@ class Silence:
 
     @property
     def ask_due_s(self) -> float:
-        """When to ask."""
-        timeout_s = FIRST_TIMEOUT_S
+        """When to ask: often enough that all questions fit into the patience."""
+        timeout_s = self._first_timeout_s
         if self._round_trip_s is not None:
             timeout_s = max(LEAST_TIMEOUT_S, 2 * self._round_trip_s)
-        return max(self._heard_s, self._asked_s) + (timeout_s + self._tick_s) * self._backoff
+        pause_s = min(timeout_s * self._backoff, self._patience_s / 8)
+        return max(self._heard_s + timeout_s + self._tick_s, self._asked_s + pause_s)
 
     @property
     def end_s(self) -> float:

@@ -45,32 +45,25 @@ def _digitise(batch: Batch) -> Iterator[Sequence]:
     events = reduce(trace(batch, samples))
     closed = _closed(batch, samples)
     starts = _starts(events)
-    of_start = samples.curve[events.piece[starts]]
-    bounds = np.append(starts, events.t.size)[
-        np.searchsorted(of_start, np.arange(len(batch.curves) + 1))
-    ]
-    voxels = np.ascontiguousarray(events.voxels.T)
-    seconds = (perf_counter() - begin) / max(len(voxels), 1)
+    voxels, t = np.ascontiguousarray(events.voxels.T), events.t
+    voxels.flags.writeable = t.flags.writeable = False
+    # Curve i has the pieces of[i] to of[i + 1], which begin and end at these of the bounds.
+    of = np.searchsorted(samples.curve[events.piece[starts]], np.arange(len(batch.curves) + 1))
+    bounds = np.append(starts, len(voxels))
+    seconds = (perf_counter() - begin) / len(voxels)
     for index, curve in enumerate(batch.curves):
         begin = perf_counter()
-        own = slice(bounds[index], bounds[index + 1])
-        own_voxels, t = voxels[own], events.t[own]
-        own_starts = starts[np.searchsorted(starts, own.start) : np.searchsorted(starts, own.stop)]
+        own = slice(bounds[of[index]], bounds[of[index + 1]])
+        own_starts = starts[of[index] : of[index + 1]] - own.start
+        own_voxels, own_t = voxels[own], t[own]
         closes = bool(closed[index]) and own_starts.size == 1
         if closes:
-            loop = close_loop(
-                events.take(np.arange(own.start, own.stop)), curve.position, batch.last[index]
-            )
-            own_voxels, t = np.ascontiguousarray(loop.voxels.T), loop.t
-        own_voxels.flags.writeable = t.flags.writeable = False
-        yield Sequence(
-            voxels=own_voxels,
-            closed=closes,
-            starts=own_starts - own.start,
-            t=t,
-            curve=curve,
-            seconds=seconds * len(own_voxels) + perf_counter() - begin,
-        )
+            thin = events.take(np.arange(own.start, own.stop))
+            loop = close_loop(thin, curve.position, batch.last[index])
+            own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
+            own_voxels.flags.writeable = own_t.flags.writeable = False
+        spent = seconds * len(own_voxels) + perf_counter() - begin
+        yield Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
 
 
 def _starts(events: Events) -> Ints:

@@ -1,0 +1,106 @@
+"""What payloads draw, by the emulator's decoder; and the simplest possible segmenter."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from firmware_sim.grid import Grid as DeviceGrid
+from firmware_sim.memory import FORMATS, Page
+from firmware_sim.unpack import unpack
+from voxdisplay.pixel import PixelFormat
+
+HEADER = bytes(3)
+
+
+def page_after(payloads, grid, pixel_format):
+    """The emulator's page after the payloads, each in a packet of its own."""
+    shape, format_ = DeviceGrid(*grid), FORMATS[pixel_format.value]
+    page = Page(shape.volume, format_.size)
+    for payload in payloads:
+        unpack(HEADER + payload, shape, format_, page)
+    return page
+
+
+def values_of(page, pixel_format):
+    """Pixel values of a page in scan order."""
+    raw = np.frombuffer(bytes(page.pixels), dtype=np.uint8).reshape(-1, pixel_format.bytes)
+    return (raw.astype(np.uint32) << np.arange(pixel_format.bytes, dtype=np.uint32) * 8).sum(axis=1)
+
+
+def fits_one_octant(steps):
+    """Whether one octant has all steps, by trying all 24."""
+    return any(
+        all(
+            step[main] == 1 - 2 * falls[main]
+            and all(move in (0, 1 - 2 * fall) for move, fall in zip(step, falls, strict=True))
+            for step in steps
+        )
+        for main in range(3)
+        for falls in itertools.product((0, 1), repeat=3)
+    )
+
+
+def fewest_segments(voxels, pens, longest=256):
+    """Least number of chains and lone voxels, by trying every cut."""
+    best = [0] + [len(voxels)] * len(voxels)  # best[n]: for the first n voxels
+    for end in range(1, len(voxels) + 1):
+        for first in range(end):  # a new place at `first`, and what a chain from there reaches
+            steps = [
+                tuple(int(b) - int(a) for a, b in zip(voxels[k], voxels[k + 1], strict=True))
+                for k in range(first, end - 1)
+            ]
+            same_pen = len(set(pens[first:end])) == 1
+            near = all(max(map(abs, step)) == 1 for step in steps)
+            if same_pen and near:
+                best[end] = min(best[end], best[first] + max(1, _fewest_cuts(steps, longest)))
+    return best[-1]
+
+
+def _fewest_cuts(steps, longest):
+    """Least number of segments of steps that follow each other."""
+    best = [0] + [len(steps)] * len(steps)
+    for end in range(1, len(steps) + 1):
+        for first in range(max(0, end - longest), end):
+            if fits_one_octant(steps[first:end]):
+                best[end] = min(best[end], best[first] + 1)
+    return best[-1]
+
+
+def chains_in(payload, grid, pixel_format):
+    """Ops of a payload of chains, taken apart by hand: (op, octant, steps) each."""
+    size = 1 if max(grid) <= 256 else 2
+    at, found = 0, []
+    while at < len(payload):
+        op = payload[at]
+        if op == 0x01:
+            found.append(("PEN", None, None))
+            at += 1 + pixel_format.bytes
+        elif op == 0x02:
+            assert payload[at + 1 + 3 * size] == 0xA0
+            found.append(("LONE", None, 0))
+            at += 2 + 3 * size
+        else:
+            fresh = op & 0xE0 == 0x40
+            assert fresh or op & 0xE0 == 0x20
+            at += 1 + 3 * size * fresh
+            steps = payload[at] + 1
+            found.append(("FROM" if fresh else "STEP", op & 31, steps))
+            at += 1 + -(-steps // 4)
+    assert at == len(payload)
+    return found
+
+
+SEGMENTS = {"LONE", "FROM", "STEP"}
+
+
+def segments_in(payloads, grid, pixel_format):
+    return [
+        op
+        for payload in payloads
+        for op in chains_in(payload, grid, pixel_format)
+        if op[0] in SEGMENTS
+    ]
+
+
+FORMAT_LIST = list(PixelFormat)

@@ -1,0 +1,116 @@
+"""Packets packed by hand from the document, and a device to try them on."""
+
+import struct
+from dataclasses import dataclass
+
+from document import off_wire, on_wire
+
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+
+DATA, HELLO, STATUS, READ, ACK, INFO, PAGE, ERROR = 1, 3, 4, 5, 8, 9, 10, 11
+CLEAR, COMMIT = 1, 4
+SHOWN, PENDING, ASKED = 1, 2, 4
+SESSION = 0x1234
+BOOT = 0xB007
+
+
+def packet(kind: int, flags: int = 0, seq: int = 0, frame: int = 0, payload: bytes = b"") -> bytes:
+    return on_wire(bytes((kind << 4 | flags, seq, frame)) + payload)
+
+
+def hello(session: int = SESSION, major: int = 1, more: bytes = b"\0\0") -> bytes:
+    return packet(HELLO, payload=struct.pack("<BH", major, session) + more)
+
+
+def data(seq: int, frame: int, ops: bytes = b"", flags: int = CLEAR) -> bytes:
+    return packet(DATA, flags, seq, frame, ops)
+
+
+def status(tag: int = 0) -> bytes:
+    return packet(STATUS, seq=tag)
+
+
+def read(start: int, count: int, tag: int = 0, back: int = 0) -> bytes:
+    return packet(READ, back, tag, 0, struct.pack("<BII", 0, start, count))
+
+
+@dataclass
+class Answer:
+    kind: int
+    flags: int
+    seq: int
+    frame: int
+    payload: bytes
+
+    def __getattr__(self, name: str) -> int:
+        fields = {
+            ACK: (
+                "<BHHIIIH",
+                ("last", "session", "boot", "received", "credit", "digest", "damaged"),
+            ),
+            INFO: (
+                "<BHHBBHHHBBHIII",
+                (
+                    *("major", "session", "boot", "minor", "format", "nx", "ny", "nz", "pages"),
+                    *("reserved", "max_payload", "rx_buffer", "refresh", "features"),
+                ),
+            ),
+            ERROR: ("<BHH", ("code", "session", "offset")),
+            PAGE: ("<BII", ("reserved", "start", "count")),
+        }
+        layout, names = fields[self.kind]
+        if name not in names:
+            raise AttributeError(name)
+        return struct.unpack_from(layout, self.payload)[names.index(name)]
+
+    @property
+    def error(self) -> tuple[int, int]:
+        assert self.kind == ERROR, self
+        return self.code, self.offset
+
+
+def answers(wire: bytes) -> list[Answer]:
+    """Take apart what a device sent; every byte of it must be of a good packet."""
+    return [
+        Answer(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:]) for body in off_wire(wire)
+    ]
+
+
+class Rig:
+    """A device and someone who talks to it."""
+
+    def __init__(self, *grid: int, session: bool = True, **config: object) -> None:
+        config = {"refresh": 1, "boot": BOOT, **config}
+        self.device = Device(Config(grid=grid or (3, 5, 7), **config))
+        if session:
+            (info,) = self.say(hello())
+            assert info.kind == INFO
+
+    def say(self, *packets: bytes) -> list[Answer]:
+        """Send packets; return the answers."""
+        self.device.receive(b"".join(packets))
+        return answers(self.device.transmit())
+
+    def ask(self, wire: bytes) -> Answer:
+        """Send one packet; return its only answer."""
+        (answer,) = self.say(wire)
+        return answer
+
+    def tick(self) -> list[Answer]:
+        self.device.tick()
+        return answers(self.device.transmit())
+
+    def show(self, seq: int, frame: int, ops: bytes, flags: int = CLEAR) -> Answer:
+        """Send a frame of one packet and let it be shown."""
+        self.ask(data(seq, frame, ops, flags | COMMIT))
+        (ack,) = self.tick()
+        return ack
+
+    @property
+    def front(self) -> bytes:
+        return bytes(self.device.memory.front.pixels)
+
+    @property
+    def back(self) -> bytes:
+        return bytes(self.device.memory.back.pixels)

@@ -1,0 +1,153 @@
+"""A frame: what was drawn, in its order, and what the emulator makes of it."""
+
+import numpy as np
+import pytest
+from drawing import page_after, values_of
+from voxdisplay import Segment, voxelize
+from voxdisplay.frame import Frame
+from voxdisplay.pixel import PixelFormat
+
+GRID = (17, 64, 40)
+FORMATS = pytest.mark.parametrize("format_", PixelFormat)
+
+
+def shown(frame, max_payload=64, seed=0):
+    """The frame's payloads, drawn by the emulator in any order, are the frame."""
+    payloads = frame.payloads(max_payload)
+    assert all(0 < len(payload) <= max_payload for payload in payloads)
+    order = np.random.default_rng(seed).permutation(len(payloads))
+    page = page_after([payloads[k] for k in order], frame.grid, frame.format)
+    assert values_of(page, frame.format).tolist() == frame.format.values(frame.array()).tolist()
+    assert page.digest == frame.digest()
+    return frame.array()
+
+
+def walk(rng, steps, low=-3):
+    """A 26-connected walk that leaves the grid now and then."""
+    start = rng.integers(0, GRID)
+    return np.clip(start + np.cumsum(rng.integers(-1, 2, (steps, 3)), axis=0), low, 70)
+
+
+@FORMATS
+def test_a_blank_frame(format_):
+    frame = Frame((3, 5, 7), format_)
+    assert frame.payloads(64) == []
+    assert frame.digest() == 0
+    assert not shown(frame).any()
+
+
+@FORMATS
+@pytest.mark.parametrize("seed", range(4))
+def test_the_later_item_covers_the_earlier(format_, seed):
+    rng = np.random.default_rng(seed)
+    frame = Frame(GRID, format_)
+    meant = {}
+    for color in ("red", "#123456", "black", "white", "red"):
+        walked = walk(rng, 400)
+        frame.draw(walked, color)
+        (value,) = frame.format.nearest(np.array([voxdisplay_color(color)], dtype=np.uint8))
+        meant |= {tuple(v): int(value) for v in walked.tolist() if inside(v)}
+    shown(frame, seed=seed)
+    values = frame.format.values(frame.array()).reshape(frame.grid.array_shape)
+    assert {v: int(values[v[::-1]]) for v in meant} == meant
+    assert np.count_nonzero(values) == sum(value != 0 for value in meant.values())
+    index, lit = frame.lit()
+    assert index.tolist() == np.flatnonzero(values).tolist()
+    assert lit.tolist() == values.reshape(-1)[index].tolist()
+
+
+def voxdisplay_color(text):
+    return {"red": (255, 0, 0), "#123456": (0x12, 0x34, 0x56), "black": (0, 0, 0),
+            "white": (255, 255, 255)}[text]  # fmt: skip
+
+
+def inside(voxel):
+    return all(0 <= place < side for place, side in zip(voxel, GRID, strict=True))
+
+
+def test_what_is_outside_is_clipped_and_counted():
+    frame = Frame((3, 5, 7), "index8")
+    drawing = frame.draw([(-1, 0, 0), (0, 0, 0), (2, 4, 6), (3, 4, 6), (2, 5, 6), (2, 4, 7)])
+    assert (drawing.voxels, drawing.clipped, drawing.exact_color) == (6, 4, True)
+    assert np.argwhere(shown(frame)).tolist() == [[0, 0, 0], [6, 4, 2]]
+    assert frame.draw(np.empty((0, 3), dtype=int)).voxels == 0
+    assert frame.draw([(9, 9, 9)]).clipped == 1
+    shown(frame)
+
+
+def test_x_y_z_are_not_exchanged():
+    frame = Frame((3, 5, 7), "index8")
+    frame.draw([(2, 4, 6)])
+    assert frame.array().shape == (7, 5, 3)
+    assert frame.array()[6, 4, 2] == 255
+
+
+def test_a_curve_and_its_sequence_and_its_voxels_are_the_same():
+    curve = Segment((1.5, 2.5, 3.5), (15.5, 60.5, 30.5))
+    frames = [Frame(GRID) for _ in range(4)]
+    frames[0].draw(curve, "orange")
+    frames[1].draw(voxelize(curve), "orange")
+    frames[2].draw(voxelize(curve).voxels, "orange")
+    assert len(frames[3].draw_all([(curve, "orange")])) == 1
+    assert len({frame.digest() for frame in frames}) == 1
+    assert shown(frames[0]).any()
+    assert frames[0].draw_all([]) == []
+
+
+def test_colours_are_spread_evenly_and_both_ends_are_met():
+    frame = Frame((5, 1, 1))
+    drawing = frame.draw([(x, 0, 0) for x in range(5)], ["black", "white"])
+    assert frame.array()[0, 0, :, 0].tolist() == [0, 64, 128, 191, 255]
+    assert drawing.exact_color
+    assert not Frame((5, 1, 1), "index8").draw([(0, 0, 0)], "#808080").exact_color
+    frame.draw([(4, 0, 0)], ["red", "lime"])
+    assert frame.array()[0, 0, 4].tolist() == [255, 0, 0]
+    frame.draw([(x, 0, 0) for x in range(3)], np.array([[9, 8, 7], [9, 8, 9]]))
+    assert frame.array()[0, 0, :3].tolist() == [[9, 8, 7], [9, 8, 8], [9, 8, 9]]
+
+
+@pytest.mark.parametrize(
+    "colors",
+    [np.zeros((0, 3)), np.zeros(3), np.zeros((2, 4)), np.array([[0.5, 1, 0]]),
+     np.array([[256, 0, 0]]), np.array([[-1, 0, 0]])],
+)  # fmt: skip
+def test_an_array_that_is_no_colours(colors):
+    with pytest.raises(ValueError, match="colours are"):
+        Frame((3, 5, 7)).draw([(0, 0, 0)], colors)
+
+
+@pytest.mark.parametrize("voxels", [[], [1, 2, 3], [[1, 2]], [[1.0, 2.0, 3.0]], [[True, False, True]]])
+def test_what_is_no_voxels(voxels):
+    with pytest.raises(ValueError, match="columns x, y, z"):
+        Frame((3, 5, 7)).draw(voxels)
+
+
+@FORMATS
+def test_set_makes_it_an_array_and_drawing_goes_on_from_there(format_):
+    rng = np.random.default_rng(1)
+    frame = Frame(GRID, format_)
+    frame.draw(walk(rng, 50), "red")
+    array = frame.array()
+    array[...] = rng.integers(0, min(format_.full, 255), array.shape, endpoint=True)
+    frame.set(array)
+    assert (shown(frame) == array).all()
+    frame.draw(walk(rng, 500), "black")
+    frame.draw(walk(rng, 500), "red")
+    shown(frame)
+    array[...] = 0
+    assert frame.array().any(), "it keeps no hold of the caller's array"
+    frame.clear()
+    assert not shown(frame).any()
+    frame.draw(walk(rng, 50), "red")
+    shown(frame)
+
+
+@pytest.mark.parametrize(
+    "array", [np.zeros((3, 5, 7), np.uint8), np.zeros((7, 5, 3), int), np.full((7, 5, 3), 1.0)]
+)
+def test_set_refuses_what_is_no_memory_and_changes_nothing(array):
+    frame = Frame((3, 5, 7), "index8")
+    frame.draw([(0, 0, 0)])
+    with pytest.raises(ValueError, match="the array"):
+        frame.set(array)
+    assert np.count_nonzero(frame.array()) == 1
