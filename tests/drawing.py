@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+
 from firmware_sim.grid import Grid as DeviceGrid
 from firmware_sim.memory import FORMATS, Page
 from firmware_sim.unpack import unpack
-from voxdisplay.pixel import PixelFormat
 
 HEADER = bytes(3)
 
@@ -42,19 +42,15 @@ def fits_one_octant(steps):
 
 
 def fewest_segments(voxels, pens, longest=256):
-    """Least number of chains and lone voxels, by trying every cut."""
-    best = [0] + [len(voxels)] * len(voxels)  # best[n]: for the first n voxels
-    for end in range(1, len(voxels) + 1):
-        for first in range(end):  # a new place at `first`, and what a chain from there reaches
-            steps = [
-                tuple(int(b) - int(a) for a, b in zip(voxels[k], voxels[k + 1], strict=True))
-                for k in range(first, end - 1)
-            ]
-            same_pen = len(set(pens[first:end])) == 1
-            near = all(max(map(abs, step)) == 1 for step in steps)
-            if same_pen and near:
-                best[end] = min(best[end], best[first] + max(1, _fewest_cuts(steps, longest)))
-    return best[-1]
+    """Least number of segments and lone voxels, by trying every cut of what hangs together."""
+    chains = [[]]
+    for here, there, pen, next_pen in zip(voxels, voxels[1:], pens, pens[1:], strict=False):
+        step = tuple(int(b) - int(a) for a, b in zip(here, there, strict=True))
+        if pen == next_pen and max(map(abs, step)) == 1:
+            chains[-1].append(step)
+        else:
+            chains.append([])
+    return sum(max(1, _fewest_cuts(steps, longest)) for steps in chains)
 
 
 def _fewest_cuts(steps, longest):
@@ -101,6 +97,3 @@ def segments_in(payloads, grid, pixel_format):
         for op in chains_in(payload, grid, pixel_format)
         if op[0] in SEGMENTS
     ]
-
-
-FORMAT_LIST = list(PixelFormat)

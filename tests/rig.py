@@ -1,5 +1,7 @@
-"""A link and an emulated device with a line between them that delays, damages and loses. The clock
-is a number, and every fault comes from a seed."""
+"""A link and an emulated device with a line between them that delays, damages and loses.
+
+The clock is a number, and every fault comes from a seed.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from collections import deque
 
 import document
 import numpy as np
+
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
@@ -28,8 +31,9 @@ def random_frame(rng, pixel_format="index8", density=0.5):
         array = frame.array()
         top = 2 if pixel_format == "mono1" else np.iinfo(array.dtype).max
         frame.set(
-            (numbers.integers(1, top, array.shape) * (numbers.random(array.shape) < density))
-            .astype(array.dtype)
+            (
+                numbers.integers(1, top, array.shape) * (numbers.random(array.shape) < density)
+            ).astype(array.dtype)
         )
     return frame
 
@@ -130,9 +134,9 @@ class Rig:
             self._note_sent(out)
             self.down.put(out, self.now)
         self.now = max(self.now + 1e-6, self._next_s())
-        if data := self.down.get(self.now):
-            if self.alive:
-                self.device.receive(data)
+        data = self.down.get(self.now)
+        if self.alive:
+            self.device.receive(data)
         self._tick()
         while self.alive and (data := self.device.transmit()):
             self.up.put(data, self.now)

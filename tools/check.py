@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 # What must be covered in all its branches: the wire and both of its ends.
-COVERED = ["voxdisplay.wire", "voxdisplay.link", "firmware_sim"]
+COVERED = ["voxdisplay/wire", "voxdisplay/link", "firmware_sim"]
 
 
 def steps(*, fast: bool, fix: bool) -> dict[str, list[str]]:

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import Faults, Rig, frames, random_frame
+
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.link import PageRead, Refused
 from voxdisplay.pixel import PixelFormat
@@ -34,7 +35,7 @@ def rig_of(seed, device):
     return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=20, **config)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(seeds, devices)
 def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, device):
     """9.3: "Then, and only then, the host sends it again"."""
@@ -56,7 +57,7 @@ def faults_of(rng):
     return Faults(rng.getrandbits(32), **(rates if kind == "all" else {kind: rates[kind]}))
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120, deadline=None, derandomize=True)
 @given(seeds, devices, st.sampled_from(["down", "up", "both"]))
 def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
     """5: "A frame that is not whole MUST NOT be shown" is checked after every step."""
@@ -77,7 +78,7 @@ def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
     rig.assert_told(tickets[-1])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(seeds, devices, st.integers(0, 60), st.integers(1, 3))
 def test_a_device_that_loses_its_power(seed, device, when, times):
     rig = rig_of(seed, device)
@@ -94,7 +95,7 @@ def test_a_device_that_loses_its_power(seed, device, when, times):
     assert rig.restarts <= times
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(seeds, devices, st.floats(0.01, 8), st.integers(1, 50))
 def test_a_line_that_stalls(seed, device, stall_s, when):
     rig = rig_of(seed, device)
@@ -112,7 +113,7 @@ def test_a_line_that_stalls(seed, device, stall_s, when):
         assert rig.link.counters.sessions == 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(seeds, devices, st.booleans())
 def test_a_page_is_read_through_a_bad_line(seed, device, bad):
     rig = rig_of(seed, device)
@@ -180,19 +181,33 @@ def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
         rig.step()
     rig.alive = False
     died_s = rig.now
-    with pytest.raises(TransportTimeout, match="silent|nothing answered HELLO"):
+    with pytest.raises(TransportTimeout, match=r"silent|nothing answered HELLO"):
         rig.run()
     assert rig.now - died_s <= 3 + (1000 / refresh if refresh else 0) + 0.01
+
+
+def test_a_device_that_dies_when_there_is_little_patience():
+    rig = Rig(patience_s=0.3)
+    rig.present(random_frame(rig.rng))
+    rig.run(lambda: rig.link.ready)
+    rig.alive = False
+    with pytest.raises(TransportTimeout, match=r"silent for 0.3 s"):
+        rig.run()
 
 
 def test_a_device_that_talks_but_never_shows_anything():
     rig = Rig(refresh=1, patience_s=3)  # a tick in 1000 s; what it says of itself is a lie
     rig.device.config = rig.device.config.__class__(
-        grid=(17, 9, 5), pixel_format="index8", refresh=30_000, max_payload=64, name="",
-        firmware="", rx_buffer=512,
+        grid=(17, 9, 5),
+        pixel_format="index8",
+        refresh=30_000,
+        max_payload=64,
+        name="",
+        firmware="",
+        rx_buffer=512,
     )
     rig._tick = lambda: None
-    rig._tick_after = lambda now: float("inf")
+    rig._tick_after = lambda _now: float("inf")
     rig.present(random_frame(rig.rng, density=0.02))
     with pytest.raises(TransportTimeout, match="nothing has moved"):
         rig.run()
@@ -225,7 +240,7 @@ def test_a_refused_frame_is_told_and_the_next_is_shown():
 
 
 @pytest.mark.slow
-@settings(max_examples=3000, deadline=None)
+@settings(max_examples=3000, deadline=None, derandomize=True)
 @given(seeds, devices, st.sampled_from(["down", "up", "both"]))
 def test_after_many_more_faults(seed, device, where):
     test_after_the_last_fault_the_last_frame_is_shown.hypothesis.inner_test(seed, device, where)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawing import chains_in, page_after, segments_in, values_of
+
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire.chains import encode_chains
@@ -34,8 +35,16 @@ def test_one_voxel_is_a_move_and_a_run():
 
 def test_the_vector_of_two_octants():
     """protocol.md, 17.3: chain-in-two-octants."""
-    voxels = [(3, 60, 7), (3, 59, 7), (3, 58, 8), (4, 57, 8), (5, 56, 9), (5, 55, 10), (4, 56, 11),
-              (4, 57, 12)]
+    voxels = [
+        (3, 60, 7),
+        (3, 59, 7),
+        (3, 58, 8),
+        (4, 57, 8),
+        (5, 56, 9),
+        (5, 55, 10),
+        (4, 56, 11),
+        (4, 57, 12),
+    ]
     drawn = encode(voxels, grid=Grid(17, 64, 40), format_=PixelFormat.MONO1)
     (payload,) = drawn
     assert [op[0] for op in chains_in(payload, (17, 64, 40), PixelFormat.MONO1)] == ["FROM", "STEP"]

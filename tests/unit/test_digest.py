@@ -3,6 +3,7 @@
 import document
 import numpy as np
 import pytest
+
 from firmware_sim.memory import Page
 from voxdisplay.wire.digest import digest
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawing import page_after, values_of
+
 from voxdisplay import Segment, voxelize
 from voxdisplay.frame import Frame
 from voxdisplay.pixel import PixelFormat
@@ -116,7 +117,9 @@ def test_an_array_that_is_no_colours(colors):
         Frame((3, 5, 7)).draw([(0, 0, 0)], colors)
 
 
-@pytest.mark.parametrize("voxels", [[], [1, 2, 3], [[1, 2]], [[1.0, 2.0, 3.0]], [[True, False, True]]])
+@pytest.mark.parametrize(
+    "voxels", [[], [1, 2, 3], [[1, 2]], [[1.0, 2.0, 3.0]], [[True, False, True]]]
+)
 def test_what_is_no_voxels(voxels):
     with pytest.raises(ValueError, match="columns x, y, z"):
         Frame((3, 5, 7)).draw(voxels)

@@ -2,6 +2,7 @@
 
 import document
 import pytest
+
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec

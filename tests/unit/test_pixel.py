@@ -5,6 +5,7 @@ import itertools
 import document
 import numpy as np
 import pytest
+
 from voxdisplay.pixel import PixelFormat
 
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)

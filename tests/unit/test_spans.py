@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawing import page_after, values_of
+
 from firmware_sim.memory import FORMATS as DEVICE_FORMATS
 from firmware_sim.memory import Page
 from firmware_sim.pack import pack
@@ -81,6 +82,21 @@ def test_a_full_page_is_one_run(format_):
     """7: the pen begins as the full pixel."""
     payloads, _ = drawn(np.full(105, format_.full, dtype=np.uint32), format_)
     assert payloads == [count_op(0xA0, 105)]
+
+
+@pytest.mark.parametrize(
+    ("index", "ops"),
+    [(2**21 + 32, "C0 FF 9F FF FF 7F C0 FF"), (2**21 + 33, "C0 FF 02 21 00 20 C0 FF")],
+    ids=["skip", "move"],
+)
+def test_a_long_way_is_a_move(index, ops):
+    """SKIP with a LEB128 of three bytes is as long as MOVE; with four, MOVE is shorter."""
+    grid = Grid(256, 256, 40)
+    values = np.zeros(grid.voxels, dtype=np.uint32)
+    values[[0, index]] = 255
+    payloads, page = drawn(values, PixelFormat.INDEX8, 64, grid)
+    assert (page == values).all()
+    assert payloads == [bytes.fromhex(ops)]
 
 
 @FORMATS
@@ -167,4 +183,3 @@ def test_a_page_that_breaks_the_protocol(format_, count, ops, what, offset):
         decode_spans(bytes.fromhex(ops), count, PixelFormat(format_))
     assert caught.value.section == "10"
     assert caught.value.offset == offset
-

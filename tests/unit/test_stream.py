@@ -2,6 +2,7 @@
 
 import document
 import pytest
+
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import stream as streams
@@ -90,7 +91,9 @@ def test_the_end_of_an_overlong_segment_is_no_packet():
 
 def test_noise_is_told_before_it_ends():
     assert fed(b"boot> ")[0].noise == b"boot> "
-    assert fed(b"Hello, this is a console.\0" * 5)[0].noise == (b"Hello, this is a console." * 3)[:64]
+    assert (
+        fed(b"Hello, this is a console.\0" * 5)[0].noise == (b"Hello, this is a console." * 3)[:64]
+    )
 
 
 class Counted(bytearray):

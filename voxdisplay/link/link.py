@@ -24,7 +24,7 @@ from voxdisplay.wire.stream import PacketStream
 HELLO_INTERVAL_S = 0.25
 MOST_LATE_S = 0.25  # a caller that comes back later than this was away
 MOST_TRANSMISSIONS = 30
-MOST_RESTARTS = 3
+MOST_RESTARTS = 8  # without a frame shown
 _MODULUS = 256
 
 
@@ -98,6 +98,7 @@ class Link:
         self._tickets = 0
         self._restarts = 0
         self._hello_due_s = now
+        self._hellos = 0  # of this session
         self._silence = Silence(now, patience_s)
         self._back_s = math.inf  # when the caller should be back
         self._starved = False  # something is to be sent, and there is no credit for it
@@ -170,6 +171,7 @@ class Link:
         self._starved = self._ask_at_once = False
         self._silence.forget()
         self._hello_due_s = now
+        self._hellos = 0
 
     # -- what goes out
 
@@ -194,8 +196,8 @@ class Link:
     def _converse(self, now: float) -> bytes:
         if self._waiting:
             self._silence.check(now)
-        else:  # nothing was on its way: silence so far says nothing
-            self._silence.progress(now)
+        else:
+            self._silence.rest(now)
         return b"".join(self._outgoing(now)) + self._ask(now)
 
     def _greet(self, now: float) -> bytes:
@@ -204,6 +206,7 @@ class Link:
         if now < self._hello_due_s:
             return b""
         self._hello_due_s = now + HELLO_INTERVAL_S
+        self._hellos += 1
         return b"\0" + packets.encode(packets.Hello(session=self._session))
 
     def _no_answer(self) -> TransportTimeout:
@@ -288,10 +291,10 @@ class Link:
 
     @property
     def _on_its_way(self) -> bool:
-        """Whether an answer comes by itself that brings credit, or pixels."""
+        """Whether an answer comes by itself, that brings credit or makes some needless."""
         return bool(
-            self._window.flights
-            or self._silence.asking
+            self._silence.asking
+            or any(not flight.lost for flight in self._window.flights.values())
             or any(request.ordinal for request in self._requests)
         )
 
@@ -321,6 +324,7 @@ class Link:
             return b"\0" + wire  # the 00 costs no credit, and ends what a lost 00 has left open
         if due:  # nothing more may be asked; HELLO always may
             self._restart(now)
+            silence.forget(doubt=True)
             return self._greet(now)
         return b""
 
@@ -363,7 +367,7 @@ class Link:
 
     def _take(self, packet: packets.Packet, now: float) -> Iterator[Event]:
         info = self.info
-        if info:
+        if info and not isinstance(packet, packets.Info):
             self._silence.heard(now)
         match packet:
             case packets.Info() if packet.session == self._session:
@@ -384,7 +388,9 @@ class Link:
             check_info(info)
         self.info = info
         self.counters.sessions += 1
-        self._window = Window(info.rx_buffer)
+        # Which HELLO it answers cannot be known: those behind the first may still be in the buffer.
+        behind = (self._hellos - 1) * len(packets.encode(packets.Hello(session=self._session)))
+        self._window = Window(info.rx_buffer - behind)
         self._silence.begin(now, info.refresh)
         yield Ready(info)
 

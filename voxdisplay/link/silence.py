@@ -31,6 +31,7 @@ class Silence:
         self._round_trip_s: float | None = None
         self._heard_s = self._progress_s = self._asked_s = now
         self._backoff = 1
+        self._doubt = False
         self._asked: dict[int, float] = {}  # tag -> when
 
     def begin(self, now: float, refresh: int) -> None:
@@ -39,21 +40,31 @@ class Silence:
         # At most a round trip: the device may have had to start first.
         greeted_s = min(now - self._heard_s, self._patience_s / 4)
         self._first_timeout_s = max(FIRST_TIMEOUT_S, 2 * greeted_s)
-        self.forget()
-        self.progress(now)
+        self.rest(now)
 
-    def forget(self) -> None:
-        """Await no answer any more."""
+    def forget(self, *, doubt: bool = False) -> None:
+        """Await no answer any more; ``doubt`` if that is because none came.
+
+        Then a device that only answers HELLO is as good as silent.
+        """
         self._asked.clear()
         self._backoff = 1
+        self._doubt = doubt
+
+    def rest(self, now: float) -> None:
+        """Note that nothing is waited for: silence so far says nothing."""
+        if not self._doubt:
+            self.progress(now)
 
     def heard(self, now: float) -> None:
         """Note that the device has said something."""
         self._heard_s = now
+        self._doubt = False
 
     def progress(self, now: float) -> None:
-        """Note that something has arrived, or that nothing is waited for."""
-        self._heard_s = self._progress_s = now
+        """Note that something has arrived."""
+        self.heard(now)
+        self._progress_s = now
         self._backoff = 1
 
     def excuse(self, seconds: float) -> None:

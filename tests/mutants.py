@@ -1,0 +1,75 @@
+"""Changes each literal of one side's ``spec.py`` by one and runs the vectors of protocol.md.
+
+    python mutants.py voxdisplay.wire.spec
+    python mutants.py firmware_sim.spec
+
+prints the names of the literals that no vector holds. The side's modules are imported afresh for
+each literal, so that every copy of it has changed.
+"""
+
+import importlib
+import importlib.util
+import inspect
+import itertools
+import sys
+from pathlib import Path
+
+TESTS = Path(__file__).parent
+DEPEND = ("voxdisplay.wire", "voxdisplay.pixel", "voxdisplay.link", "firmware_sim", "sides")
+
+
+def purge():
+    for name in list(sys.modules):
+        if any(name == part or name.startswith(f"{part}.") for part in DEPEND):
+            del sys.modules[name]
+
+
+def vectors_pass():
+    """Run the tests of the vectors, without pytest's ado, up to the first that fails."""
+    place = importlib.util.spec_from_file_location(
+        "vectors_again", TESTS / "conformance" / "test_vectors.py"
+    )
+    module = importlib.util.module_from_spec(place)
+    place.loader.exec_module(module)
+    for name, test in inspect.getmembers(module, inspect.isfunction):
+        if name.startswith("test_"):
+            for case in cases_of(test):
+                test(**case)
+
+
+def cases_of(test):
+    marks = [mark for mark in getattr(test, "pytestmark", []) if mark.name == "parametrize"]
+    names = [mark.args[0] for mark in marks]
+    for values in itertools.product(*(mark.args[1] for mark in marks)):
+        yield dict(zip(names, values, strict=True))
+
+
+def survives(spec_name, literal):
+    purge()
+    spec = importlib.import_module(spec_name)
+    value = getattr(spec, literal)
+    if isinstance(value, tuple):
+        (*others, (field, offset, size)) = value
+        changed = (*others, (field, offset, {1: 2, 2: 4, 4: 2}[size]))
+    else:
+        changed = value + 1
+    setattr(spec, literal, changed)
+    try:
+        vectors_pass()
+    except Exception:  # noqa: BLE001 - however it fails, the literal is held
+        return False
+    return True
+
+
+def main(spec_name):
+    names = [name for name in vars(importlib.import_module(spec_name)) if name.isupper()]
+    literals = [name for name in names if name != "PIXEL_BYTES"]
+    purge()
+    vectors_pass()
+    survivors = [literal for literal in literals if survives(spec_name, literal)]
+    sys.stdout.write(" ".join(survivors) + "\n")
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(TESTS))
+    main(sys.argv[1])
