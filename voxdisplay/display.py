@@ -260,7 +260,8 @@ class Display:
         """Find out what the display shows instead, and send the frame once more."""
         what = f"the display's digest is {digest:08x}, the frame's {meant:08x}"
         if "read" in self.info.features:
-            what += f"; {_difference(frame.array(), self.read())}"
+            difference = _difference(frame.array(), self.read())
+            what += f"; {difference or 'but its memory reads back as it was meant'}"
         again = self._show(payloads)
         if again != meant:
             raise DesyncError(
@@ -347,6 +348,28 @@ class Display:
         shape = self.info.format.shape(self.info.grid.array_shape)
         return self.info.format.pixels(values).reshape(shape)
 
+    def verify(self, frame: Frame, *, progress: Progress | None = None) -> None:
+        """Read the front page back and compare it with a frame, voxel by voxel.
+
+        Parameters
+        ----------
+        frame : Frame
+            What should be on display.
+        progress : callable, optional
+            As of `read`.
+
+        Raises
+        ------
+        DesyncError
+            If they differ, saying where.
+        IncompatibleDevice
+            If the device cannot read.
+
+        """
+        difference = _difference(frame.array(), self.read(progress=progress))
+        if difference:
+            raise DesyncError(f"what was read back is not the frame: {difference}")
+
     # -- the end
 
     def _check_open(self) -> None:
@@ -399,13 +422,13 @@ def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:
 
 
 def _difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:
-    """Say where two arrays [z, y, x] differ, in one line."""
+    """Say where two arrays [z, y, x] differ, in one line; nothing if they do not."""
     differs = meant != got
     if differs.ndim == 4:
         differs = differs.any(axis=-1)
     places = np.argwhere(differs)
     if len(places) == 0:
-        return "but its memory reads back as it was meant"
+        return ""
     z, y, x = places[0].tolist()
     return (
         f"{len(places)} voxels differ, the first at ({x}, {y}, {z}): "

@@ -113,6 +113,17 @@ def test_present_read_and_clear(opened, format_, refresh):
     assert not any(pipe.bench.snapshot().pixels)
 
 
+def test_verify_says_where_the_page_differs(opened):
+    display, pipe = opened()
+    frame = display.frame()
+    frame.draw([(1, 2, 3), (16, 8, 4)], "red")
+    display.present(frame)
+    display.verify(frame)
+    pipe.device.memory.front.pixels[3 * display.info.grid.index_of(np.array([(1, 2, 3)]))[0]] = 7
+    with pytest.raises(vd.DesyncError, match=r"1 voxels differ, the first at \(1, 2, 3\)"):
+        display.verify(frame)
+
+
 def test_progress_is_told(opened):
     display, _ = opened()
     told = []

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from typing import Literal
 
 import click
-import numpy as np
 
 import voxdisplay as vd
 from voxdisplay.cli.options import (
@@ -67,7 +66,8 @@ def push(
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
         if verify:
-            _verify(display, frame)
+            with _progress("reading back") as progress:
+                display.verify(frame, progress=progress)
         if as_json:
             print_json(
                 {
@@ -103,13 +103,6 @@ def draw(scene: vd.Scene, display: vd.Display) -> vd.Frame:
     if not all(drawing.exact_color for drawing in drawings):
         note(f"this is a {display.info.format.value} display: colours are the nearest it has")
     return frame
-
-
-def _verify(display: vd.Display, frame: vd.Frame) -> None:
-    with _progress("reading back") as progress:
-        got = display.read(progress=progress)
-    if not np.array_equal(got, frame.array()):
-        raise vd.DesyncError("the page that was read back is not the frame that was sent")
 
 
 @contextlib.contextmanager
