@@ -1,7 +1,8 @@
 """Measures, as medians and ratios of one run; prints one table.
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
-``cold`` what the command costs from a cold start.
+``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
+beside other ways to do it (`bench_curves`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+from bench_curves import bench_curves
 
 import voxdisplay as vd
 
@@ -212,10 +215,14 @@ def bench_cold(repeats: int) -> None:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["push", "cold"])
+    parser.add_argument("what", choices=["push", "cold", "curves"])
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--quick", action="store_true", help="curves: only a few")
     options = parser.parse_args()
-    {"push": bench_push, "cold": bench_cold}[options.what](options.repeats)
+    if options.what == "curves":
+        bench_curves(options.repeats, quick=options.quick)
+    else:
+        {"push": bench_push, "cold": bench_cold}[options.what](options.repeats)
 
 
 if __name__ == "__main__":

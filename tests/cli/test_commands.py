@@ -16,7 +16,7 @@ PUSH_KEYS = {
 }  # fmt: skip
 OBJECT_KEYS = {
     "object", "type", "voxels", "closed", "pieces", "e_max", "e_av", "gaps", "contacts", "clipped",
-    "seconds",
+    "seconds", "certified",
 }  # fmt: skip
 PAPER = "examples/paper-curve.json"
 

@@ -282,7 +282,7 @@ def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
 
 
 def test_a_long_curve_is_the_same_alone_and_in_a_batch() -> None:
-    long = paper_curve(2500, 4, 0)  # several blocks
+    long = paper_curve(8000, 4, 0)  # several blocks
     other = fourier_curve(1, "smooth", closed=False)
     _, many, _ = voxelize_many([other, long, other])
     assert np.array_equal(voxelize(long).voxels, many.voxels)

@@ -28,7 +28,7 @@ _COLUMNS = ("object", "x", "y", "z")
     Examples:
       voxdisplay voxelize curve.json > voxels.csv
       voxdisplay voxelize curve.json -o voxels.npy --clip 128,128,128
-      voxdisplay voxelize curve.json --json
+      voxdisplay voxelize curve.json --certified --json
     """,
 )
 @click.argument("scene", type=click.Path())
@@ -59,6 +59,11 @@ _COLUMNS = ("object", "x", "y", "z")
     help="Where the march takes tangents from.  [default: analytic, if there is a derivative]",
 )
 @click.option(
+    "--certified",
+    is_flag=True,
+    help="Prove that no feature is missed, however narrow, and say where there is no proof.",
+)
+@click.option(
     "--clip",
     type=SizeType(),
     metavar="NX,NY,NZ",
@@ -72,6 +77,7 @@ def voxelize(
     method: str,
     variant: int,
     tangent: str | None,
+    certified: bool,
     clip: vd.Grid | None,
     as_json: bool,
 ) -> None:
@@ -83,11 +89,20 @@ def voxelize(
         raise click.BadParameter(
             f"{output} should end in {', '.join(_WRITERS)}", param_hint="--output"
         )
+    if certified and method != "grid-plane":
+        raise click.BadParameter(
+            f"nothing is proven of the method {method}", param_hint="--certified"
+        )
     loaded = vd.load_scene(scene)
     items = loaded.items
     began_s = time.perf_counter()
-    sequences = voxelize_scene(loaded, method=method, variant=variant, tangent=tangent)
+    sequences = voxelize_scene(
+        loaded, method=method, variant=variant, tangent=tangent, certified=certified
+    )
     seconds = time.perf_counter() - began_s
+    for number, (item, sequence) in enumerate(zip(items, sequences, strict=True)):
+        if isinstance(sequence.proof, str):
+            note(f"object {number} ({item.type}) is not certified: {sequence.proof}")
     kept = [_kept(sequence, clip) for sequence in sequences]
     rows = _rows(kept)
     if output:
@@ -138,6 +153,7 @@ def _report(number: int, item: Any, sequence: vd.Sequence, clipped: int) -> dict
         "contacts": report.contacts,
         "clipped": clipped,
         "seconds": round(report.seconds, 6),
+        "certified": report.certified,
     }
 
 

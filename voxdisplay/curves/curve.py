@@ -7,11 +7,16 @@ colours and no display: only where it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Evaluate = Callable[[Ints, Floats], Floats]
+"""What `Curve.together` prepares."""
 
 
 class Curve(ABC):
@@ -29,12 +34,21 @@ class Curve(ABC):
     breaks : (k,) float64 array
         Parameters inside the range, ascending, where the direction may turn sharply (the vertices
         of a polyline). A hint for sampling; never needed for correctness.
+    family : hashable
+        What curves have in common that `together` takes. None: nothing, evaluate it by itself.
 
     """
 
     t_range: tuple[float, float]
     closed: bool | None = None
     breaks: Floats = np.empty(0)
+    family: Hashable = None
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        if "position" in vars(cls) and "together" not in vars(cls):
+            # What it inherits would speak of another formula.
+            cls.together = staticmethod(Curve.together)  # type: ignore[method-assign]
 
     @abstractmethod
     def position(self, t: Floats) -> Floats:
@@ -54,4 +68,50 @@ class Curve(ABC):
 
     def derivative(self, t: Floats) -> Floats | None:  # noqa: ARG002 - for those that have one
         """Give dP/dt at t as a (3, n) float64 array, or None when it is not known."""
+        return None
+
+    @staticmethod
+    def together(curves: Sequence[Any]) -> Evaluate:
+        """Prepare to evaluate curves of one family at once.
+
+        Parameters
+        ----------
+        curves : sequence
+            Curves whose classes share this function, of equal ``family``.
+
+        Returns
+        -------
+        callable
+            ``(which, t)`` -> (3, n) points: for each of n parameters, the position of the curve
+            with that index, (n,) int64; to the bit what its ``position`` gives.
+
+        """
+
+        def evaluate(which: Ints, t: Floats) -> Floats:
+            points = np.empty((3, t.size))
+            for index in np.unique(which):
+                mine = which == index
+                points[:, mine] = curves[index].position(t[mine])
+            return points
+
+        return evaluate
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats] | None:  # noqa: ARG002 - as above
+        """Give boxes that hold all of the curve between pairs of parameters.
+
+        What makes voxels provable: see `voxelize.certify`.
+
+        Parameters
+        ----------
+        t_lo, t_hi : (n,) float64 array
+            Inside ``t_range``, t_lo <= t_hi; the same array for the curve's points.
+
+        Returns
+        -------
+        (3, n), (3, n) float64 arrays, or None
+            Bounds of P(t) for all real t from t_lo to t_hi, as exact arithmetic would give it.
+            One or both nan where nothing is known, as where the curve may have no point. None if
+            the curve has no bounds at all.
+
+        """
         return None

@@ -1,4 +1,4 @@
-"""Safe expressions: text -> a numpy function of t, with its exact derivative.
+"""Safe expressions: text -> a numpy function of t, with its exact derivative and its bounds.
 
 ::
 
@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar, cast
 
 import numpy as np
 
+from voxdisplay.curves.interval import Interval, interval
 from voxdisplay.curves.operations import (
     ADD,
     DIVIDE,
@@ -38,9 +39,9 @@ from voxdisplay.curves.operations import (
 from voxdisplay.errors import CurveError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from voxdisplay.curves.curve import Floats
+    from voxdisplay.curves.curve import Evaluate, Floats, Ints
 
 MAX_LENGTH = 4096
 """Longest text of an expression, in characters."""
@@ -74,6 +75,15 @@ class Expression:
 
     source: str
     program: tuple[Step, ...]
+
+    @property
+    def template(self) -> tuple[Step | None, ...]:
+        """The program without its numbers, but with exponents: they decide how ``**`` computes."""
+        following = (*self.program[1:], None)
+        return tuple(
+            None if isinstance(step, float) and after is not POWER else step
+            for step, after in zip(self.program, following, strict=True)
+        )
 
     @property
     def constant(self) -> float | None:
@@ -129,6 +139,46 @@ class Expression:
             _, slope = self.fold(variable, lambda value: (np.float64(value), None), _chain_rule)
         out[...] = 0.0 if slope is None else slope
         return out
+
+    def enclosure(self, t: Interval) -> Interval:
+        """Bound the exact values of the program for all real t in intervals.
+
+        Its numbers, float64, are taken as they are.
+        """
+        with np.errstate(all="ignore"):
+            return self.fold(t, interval, lambda operation, x: operation.enclosure(*x))
+
+
+def together(expressions: Sequence[Expression]) -> Evaluate:
+    """Prepare to evaluate expressions of one template at once.
+
+    Returns
+    -------
+    callable
+        ``(which, t)`` -> (n,) values: for each of n parameters, that of the expression with that
+        index, (n,) int64; to the bit what its ``value`` gives.
+
+    """
+    programs = [each.program for each in expressions]
+    numbers = np.array([[x for x in program if isinstance(x, float)] for program in programs])
+    bits = numbers.view(np.int64)
+    # Numbers that all have in common, as exponents are, stay scalars.
+    columns = [
+        column[0] if same else column
+        for column, same in zip(numbers.T, (bits == bits[0]).all(axis=0), strict=True)
+    ]
+
+    def evaluate(which: Ints, t: Floats) -> Floats:
+        values = iter([column[which] if column.ndim else column for column in columns])
+        out = np.empty_like(t, dtype=np.float64)
+        variable: Any = t
+        with np.errstate(all="ignore"):
+            out[...] = expressions[0].fold(
+                variable, lambda _: next(values), lambda operation, x: operation.value(*x)
+            )
+        return out
+
+    return evaluate
 
 
 # A value and its derivative by t. None is an exact zero, so that what does not depend on t cannot

@@ -12,9 +12,10 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Floats
+from voxdisplay.curves import checks, expression
+from voxdisplay.curves.curve import Curve, Evaluate, Floats
 from voxdisplay.curves.expression import Expression, constant, excerpt, parse
+from voxdisplay.curves.interval import Interval
 from voxdisplay.curves.params import resolve_params
 from voxdisplay.errors import CurveError
 
@@ -29,7 +30,7 @@ class Parametric(Curve):
     """A curve given by formulas.
 
     ``Parametric(x, y, z, t=(a, b))`` takes three expressions of t, see `expression`, and has an
-    exact derivative. ``Parametric(function, t=(a, b))`` takes any callable.
+    exact derivative and an enclosure. ``Parametric(function, t=(a, b))`` takes any callable.
 
     Parameters
     ----------
@@ -99,6 +100,7 @@ class Parametric(Curve):
         derivative: Function | None = None,
     ) -> None:
         values = resolve_params(params or {})
+        self._formulas: list[Expression] = []
         self.t_range = _range(t, values)
         self.closed = closed
         if callable(x):
@@ -115,10 +117,11 @@ class Parametric(Curve):
             raise TypeError("Parametric needs x, y and z, or one callable")
         if derivative is not None:
             raise TypeError("derivative goes with a callable; with expressions use dx, dy, dz")
-        formulas = [
+        self._formulas = formulas = [
             _formula(axis, axis, formula, values)
             for axis, formula in zip(_AXES, (x, y, z), strict=True)
         ]
+        self.family = tuple(formula.template for formula in formulas)
         slopes = [
             formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
             for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
@@ -130,9 +133,34 @@ class Parametric(Curve):
         """Give the points at t, (n,), as a (3, n) float64 array."""
         return self._position(t)
 
+    @staticmethod
+    def together(curves: Sequence[Parametric]) -> Evaluate:
+        """Prepare to evaluate formulas that differ in numbers only, see `Curve.together`."""
+        formulas = zip(*(curve._formulas for curve in curves), strict=True)
+        rows = [expression.together(row) for row in formulas]
+        return lambda which, t: np.stack([row(which, t) for row in rows])
+
     def derivative(self, t: Floats) -> Floats | None:
         """Give dP/dt at t, (n,), as a (3, n) float64 array, or None when it is not known."""
         return self._derivative(t) if self._derivative else None
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats] | None:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n). Not a callable.
+
+        Nothing is known where a formula may have no value for some t in between. But an interval
+        as narrow as parameters can be told apart may end where values do, as those of sqrt(1 - t)
+        at t = 1, and holds for the values there are.
+        """
+        if not self._formulas:
+            return None
+        low, high = np.empty((3, t_lo.size)), np.empty((3, t_lo.size))
+        wide = t_hi - t_lo > 4 * np.spacing(np.abs(self.t_range).max())
+        for row, formula in enumerate(self._formulas):
+            values = formula.enclosure(Interval(t_lo, t_hi))
+            low[row], high[row] = values.lo, values.hi
+            if values.partial is not False:
+                low[row, values.partial & wide] = np.nan
+        return low, high
 
 
 def _range(t: Bounds, values: Mapping[str, float]) -> tuple[float, float]:

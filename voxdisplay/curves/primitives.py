@@ -1,6 +1,6 @@
 """Curves with names: lines, circles and their kin, Lissajous curves, torus knots.
 
-All have exact derivatives. Angles are radians. Knows formulas only.
+All have exact derivatives and enclosures. Angles are radians. Knows formulas only.
 
 Where an angle begins: the curves that turn about a direction n (a circle's normal, a helix's
 axis) measure their angle in the plane across n, from the direction u nearest to +x, towards
@@ -16,9 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Floats
+from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
+from voxdisplay.curves.interval import Interval, cos, interval, sin
+from voxdisplay.curves.spans import Box, enclose_spans
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
 
@@ -43,6 +47,7 @@ class Polyline(Curve):
         self.closed = closed
         self.t_range = (0.0, len(vertices) - 1.0)
         self.breaks = np.arange(1.0, len(vertices) - 1)
+        self.family = len(vertices)
         self._vertices = vertices.T.copy()
 
     def position(self, t: Floats) -> Floats:
@@ -51,10 +56,35 @@ class Polyline(Curve):
         f = t - i
         return self._vertices[:, i] * (1 - f) + self._vertices[:, i + 1] * f
 
+    @staticmethod
+    def together(curves: Sequence[Polyline]) -> Evaluate:
+        """Prepare to evaluate polylines of equally many points at once, see `Curve.together`."""
+        vertices = np.concatenate([curve._vertices for curve in curves], axis=1)
+        size = curves[0]._vertices.shape[1]
+
+        def evaluate(which: Ints, t: Floats) -> Floats:
+            i = curves[0]._line(t)
+            f = t - i
+            at = which * size + i
+            return np.asarray(vertices[:, at] * (1 - f) + vertices[:, at + 1] * f)
+
+        return evaluate
+
     def derivative(self, t: Floats) -> Floats:
         """Give dP/dt at t, (n,), as a (3, n) float64 array; at a vertex, of the line after it."""
         i = self._line(t)
         return self._vertices[:, i + 1] - self._vertices[:, i]
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        return enclose_spans(np.arange(self.t_range[1] + 1), t_lo, t_hi, self._box)
+
+    def _box(self, i: Ints, t_lo: Floats, t_hi: Floats) -> Box:
+        ends = []
+        for t in (t_lo, t_hi):
+            f = interval(t) - i
+            ends.append(self._vertices[:, i] * (1 - f) + self._vertices[:, i + 1] * f)
+        return np.minimum(ends[0].lo, ends[1].lo), np.maximum(ends[0].hi, ends[1].hi)
 
     def _line(self, t: Floats) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
         return np.clip(np.floor(t), 0, self._vertices.shape[1] - 2).astype(np.intp)
@@ -77,6 +107,8 @@ class Segment(Polyline):
 class _Turning(Curve):
     """P(t) = center + cos(t) a + sin(t) b + t rise: all that turns evenly."""
 
+    family = "turning"
+
     def __init__(
         self,
         center: ArrayLike,
@@ -95,11 +127,30 @@ class _Turning(Curve):
 
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
-        return self._center + self._a * np.cos(t) + self._b * np.sin(t) + self._rise * t
+        return _turn(self._center, self._a, self._b, self._rise, t)
+
+    @staticmethod
+    def together(curves: Sequence[_Turning]) -> Evaluate:
+        """Prepare to evaluate such curves at once, see `Curve.together`."""
+        center = np.concatenate([curve._center for curve in curves], axis=1)
+        a = np.concatenate([curve._a for curve in curves], axis=1)
+        b = np.concatenate([curve._b for curve in curves], axis=1)
+        rise = np.concatenate([curve._rise for curve in curves], axis=1)
+        return lambda which, t: _turn(center[:, which], a[:, which], b[:, which], rise[:, which], t)
 
     def derivative(self, t: Floats) -> Floats:
         """Give dP/dt at t, (n,), as a (3, n) float64 array."""
         return self._b * np.cos(t) - self._a * np.sin(t) + self._rise
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        t = Interval(t_lo, t_hi)
+        box = self._center + self._a * cos(t) + self._b * sin(t) + self._rise * t
+        return box.lo, box.hi
+
+
+def _turn(center: Floats, a: Floats, b: Floats, rise: Floats, t: Floats) -> Floats:
+    return center + a * np.cos(t) + b * np.sin(t) + rise * t
 
 
 class Ellipse(_Turning):
@@ -265,6 +316,12 @@ class Lissajous(Curve):
         rate = self._amplitude * self._frequency
         return np.asarray(rate * np.cos(self._frequency * t + self._phase))
 
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        angle = self._frequency * Interval(t_lo, t_hi) + self._phase
+        box = self._center + self._amplitude * sin(angle)
+        return box.lo, box.hi
+
 
 class TorusKnot(Curve):
     """The (p, q) torus knot: p times around the axis while q times around the tube.
@@ -326,6 +383,16 @@ class TorusKnot(Curve):
             self._q * self._minor * np.cos(along),
         )
         return np.asarray(self._axes @ np.stack(local))
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        t = Interval(t_lo, t_hi)
+        around, along = self._p * t, self._q * t
+        reach = self._major + self._minor * cos(along)
+        u, v, n = self._axes.T[:, :, None]
+        box = self._center + u * (reach * cos(around))
+        box = box + v * (reach * sin(around)) + n * (self._minor * sin(along))
+        return box.lo, box.hi
 
 
 def _frame(name: str, direction: ArrayLike) -> tuple[Floats, Floats, Floats]:

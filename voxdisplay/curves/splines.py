@@ -1,6 +1,6 @@
 """Smooth curves through or along given points: Bezier, B-spline (and NURBS), Catmull-Rom.
 
-All have exact derivatives. Points are (n, 3) arrays, in voxels. Knows formulas only.
+All have exact derivatives and enclosures. Points are (n, 3) arrays, in voxels. Knows formulas only.
 """
 
 from __future__ import annotations
@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Floats
+from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
+from voxdisplay.curves.interval import Interval, interval
+from voxdisplay.curves.spans import Box, control_box, enclose_spans
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
 MAX_DEGREE = 64
@@ -37,22 +41,37 @@ class Bezier(Curve):
         self.closed = closed
         self._points = checks.points("points", points, least=2)
         _check_degree("points", len(self._points) - 1)
+        self.family = len(self._points)
         self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
 
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
-        return _de_casteljau(self._points, t)
+        return _de_casteljau(self._points[:, :, None], t)
 
     def derivative(self, t: Floats) -> Floats:
         """Give dP/dt at t, (n,), as a (3, n) float64 array."""
-        return _de_casteljau(self._slopes, t)
+        return _de_casteljau(self._slopes[:, :, None], t)
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        knots = np.repeat((0.0, 1.0), len(self._points) - 1)[:, None]
+        return control_box(interval(self._points[:, :, None]), knots, t_lo, t_hi)
+
+    @staticmethod
+    def together(curves: Sequence[Bezier]) -> Evaluate:
+        """Prepare to evaluate curves of one degree at once, see `Curve.together`."""
+        points = np.stack([curve._points for curve in curves], axis=2)
+        return lambda which, t: _de_casteljau(points.take(which, axis=2), t)
 
 
-def _de_casteljau(points: Floats, t: Floats) -> Floats:
-    layer = np.broadcast_to(points[:, :, None], (*points.shape, t.size))
+def _de_casteljau(layer: Floats, t: Floats) -> Floats:
+    """Evaluate at t, (n,), from control points (degree + 1, 3, n), or 1 in place of n."""
+    if len(layer) == 1:
+        return np.array(np.broadcast_to(layer[0], (3, t.size)))
+    rest = 1 - t
     while len(layer) > 1:
-        layer = layer[:-1] * (1 - t) + layer[1:] * t
-    return np.array(layer[0])
+        layer = layer[:-1] * rest + layer[1:] * t
+    return np.asarray(layer[0])
 
 
 class BSpline(Curve):
@@ -122,6 +141,23 @@ class BSpline(Curve):
             return slopes
         points = _de_boor(self._points, self._knots, self._degree, t)
         return np.asarray((slopes[:3] - points[:3] / points[3] * slopes[3]) / points[3])
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        inner = self._knots[self._degree : len(self._points) + 1]
+        return enclose_spans(np.unique(inner), t_lo, t_hi, self._box)
+
+    def _box(self, i: Ints, t_lo: Floats, t_hi: Floats) -> Box:
+        p = self._degree
+        inner = np.unique(self._knots[p : len(self._points) + 1])
+        k = np.searchsorted(self._knots, inner[i], side="right") - 1
+        control = np.stack([self._points[k - p + j].T for j in range(p + 1)])
+        knots = np.stack([self._knots[k - p + 1 + j] for j in range(2 * p)])
+        low, high = control_box(interval(control), knots, t_lo, t_hi)
+        if not self._rational:
+            return low, high
+        box = Interval(low[:3], high[:3]) / Interval(low[3], high[3])
+        return box.lo, box.hi
 
 
 def _weighted(points: Floats, weights: ArrayLike) -> Floats:
@@ -225,6 +261,20 @@ class CatmullRom(Curve):
         a, b, slope_a, slope_b, h, f = self._span(t)
         g = 1 - f
         return 6 * f * g * (b - a) / h + g * (1 - 3 * f) * slope_a + f * (3 * f - 2) * slope_b
+
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        return enclose_spans(self._t, t_lo, t_hi, self._box)
+
+    def _box(self, i: Ints, t_lo: Floats, t_hi: Floats) -> Box:
+        a, b = (interval(self._nodes[k].T) for k in (i, i + 1))
+        slope_a, slope_b = (self._slopes[k].T for k in (i, i + 1))
+        # The cubic with these ends and slopes, as a Bezier curve.
+        third = (interval(self._t[i + 1]) - self._t[i]) / 3.0
+        points = (a, a + third * slope_a, b - third * slope_b, b)
+        low, high = (np.stack([getattr(point, end) for point in points]) for end in ("lo", "hi"))
+        knots = np.repeat((self._t[i], self._t[i + 1]), 3, axis=0)
+        return control_box(Interval(low, high), knots, t_lo, t_hi)
 
     def _span(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
         """Give, for each t, its two nodes, their slopes, their distance in t, the place between."""

@@ -1,21 +1,21 @@
 """Where curves are: checked positions of many curves at once.
 
 Parameters and points only; this module must not know what a voxel is. All arrays hold many curves
-(or pieces of curves), one after the other, so that a thousand short curves cost a thousand calls
-of ``Curve.position`` and nothing else a thousand times. What a curve gets never depends on its
-neighbours in the batch: decisions are taken per interval, and positions asked for per curve.
+(or pieces of curves), one after the other, so that a thousand short curves cost at most a thousand
+calls of ``Curve.position`` and nothing else a thousand times. What a curve gets never depends on
+its neighbours in the batch: decisions are taken per interval, and positions found per curve.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.family import Curves
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.ranges import spread
 
@@ -27,8 +27,6 @@ AXES = "xyz"
 
 # Voxel indices are int32, and sums and differences of a few of them must be as well.
 FARTHEST = 2.0**30
-# Points per call of Curve.position: three rows of this many stay in a core's cache.
-CALL = 1 << 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +91,7 @@ class Batch:
                 f"{self.name(index)}the range of t must be finite and ascending, "
                 f"not {self.first[index]} to {self.last[index]}"
             )
+        self._positions = Curves(self.curves).positions
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
@@ -109,16 +108,8 @@ class Batch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        points = np.empty((3, t.size))
-        if not t.size:
-            return points
-        edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1
         with np.errstate(all="ignore"):
-            for start, stop in pairwise([0, *edges.tolist(), t.size]):
-                position = self.curves[curve[start]].position
-                for low in range(start, stop, CALL):
-                    high = min(low + CALL, stop)
-                    points[:, low:high] = position(t[low:high])
+            points = self._positions(curve, t)
             good = np.abs(points) < FARTHEST  # and so not where P is not a number
         if not good.all():
             at = int(np.argmin(good.all(axis=0)))

@@ -18,8 +18,9 @@ from voxdisplay.voxelize.events import Events, Voxels
 from voxdisplay.voxelize.ranges import blocks, spread
 from voxdisplay.voxelize.roots import TOLERANCE, cross
 
-# Knot intervals handled at once. What is computed per crossing then stays in a core's cache.
-BLOCK = 1 << 12
+# Knot intervals handled at once: enough to forget what a call costs, few enough for what is
+# computed per crossing to stay in cache.
+BLOCK = 1 << 14
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
 # the last bit, or lines along edges and diagonals waver.
 NUDGE = 1e-9

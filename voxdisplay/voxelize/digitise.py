@@ -1,4 +1,4 @@
-"""From curves to sequences, in batches: sample, trace, thin, close, hand out.
+"""From curves to sequences, in batches: sample, trace, thin, close, prove, hand out.
 
 This module only puts the steps in order; it must not know how they are done.
 """
@@ -6,6 +6,7 @@ This module only puts the steps in order; it must not know how they are done.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -13,9 +14,12 @@ import numpy as np
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import Batch, Bools, Ints, Samples
+from voxdisplay.voxelize.certify import Certificate, certify
+from voxdisplay.voxelize.enclose import Boxes, enclose, see
 from voxdisplay.voxelize.events import Events, near
-from voxdisplay.voxelize.grid_plane import trace
-from voxdisplay.voxelize.knots import knots
+from voxdisplay.voxelize.grid_plane import trace, trace_everything
+from voxdisplay.voxelize.knots import cut_at_jumps, first_look, settle
+from voxdisplay.voxelize.mend import mend
 from voxdisplay.voxelize.reduce import reduce
 from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
@@ -27,22 +31,28 @@ VOXELS = 2_000_000
 TOUCH = 1e-3
 
 
-def digitise(curves: Iterable[Curve]) -> list[Sequence]:
+def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
     """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
     curves = list(curves)
     sequences: list[Sequence] = []
     size = 16
     while rest := curves[len(sequences) : len(sequences) + size]:
-        fresh = list(_digitise(Batch(rest, len(sequences) if len(curves) > 1 else None)))
+        batch = Batch(rest, len(sequences) if len(curves) > 1 else None)
+        fresh = list(_digitise(batch, certified=certified))
         sequences += fresh
         size = min(CURVES, VOXELS * len(fresh) // sum(map(len, fresh)) + 1)
     return sequences
 
 
-def _digitise(batch: Batch) -> Iterator[Sequence]:
+def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
     begin = perf_counter()
-    samples = knots(batch)
-    events = reduce(trace(batch, samples))
+    samples = settle(batch, first_look(batch))
+    boxes = enclose(batch, samples) if certified else None
+    if boxes:
+        samples = settle(batch, see(batch, samples, boxes))
+    samples = cut_at_jumps(batch, samples)
+    traced = trace(batch, samples)
+    events = reduce(traced, tips=certified)
     closed = _closed(batch, samples)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
@@ -62,8 +72,46 @@ def _digitise(batch: Batch) -> Iterator[Sequence]:
             loop = close_loop(thin, curve.position, batch.last[index])
             own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
             own_voxels.flags.writeable = own_t.flags.writeable = False
+        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve)
+        if boxes:
+            thin = events.take(np.arange(own.start, own.stop))
+            sequence = _proven(batch, sequence, boxes, index, thin, traced)
         spent = seconds * len(own_voxels) + perf_counter() - begin
-        yield Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
+        yield replace(sequence, seconds=spent)
+
+
+def _proven(
+    batch: Batch, sequence: Sequence, boxes: Boxes, index: int, thin: Events, traced: Events
+) -> Sequence:
+    """Give the sequence with its proof, mended if need be, or with what is in the way of one."""
+    if index in boxes.doubts:
+        return replace(sequence, proof=boxes.doubts[index])
+    if len(sequence.starts) > 1:
+        return replace(sequence, proof="the curve jumps")
+    own = boxes.of_curve(index)
+    ends = boxes.t_lo[own], boxes.t_hi[own]
+    box = boxes.low[:, own], boxes.high[:, own]
+    curve, closed = sequence.curve, sequence.closed
+    proof = certify(curve, ends, box, sequence.voxels, sequence.t, closed=closed)
+    for again in (False, True):
+        if isinstance(proof, Certificate):
+            break
+        if again:
+            t = np.append(ends[0], ends[1][-1])
+            of = np.full(t.size, index)
+            points = batch.evaluate(of, t)
+            samples = Samples(np.zeros_like(of), t, points, np.array([index]))
+            full = trace_everything(batch, samples)
+            thin = reduce(full, tips=True)
+        else:
+            full = traced.take(traced.piece == thin.piece[0])
+        mended = mend(thin, full, ends, box, closed=closed)
+        voxels = np.ascontiguousarray(mended.voxels.T)
+        voxels.flags.writeable = mended.t.flags.writeable = False
+        second = certify(curve, ends, box, voxels, mended.t, closed=closed)
+        if isinstance(second, Certificate):
+            return replace(sequence, voxels=voxels, t=mended.t, proof=second)
+    return replace(sequence, proof=proof)
 
 
 def _starts(events: Events) -> Ints:

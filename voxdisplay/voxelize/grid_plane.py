@@ -54,6 +54,18 @@ def trace(batch: Batch, knots: Samples) -> Events:
     return _bridge_gaps(batch, events, knots.curve)
 
 
+def trace_everything(batch: Batch, samples: Samples) -> Events:
+    """Follow curves through all mid-planes they pass between samples: as `trace`, but slowly.
+
+    Where a curve wriggles across its own way, the axis that changes most hides the others.
+    """
+    samples = refine(batch, samples, LOOKS[0])
+    piece, t, voxels = _all_crossings(batch, samples)
+    inner = Events(piece.astype(np.int32), t, voxels, np.full(t.size, OTHER))
+    crossings = Crossings(inner, voxels, np.full(t.size, np.inf))
+    return _bridge_gaps(batch, _with_ends(crossings, samples).events, samples.curve)
+
+
 def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     """Put the voxels of each piece's first and last point around its crossings."""
     inner = crossings.events

@@ -54,11 +54,15 @@ def knots(batch: Batch) -> Samples:
         If a curve runs off, does not settle, or would need too many voxels.
 
     """
-    samples = _first_look(batch)
+    return cut_at_jumps(batch, settle(batch, first_look(batch)))
+
+
+def settle(batch: Batch, samples: Samples) -> Samples:
+    """Split steps of samples, one piece for each curve, as far as `knots` says."""
     while True:
         parts, chord = _needed_parts(samples, batch.resolution)
         if not (parts > 1).any():
-            return _cut_at_jumps(batch, samples, chord)
+            return samples
         _check_size(batch, samples, parts, chord)
         samples = batch.split(samples, parts)
 
@@ -79,7 +83,8 @@ def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
         samples = batch.split(samples, parts)
 
 
-def _first_look(batch: Batch) -> Samples:
+def first_look(batch: Batch) -> Samples:
+    """Sample curves, one piece for each, before anything is known of them."""
     t = batch.first[:, None] + (batch.last - batch.first)[:, None] * _LOOK
     t[:, -1] = batch.last
     index = np.arange(len(batch.curves))
@@ -166,7 +171,9 @@ def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError
     )
 
 
-def _cut_at_jumps(batch: Batch, samples: Samples, chord: Floats) -> Samples:
+def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
+    """Make pieces of what settled, ending where a curve jumps."""
+    chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
     finest = np.diff(samples.t) < 2 * batch.resolution[samples.piece[:-1]]
     torn = samples.joined & finest & (chord > JUMP)
     if not torn.any():

@@ -157,7 +157,7 @@ def _later(cells: Cells, voxels: Voxels, offset: tuple[int, int]) -> tuple[Ints,
 # ------------------------------------------------------------------- the voxels and the curve
 
 
-def distances(voxels: Voxels, curve: Curve) -> Floats:
+def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> Floats:
     """Measure how far voxel centres are from a curve.
 
     Parameters
@@ -166,6 +166,9 @@ def distances(voxels: Voxels, curve: Curve) -> Floats:
         Any voxels; their centres are at + 1/2 (paper, equation 3).
     curve : Curve
         The curve, from P(a) to P(b).
+    hints : (n,) float64 array, optional
+        Parameters where to look, as well as everywhere: for features narrower than 1/256 of the
+        range of t. Distances are from the curve's points, whatever the hints.
 
     Returns
     -------
@@ -175,7 +178,7 @@ def distances(voxels: Voxels, curve: Curve) -> Floats:
 
     """
     centres = np.asarray(voxels, dtype=float).T + 0.5
-    t, begin, solid = _polyline(curve)
+    t, begin, solid = _polyline(curve, hints)
     after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
     t_end, end = t[after], begin[:, after]
     middle = (begin + end) / 2
@@ -233,8 +236,8 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     return float(best.max())
 
 
-def _polyline(curve: Curve) -> tuple[Floats, Floats, Bools]:
-    """Sample a curve finely.
+def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats, Bools]:
+    """Sample a curve finely, and at any hints.
 
     Returns
     -------
@@ -247,6 +250,8 @@ def _polyline(curve: Curve) -> tuple[Floats, Floats, Bools]:
     first, last = curve.t_range
     resolution = 4 * float(np.spacing(max(abs(first), abs(last))))
     t = np.union1d(np.linspace(first, last, 258), curve.breaks)
+    if hints is not None:
+        t = np.union1d(t, hints)
     t = t[(t >= first) & (t <= last)]
     points = _position(curve, t)
     settled = np.zeros(t.size - 1, dtype=bool)

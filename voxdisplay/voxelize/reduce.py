@@ -22,7 +22,7 @@ def without_repeats(events: Events) -> Events:
     return events.take(keep)
 
 
-def reduce(events: Events) -> Events:
+def reduce(events: Events, *, tips: bool = False) -> Events:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 
     J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
@@ -34,6 +34,9 @@ def reduce(events: Events) -> Events:
     ----------
     events : Events
         Consecutive ones 26-adjacent or equal within a piece.
+    tips : bool
+        Take no short cut over a tip: a voxel that sticks out of the box around both ends, where
+        the sequence comes back so near to itself that it would still be touching without the tip.
 
     Returns
     -------
@@ -44,7 +47,7 @@ def reduce(events: Events) -> Events:
     if not events.t.size:
         return events
     full, events = events, without_repeats(events)
-    start, stop = _short_cuts(events)
+    start, stop = _short_cuts(events, tips=tips)
     change = np.zeros(events.t.size, dtype=np.int8)
     change[start + 1] += 1
     change[stop] -= 1
@@ -69,7 +72,7 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     return on
 
 
-def _short_cuts(events: Events) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _short_cuts(events: Events, *, tips: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
@@ -84,6 +87,9 @@ def _short_cuts(events: Events) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     leap = furthest(voxels, stretch)
     short = np.flatnonzero(leap > 1)
     starts, stops = look[short], look[short] + leap[short]
+    if tips:
+        keep = ~_over_tips(events, starts, stops)
+        starts, stops = starts[keep], stops[keep]
     taken = []
     end = -1
     for nth, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
@@ -91,6 +97,23 @@ def _short_cuts(events: Events) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
             taken.append(nth)
             end = stop
     return starts[taken], stops[taken]
+
+
+def _over_tips(
+    events: Events, starts: NDArray[np.intp], stops: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Tell which short cuts would take a tip and still leave a chord beside them."""
+    voxels, size = events.voxels, events.t.size
+    before, after = np.maximum(starts - 1, 0), np.minimum(stops + 1, size - 1)
+    touches = near(voxels[:, before], voxels[:, stops]) & (before < starts)
+    touches |= near(voxels[:, starts], voxels[:, after]) & (after > stops)
+    low = np.minimum(voxels[:, starts], voxels[:, stops])
+    high = np.maximum(voxels[:, starts], voxels[:, stops])
+    out = np.zeros(starts.size, dtype=bool)
+    for skipped in range(1, int((stops - starts).max(initial=0))):
+        voxel = voxels[:, np.minimum(starts + skipped, stops)]
+        out |= ((voxel < low) | (voxel > high)).any(axis=0)
+    return np.asarray(touches & out)
 
 
 def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:

@@ -1,0 +1,14 @@
+"""The table of tools/bench.py runs; what it measures is not tested."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+BENCH = Path(__file__).parents[2] / "tools" / "bench.py"
+
+
+def test_the_table_of_curves_runs():
+    command = [sys.executable, str(BENCH), "curves", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "this engine" in run.stdout
+    assert "bytes a voxel" in run.stdout

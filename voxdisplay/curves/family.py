@@ -1,0 +1,75 @@
+"""Evaluating many curves at once.
+
+Curves of one family have one formula and differ in its numbers only: thousands of short ones are
+then a few array operations, where they would be thousands of calls. Each gets the very points that
+its own ``position`` gives, to the last bit. Knows no formulas: those are the curves' own.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
+
+# Points per call: what is computed for so many stays in a core's cache. Families have the numbers
+# of their curves beside each point.
+CALL = 1 << 14
+FAMILY_CALL = 1 << 11
+# Smaller families are not worth the arrays that hold them.
+SMALLEST = 4
+
+
+class Curves:
+    """Curves that are evaluated together.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+
+    """
+
+    def __init__(self, curves: Sequence[Curve]) -> None:
+        self._curves = curves
+        families = defaultdict(list)
+        for index, curve in enumerate(curves):
+            if curve.family is not None:
+                families[type(curve).together, curve.family].append(index)
+        self._evaluate: list[Evaluate] = []
+        self._family = np.full(len(curves), -1)  # which of these; -1: none
+        self._member = np.zeros(len(curves), dtype=np.int64)  # which of its curves
+        for (together, _), members in families.items():
+            if len(members) >= SMALLEST:
+                self._family[members] = len(self._evaluate)
+                self._member[members] = np.arange(len(members))
+                self._evaluate.append(together([curves[index] for index in members]))
+
+    def positions(self, curve: Ints, t: Floats) -> Floats:
+        """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,)."""
+        if not self._evaluate:
+            return self._one_by_one(curve, t)
+        points = np.empty((3, t.size))
+        family = self._family[curve]
+        for number, evaluate in enumerate(self._evaluate):
+            mine = np.flatnonzero(family == number)
+            for low in range(0, mine.size, FAMILY_CALL):
+                some = mine[low : low + FAMILY_CALL]
+                points[:, some] = evaluate(self._member[curve[some]], t[some])
+        alone = np.flatnonzero(family < 0)
+        points[:, alone] = self._one_by_one(curve[alone], t[alone])
+        return points
+
+    def _one_by_one(self, curve: Ints, t: Floats) -> Floats:
+        points = np.empty((3, t.size))
+        if not t.size:
+            return points
+        edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1
+        for start, stop in pairwise([0, *edges.tolist(), t.size]):
+            position = self._curves[curve[start]].position
+            for low in range(start, stop, CALL):
+                high = min(low + CALL, stop)
+                points[:, low:high] = position(t[low:high])
+        return points
