@@ -157,6 +157,14 @@ def test_shell_completion(run):
     assert "complete" in script.stdout
 
 
+def test_a_full_disk_is_said():
+    command = f"{sys.executable} -m voxdisplay voxelize {PAPER} > /dev/full"
+    done = subprocess.run(["/bin/bash", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "No space left" in done.stderr
+    assert "fault" not in done.stderr
+
+
 def test_a_reader_that_has_enough_is_no_error():
     command = f"{sys.executable} -m voxdisplay voxelize {PAPER} | head -n 1"
     bash = ["/bin/bash", "-o", "pipefail", "-c", command]

@@ -124,6 +124,12 @@ def test_verify_says_where_the_page_differs(opened):
         display.verify(frame)
 
 
+def test_the_text_of_a_device_cannot_steer_a_terminal(opened):
+    display, _ = opened(name="\x1b[2Jcube\r", firmware="1\n2")
+    assert display.info.name == "\N{REPLACEMENT CHARACTER}[2Jcube\N{REPLACEMENT CHARACTER}"
+    assert display.info.firmware.isprintable()
+
+
 def test_progress_is_told(opened):
     display, _ = opened()
     told = []

@@ -81,6 +81,9 @@ def main(arguments: list[str] | None = None) -> int:
         if error.hint:
             click.echo(f"  {error.hint}", err=True)
         return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+    except OSError as error:  # a pipe's are TransportErrors: what is left is our own output
+        click.echo(f"voxdisplay: the output cannot be written: {error.strerror}", err=True)
+        return EXIT_USAGE
     except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
         if debug:
             traceback.print_exc()
