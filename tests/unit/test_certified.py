@@ -301,3 +301,15 @@ def test_the_command_says_what_is_certified(tmp_path):
     assert [each["certified"] for each in json.loads(run.stdout)["objects"]] == [True, False]
     assert "object 1 (parametric) is not certified: y may jump" in run.stderr
     assert "object 0" not in run.stderr
+
+
+def test_a_subclass_with_another_position_is_not_proven_by_its_parents_boxes() -> None:
+    class Wobbly(vd.Segment):
+        def position(self, t: np.ndarray) -> np.ndarray:
+            return super().position(t) + 9 * np.sin(50 * t)
+
+    straight = vd.Segment((1, 2, 3), (30, 2, 3))
+    wobbly = Wobbly((1, 2, 3), (30, 2, 3))
+    assert voxelize(straight, certified=True).report.certified
+    assert wobbly.enclosure(np.zeros(1), np.ones(1)) is None
+    assert not voxelize(wobbly, certified=True).report.certified

@@ -46,9 +46,12 @@ class Curve(ABC):
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
-        if "position" in vars(cls) and "together" not in vars(cls):
-            # What it inherits would speak of another formula.
+        own = vars(cls)
+        # What it inherits would speak of another formula, and prove another curve.
+        if "position" in own and "together" not in own:
             cls.together = staticmethod(Curve.together)  # type: ignore[method-assign]
+        if "position" in own and "enclosure" not in own:
+            cls.enclosure = Curve.enclosure  # type: ignore[method-assign]
 
     @abstractmethod
     def position(self, t: Floats) -> Floats:
