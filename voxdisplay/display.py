@@ -229,7 +229,7 @@ class Display:
         began_s = time.monotonic()
         before = _Sent.of(self._link)
         meant = frame.digest()
-        payloads = frame.payloads(self.info.max_payload_bytes)
+        payloads = frame.payloads(self._link.payload_bytes)
         digest = self._show(payloads, progress)
         if digest is not None and digest != meant:
             self._repair(frame, payloads, meant, digest)
@@ -273,7 +273,7 @@ class Display:
         for ticket in list(self._unwaited):
             if self._link.withdraw(ticket):
                 del self._unwaited[ticket]
-        ticket = self._link.present(frame.payloads(self.info.max_payload_bytes))
+        ticket = self._link.present(frame.payloads(self._link.payload_bytes))
         self._unwaited[ticket] = frame.digest()
         self.poll()
 

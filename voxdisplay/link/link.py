@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown
 from voxdisplay.link.info import check_info
+from voxdisplay.link.loss import Loss
+from voxdisplay.link.pace import Pace
 from voxdisplay.link.silence import Silence
 from voxdisplay.link.window import Window
 from voxdisplay.wire import packet as packets
@@ -26,6 +28,7 @@ MOST_LATE_S = 0.25  # a caller that comes back later than this was away
 MOST_TRANSMISSIONS = 30
 MOST_RESTARTS = 8  # without a frame shown
 _MODULUS = 256
+_PACKETS_IN_BUFFER = 4  # so many must fit the device's buffer for the pipe to stay full
 
 
 @dataclass(slots=True)
@@ -91,6 +94,8 @@ class Link:
         self._session = session
         self._patience_s = patience_s
         self._window = Window(0)
+        self._loss = Loss()
+        self._pace = Pace()
         self._frames: deque[_Frame] = deque()
         self._next_frame_id = 0
         self._requests: deque[_Request] = deque()
@@ -103,6 +108,7 @@ class Link:
         self._back_s = math.inf  # when the caller should be back
         self._starved = False  # something is to be sent, and there is no credit for it
         self._ask_at_once = False
+        self._hits = 0  # damaged since the device has last taken anything
 
     # -- what the caller wants
 
@@ -126,6 +132,18 @@ class Link:
         """Payloads that have not been received yet."""
         waiting = sum(len(frame.payloads) - frame.entered for frame in self._frames)
         return waiting + len(self._window.flights)
+
+    @property
+    def payload_bytes(self) -> int:
+        """How long payloads should be now: what suits the line's losses and the device's buffer.
+
+        Until a session is open, as long as none has to be cut by any device.
+        """
+        if self.info is None:
+            return spec.LIMIT_MIN_PAYLOAD
+        room = (self.info.rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER
+        wanted = min(self._loss.best_payload, room - packets.wire_size(spec.LIMIT_OVERHEAD))
+        return min(max(wanted, spec.LIMIT_MIN_PAYLOAD), self.info.max_payload)
 
     def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
         """Queue a frame; give its ticket, which comes back in `Shown`.
@@ -169,6 +187,7 @@ class Link:
         for request in self._requests:
             request.ordinal = 0
         self._starved = self._ask_at_once = False
+        self._hits = 0
         self._silence.forget()
         self._hello_due_s = now
         self._hellos = 0
@@ -236,18 +255,29 @@ class Link:
                     f"counts {self.counters.device_damaged} damaged packets",
                     hint="the line is too noisy: lower the baud rate, or look at cable and ground",
                 )
-            if self._starves(len(flight.wire)):
+            if self._too_much(len(flight.wire)) or self._starves(len(flight.wire)):
                 return
             self.counters.retransmitted += 1
-            yield self._window.send(seq, now)
+            yield self._send(seq, now)
 
     def _new_packets(self, now: float) -> Iterator[bytes]:
         for frame in self._frames:
             while not frame.all_entered:
-                if not self._window.has_room or self._starves(self._wire_bound(frame)):
+                size = self._wire_bound(frame)
+                if not self._window.has_room or self._too_much(size) or self._starves(size):
                     return
                 self.counters.packets += 1
-                yield self._window.send(self._enter(frame), now)
+                yield self._send(self._enter(frame), now)
+
+    def _send(self, seq: int, now: float) -> bytes:
+        wire = self._window.send(seq, now, self._pace.delivered)
+        self._loss.sent(len(wire))
+        return wire
+
+    def _too_much(self, size: int) -> bool:
+        """Tell whether enough is on its way: its answers come by themselves."""
+        count, bytes_ = self._window.on_the_way
+        return count > 0 and not self._pace.allows(count + 1, bytes_ + size)
 
     def _reads(self) -> Iterator[bytes]:
         for request in self._requests:
@@ -401,14 +431,28 @@ class Link:
         silence = self._silence
         if ack.flags & spec.ACK_FLAG_ASKED:
             silence.answered(ack.last, now)
+        taken = self._window.taken
         if done := self._window.acknowledge(ack):
             silence.progress(now)
             silence.measure(now - done[-1].sent_s)
+            for flight in done:
+                self._pace.deliver(len(flight.wire), flight.delivered, now - flight.sent_s)
         self._find_lost_reads()
-        if ack.damaged != self.counters.device_damaged:
-            self.counters.device_damaged = ack.damaged
-            self._ask_at_once = self._waiting
+        self._note_damage(ack, moved=self._window.taken > taken)
         yield from self._note_shown(info, ack, now)
+
+    def _note_damage(self, ack: packets.Ack, *, moved: bool) -> None:
+        """Ask at once if all that is on its way was damaged: then no answer tells so."""
+        damaged = self._loss.note_damage(ack.damaged)
+        self.counters.device_damaged += damaged
+        self._hits = 0 if moved else self._hits + damaged  # before what was taken: explained
+        self._ask_at_once |= damaged > 0 and self._waiting and self._hits >= self._on_the_way
+
+    @property
+    def _on_the_way(self) -> int:
+        """Packets whose answers are to come."""
+        count, _ = self._window.on_the_way
+        return count + sum(request.ordinal > 0 for request in self._requests)
 
     def _find_lost_reads(self) -> None:
         """Send a READ again whose PAGE did not come before the answer to something later."""

@@ -26,6 +26,7 @@ class Flight:
     sent_s: float = 0.0
     transmissions: int = 0
     lost: bool = False
+    delivered: int = 0  # bytes that had arrived when it was sent
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,12 @@ class Window:
         """Whether another sequence number fits the window."""
         return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
 
+    @property
+    def on_the_way(self) -> tuple[int, int]:
+        """Packets that are neither received nor lost, as far as we know, and their bytes."""
+        sizes = [len(flight.wire) for flight in self.flights.values() if not flight.lost]
+        return len(sizes), sum(sizes)
+
     def fits(self, size: int) -> bool:
         """Tell whether credit allows another ``size`` bytes of DATA or READ.
 
@@ -74,9 +81,10 @@ class Window:
         self.next_seq = (seq + 1) % _MODULUS
         return seq
 
-    def send(self, seq: int, now: float) -> bytes:
-        """Note that a packet goes out now, and give its bytes."""
+    def send(self, seq: int, now: float, delivered: int = 0) -> bytes:
+        """Note that a packet goes out now, when so much had arrived; give its bytes."""
         flight = self.flights[seq]
+        flight.delivered = delivered
         self._data_marks[seq] = mark = self._mark(len(flight.wire))
         flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
         flight.transmissions += 1

@@ -1,0 +1,56 @@
+"""How lossy the line has been, and how long packets should be on it.
+
+A packet costs `OVERHEAD_BYTES` besides its payload, and is sent again if any of its bytes is hit:
+with a chance e of each, payloads of sqrt(overhead / e) waste least. Knows packets only as sizes;
+knows no window and no clock.
+"""
+
+from __future__ import annotations
+
+import math
+
+from voxdisplay.wire import spec
+
+# Header and check value, one code byte of COBS and the 00 (protocol.md, sections 3 and 4).
+OVERHEAD_BYTES = spec.LIMIT_OVERHEAD + 2
+# What is believed before anything was sent: payloads of 1 KiB are within 1 % of the best for bit
+# error rates from 1e-9 to 1e-6. It weighs as much as so many bytes that were really sent.
+FIRST_PAYLOAD = 1024
+_WEIGHT_BYTES = 1 << 16
+# Shorter ones would save bytes, but 32 of them do not keep a fast line busy.
+SHORTEST_PAYLOAD = 128
+# What is older than this counts half: lines get better and worse.
+_MEMORY_BYTES = 1 << 20
+_MODULUS = 1 << 16
+
+
+class Loss:
+    """The losses of one line."""
+
+    def __init__(self) -> None:
+        self._bytes = float(_WEIGHT_BYTES)
+        self._lost = _WEIGHT_BYTES * OVERHEAD_BYTES / FIRST_PAYLOAD**2
+        self._damaged: int | None = None
+
+    def sent(self, size: int) -> None:
+        """Count bytes that went out in packets."""
+        self._bytes += size
+        if self._bytes > _MEMORY_BYTES:
+            self._bytes /= 2
+            self._lost /= 2
+
+    def note_damage(self, count: int) -> int:
+        """Take the device's count of damaged segments (section 9.4); give how many are new.
+
+        When it is told for the first time, all but one are of others who have used the line.
+        """
+        before = max(count - 1, 0) if self._damaged is None else self._damaged
+        self._damaged = count
+        fresh = (count - before) % _MODULUS
+        self._lost += fresh
+        return fresh
+
+    @property
+    def best_payload(self) -> int:
+        """Bytes of payload that waste least, for all that is known."""
+        return max(SHORTEST_PAYLOAD, int(math.sqrt(OVERHEAD_BYTES * self._bytes / self._lost)))

@@ -1,0 +1,60 @@
+"""How much may be on its way, so that what is lost does not wait behind it longer than it must.
+
+Buffers between host and device may hold more than a slow line carries in minutes; what is lost is
+then sent again behind all of it, and the window stands still meanwhile. So no more is sent than
+keeps the line busy, going by what it has been seen to deliver. Knows packets only as sizes and
+times; credit and sequence numbers are the business of ``window.py``.
+"""
+
+from __future__ import annotations
+
+import math
+
+# On its way at any rate.
+LEAST_BYTES = 4096
+# One that is being sent, and one behind it.
+LEAST_PACKETS = 2
+# The rest of the window can be sent while a lost packet is on its way again. Of 10, 13, 16 and 20 the
+# one that leaves most of a line with a bit error rate of 1e-4 (tools/bench_goodput.py).
+MOST_PACKETS = 13
+# How late the caller may be: processes wait for their turn.
+LATE_S = 0.02
+# How fast a rate that is not reached any more is forgotten, with each packet delivered.
+_FADE = 1 / 64
+
+
+class Pace:
+    """The rate of delivery of one line and its round trip, and what follows from them."""
+
+    def __init__(self) -> None:
+        self.delivered = 0
+        self._rate = 0.0  # bytes per second
+        self._round_trip_s = (
+            math.inf
+        )  # the shortest: what waited in a queue says nothing of the line
+
+    def deliver(self, size: int, before: int, seconds: float) -> None:
+        """Count a packet that has arrived.
+
+        Parameters
+        ----------
+        size : int
+            Its bytes.
+        before : int
+            `delivered` when it was sent.
+        seconds : float
+            How long ago that was: meanwhile the line has delivered all that came in between.
+
+        """
+        self.delivered += size
+        seconds = max(seconds, 1e-6)
+        self._rate = max((self.delivered - before) / seconds, self._rate * (1 - _FADE))
+        self._round_trip_s = min(seconds, self._round_trip_s)
+
+    def allows(self, packets: int, size: int) -> bool:
+        """Tell whether so many packets of so many bytes in all may be on their way."""
+        if packets <= LEAST_PACKETS:
+            return True
+        busy = 1.25 * self._rate * self._round_trip_s if self._rate else 0.0
+        in_time = size <= max(LEAST_BYTES, busy + self._rate * LATE_S)
+        return in_time and (packets <= MOST_PACKETS or size <= busy)
