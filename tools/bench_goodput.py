@@ -1,4 +1,4 @@
-"""What of a bad line is left for the picture: the real link and an emulated device, on virtual time.
+"""What is left of a bad line: the real link and an emulated device, on virtual time.
 
 Time is counted, not measured, so that the figures are the same on every machine. Beside each stands
 what selective repeat can give at best: payload / (payload + 9) of the line, times the chance that

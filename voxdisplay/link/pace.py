@@ -14,8 +14,8 @@ import math
 LEAST_BYTES = 4096
 # One that is being sent, and one behind it.
 LEAST_PACKETS = 2
-# The rest of the window can be sent while a lost packet is on its way again. Of 10, 13, 16 and 20 the
-# one that leaves most of a line with a bit error rate of 1e-4 (tools/bench_goodput.py).
+# The rest of the window can be sent while a lost packet is on its way again. Of 10, 13, 16 and 20
+# the one that leaves most of a line with a bit error rate of 1e-4 (tools/bench_goodput.py).
 MOST_PACKETS = 13
 # How late the caller may be: processes wait for their turn.
 LATE_S = 0.02
