@@ -11,7 +11,7 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_features, parse_number, parse_refresh, parse_size
+from firmware_sim.config import Config, parse_names, parse_number, parse_refresh, parse_size
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.wire import Wire
@@ -27,8 +27,9 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "name": ("name", str),
     "firmware": ("firmware", str),
     "serial": ("serial", str),
-    "features": ("features", parse_features),
+    "features": ("features", parse_names),
     "silent": ("silent", parse_number),
+    "lie": ("lies", parse_names),
     "fault": ("faults", parse_faults),
     "seed": ("seed", parse_number),
 }
