@@ -45,32 +45,6 @@ def terms(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) ->
     return total & _LOW
 
 
-def terms_of_one(indices: Sequence[int], value: int) -> int:
-    """Sum mix(index, value) over voxels that have one value.
-
-    Parameters
-    ----------
-    indices
-        As of `terms`.
-    value
-        Their pixel value, below 2^32.
-
-    Returns
-    -------
-    int
-        The sum, from 0 to 2^32 - 1; 0 for the value 0, which has no term.
-    """
-    if not value:
-        return 0
-    total = 0
-    for start in range(0, len(indices), _BLOCK):
-        block = indices[start : start + _BLOCK]
-        ones = _ones(len(block))
-        same = ones * (value * spec.DIGEST_MUL_VALUE & _LOW)
-        total += _mix(_lanes(block) * spec.DIGEST_MUL_INDEX + same, ones * _LOW) % _SUM
-    return total & _LOW
-
-
 def _block(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
     ones = _ones(len(indices))
     low = ones * _LOW
@@ -78,7 +52,12 @@ def _block(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -
     for k in range(pixel_size):
         spread[k :: _LANE // 8] = pixels[k::pixel_size]
     value = int.from_bytes(spread, "little")
-    h = _mix(_lanes(indices) * spec.DIGEST_MUL_INDEX + value * spec.DIGEST_MUL_VALUE, low)
+    h = (_lanes(indices) * spec.DIGEST_MUL_INDEX + value * spec.DIGEST_MUL_VALUE) & low
+    h ^= (h >> spec.DIGEST_SHIFT_1) & low
+    h = (h * spec.DIGEST_MUL_1) & low
+    h ^= (h >> spec.DIGEST_SHIFT_2) & low
+    h = (h * spec.DIGEST_MUL_2) & low
+    h ^= (h >> spec.DIGEST_SHIFT_3) & low
     lit = ((value + low) >> 32) & ones  # the carry out of the low half: 1 if value is not 0
     return (h & lit * _LOW) % _SUM
 
@@ -93,12 +72,3 @@ def _lanes(indices: Sequence[int]) -> int:
         ramp = _RAMP if count == _BLOCK else _RAMP & (1 << _LANE * count) - 1
         return ramp + _ones(count) * indices.start
     return int.from_bytes(array("Q", indices), "little")
-
-
-def _mix(h: int, low: int) -> int:
-    h &= low
-    h ^= (h >> spec.DIGEST_SHIFT_1) & low
-    h = (h * spec.DIGEST_MUL_1) & low
-    h ^= (h >> spec.DIGEST_SHIFT_2) & low
-    h = (h * spec.DIGEST_MUL_2) & low
-    return h ^ (h >> spec.DIGEST_SHIFT_3) & low

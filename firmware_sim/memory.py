@@ -7,16 +7,15 @@ nothing of packets and ops: its callers give it voxels that are on the grid.
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.digest import terms, terms_of_one
+from firmware_sim.digest import terms
 from firmware_sim.grid import Grid
 
 _COLOR: Final = 3  # bytes of a colour: red, green, blue
-_BATCH: Final = 65_536  # voxels that are accounted for at a time
-_LONG: Final = 512  # runs from this length on are accounted for one by one
+_LOG: Final = 4096  # so many voxels are written before the digest catches up with them
+_LONG: Final = 256  # so many voxels in scan order are worth a calculation of their own
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,6 @@ class Page:
         All pixels in scan order, `volume` times `pixel_size` bytes.
     palette : bytearray
         256 colours of red, green and blue, a byte each. Of use with INDEX8 only.
-    digest : int
-        Section 8; every write keeps it up to date.
     """
 
     def __init__(self, volume: int, pixel_size: int) -> None:
@@ -93,13 +90,15 @@ class Page:
         """Make all voxels dark, and the palette the default one."""
         self.pixels = bytearray(self.volume * self.pixel_size)
         self.palette = bytearray(DEFAULT_PALETTE)
-        self.digest = 0
+        self._digest = 0
+        self._forget()
 
     def copy(self, other: "Page") -> None:
         """Take over picture and palette of another page of the same shape."""
         self.pixels[:] = other.pixels
         self.palette[:] = other.palette
-        self.digest = other.digest
+        self._digest = other.digest
+        self._forget()
 
     def put(self, start: int, pixels: bytes) -> None:
         """Write pixels in scan order.
@@ -112,33 +111,13 @@ class Page:
             Pixels of voxels on the grid, one behind the other.
         """
         size = self.pixel_size
-        at = start * size
-        old = self.pixels[at : at + len(pixels)]
-        if old == pixels:
-            return
-        self.pixels[at : at + len(pixels)] = pixels
-        indices = range(start, start + len(pixels) // size)
-        self._account(terms(indices, pixels, size) - terms(indices, old, size))
+        place = slice(start * size, start * size + len(pixels))
+        old = self.pixels[place]
+        self.pixels[place] = pixels
+        self._replaced(range(start, start + len(pixels) // size), old, pixels)
 
-    def fill(self, start: int, count: int, pixel: bytes) -> None:
-        """Write one pixel to many voxels in scan order.
-
-        Parameters
-        ----------
-        start
-            Index of the first voxel.
-        count
-            How many voxels, all on the grid.
-        pixel
-            The pixel that all of them get.
-        """
-        size = self.pixel_size
-        old = self.pixels[start * size : (start + count) * size]
-        self.pixels[start * size : (start + count) * size] = pixel * count
-        self._replace(range(start, start + count), old, pixel)
-
-    def fill_runs(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
-        """Write one pixel to many runs of voxels.
+    def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
+        """Write one pixel to runs of voxels in scan order.
 
         Parameters
         ----------
@@ -149,22 +128,9 @@ class Page:
         pixel
             The pixel that all of them get.
         """
-        if count >= _LONG:
-            for start in starts:
-                self.fill(start, count, pixel)
-            return
-        size = self.pixel_size
-        pixels = self.pixels
         run = pixel * count
-        batch = _BATCH // count
-        for first in range(0, len(starts), batch):
-            old = bytearray()
-            for start in starts[first : first + batch]:
-                place = slice(start * size, (start + count) * size)
-                old += pixels[place]
-                pixels[place] = run
-            runs = (range(start, start + count) for start in starts[first : first + batch])
-            self._replace(array("Q", chain.from_iterable(runs)), old, pixel)
+        for start in starts:
+            self.put(start, run)
 
     def plot(self, indices: "array[int]", pixel: bytes) -> None:
         """Write one pixel to many voxels.
@@ -172,24 +138,19 @@ class Page:
         Parameters
         ----------
         indices
-            Array of type ``"Q"`` of the voxels' indices, each on the grid.
+            Array of type ``"Q"`` of the voxels' indices, each on the grid and no two equal.
         pixel
             The pixel that all of them get.
         """
         pixels = self.pixels
         size = self.pixel_size
-        old = bytearray()
-        if size == 1:
-            value = pixel[0]
-            for index in indices:
-                old.append(pixels[index])
-                pixels[index] = value
-        else:
-            for index in indices:
-                place = slice(index * size, (index + 1) * size)
-                old += pixels[place]
-                pixels[place] = pixel
-        self._replace(indices, old, pixel)
+        old = bytearray(len(indices) * size)
+        for k, value in enumerate(pixel):
+            places = indices if size == 1 else [index * size + k for index in indices]
+            old[k::size] = bytes(map(pixels.__getitem__, places))
+            for place in places:
+                pixels[place] = value
+        self._replaced(indices, old, pixel * len(indices))
 
     def color(self, first: int, colors: bytes) -> None:
         """Set entries of the palette.
@@ -202,25 +163,49 @@ class Page:
             Red, green and blue of each; none behind the palette's end.
         """
         place = slice(first * _COLOR, first * _COLOR + len(colors))
-        old, self.palette[place] = self.palette[place], colors
-        self._account(self._color_terms(first, colors) - self._color_terms(first, old))
+        gain = -self._color_terms(place)
+        self.palette[place] = colors
+        self._digest += gain + self._color_terms(place)
 
-    def _color_terms(self, first: int, colors: bytes | bytearray) -> int:
-        """Return what entries of the palette add to the digest (8), if they have these colours."""
-        total = 0
-        for i in range(first, first + len(colors) // _COLOR):
-            color = colors[(i - first) * _COLOR : (i - first + 1) * _COLOR]
-            if color != DEFAULT_PALETTE[i * _COLOR : (i + 1) * _COLOR]:
-                total += terms((self.volume + i,), color + b"\1", _COLOR + 1)  # 1000000h + ...
-        return total
+    # The digest
 
-    def _replace(self, indices: "array[int] | range", old: bytearray, pixel: bytes) -> None:
-        """Account for one pixel in the place of others, in the order in which they were written."""
-        gain = terms_of_one(indices, int.from_bytes(pixel, "little"))
-        self._account(gain - terms(indices, old, self.pixel_size))
+    @property
+    def digest(self) -> int:
+        """Section 8: of the picture as it is now."""
+        size = self.pixel_size
+        gain = terms(self._written, self._new, size) - terms(self._written, self._old, size)
+        self._digest = (self._digest + gain) & 0xFFFFFFFF
+        self._forget()
+        return self._digest
 
-    def _account(self, gain: int) -> None:
-        self.digest = (self.digest + gain) & 0xFFFFFFFF
+    def _forget(self) -> None:
+        """Begin a new log of what has been written and is not in the digest yet."""
+        self._written = array("Q")  # indices in the order of the writes, the same one perhaps twice
+        self._old = bytearray()  # their pixels before
+        self._new = bytearray()  # and after
+
+    def _replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
+        if old == new:
+            return
+        size = self.pixel_size
+        if len(indices) >= _LONG:
+            self._digest += terms(indices, new, size) - terms(indices, old, size)
+            return
+        self._written.extend(indices)
+        self._old += old
+        self._new += new
+        if len(self._written) >= _LOG:
+            self._digest = self.digest
+
+    def _color_terms(self, place: slice) -> int:
+        """Return what a part of the palette adds to the digest."""
+        entries = [
+            at
+            for at in range(place.start, place.stop, _COLOR)
+            if self.palette[at : at + _COLOR] != DEFAULT_PALETTE[at : at + _COLOR]
+        ]
+        values = b"".join(self.palette[at : at + _COLOR] + b"\1" for at in entries)
+        return terms([self.volume + at // _COLOR for at in entries], values, _COLOR + 1)
 
 
 class Memory:

@@ -163,7 +163,7 @@ class _Decoder:
 
     def run(self, operand: int) -> None:
         count = self._room(self._in.count(operand))
-        self._page.fill(self._cursor, count, self._pen)
+        self._page.put(self._cursor, self._pen * count)
         self._cursor += count
 
     def literal(self, operand: int) -> None:
@@ -204,14 +204,14 @@ class _Decoder:
         self._check_cursor()
         self._check_place(place)
         for starts, count in box(self._grid, self._cursor, place):
-            self._page.fill_runs(starts, count, self._pen)
+            self._page.fill(starts, count, self._pen)
         self._cursor = self._grid.index(*place)
 
     def dots(self, _: int) -> None:
         x, y, z = self._in.places(self._in.byte() + 1)
         self._check_place((max(x), max(y), max(z)))
-        voxels = array("Q", map(self._grid.index, x, y, z))
-        self._page.plot(voxels, self._pen)
+        voxels = list(map(self._grid.index, x, y, z))
+        self._page.plot(array("Q", set(voxels)), self._pen)
         self._cursor = voxels[-1]
 
     def brick(self, level: int) -> None:
@@ -225,7 +225,7 @@ class _Decoder:
         for count, places in brick.rows:
             voxels = array("Q", [first + strides[place] for place in places])
             if count > 1:
-                self._page.fill_runs(voxels, count, self._pen)
+                self._page.fill(voxels, count, self._pen)
             else:
                 self._page.plot(voxels, self._pen)
 
