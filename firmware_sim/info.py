@@ -86,9 +86,7 @@ def announce(config: Config, boot: int) -> Announcement:
         config.strings,
     )
     if "grid" in config.lies:  # each side one voxel longer, or shorter if it is the longest
-        nx, ny, nz = (
-            side + 1 if side < spec.LIMIT_MAX_SIDE else side - 1 for side in config.grid
-        )
+        nx, ny, nz = (side + 1 if side < spec.LIMIT_MAX_SIDE else side - 1 for side in config.grid)
         said = replace(said, grid=(nx, ny, nz))
     if "credit" in config.lies:
         said = replace(said, credit=min(2 * said.credit, _U32))

@@ -70,7 +70,9 @@ class Operands:
         """Return the coordinates of many voxels: all x, all y, all z."""
         size = self._coordinate_size
         raw = self.take(3 * size * count)
-        axes = list(raw) if size == 1 else [a | b << 8 for a, b in zip(raw[::2], raw[1::2])]
+        axes = list(raw)
+        if size > 1:
+            axes = [low | high << 8 for low, high in zip(raw[::2], raw[1::2], strict=True)]
         return axes[::3], axes[1::3], axes[2::3]
 
     def count(self, operand: int) -> int:

@@ -6,7 +6,7 @@ side of 16, so that places are added without a carry from one axis to the next.
 """
 
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from functools import reduce
 from itertools import repeat
 from operator import add
@@ -59,7 +59,7 @@ def line(grid: Grid, start: int, target: tuple[int, int, int]) -> "array[int]":
     """
     deltas = [q - p for p, q in zip(grid.place(start), target, strict=True)]
     length = max(map(abs, deltas))
-    axes: list[Sequence[int]] = []
+    axes: list[Iterable[int]] = [repeat(start)]
     for delta, stride in zip(deltas, grid.strides, strict=True):
         if abs(delta) == length:
             sign = stride if delta > 0 else -stride
@@ -67,7 +67,7 @@ def line(grid: Grid, start: int, target: tuple[int, int, int]) -> "array[int]":
         elif delta:
             numerators = range(length, length + 2 * delta * (length + 1), 2 * delta)
             axes.append([n // (2 * length) * stride for n in numerators])
-    return array("Q", reduce(lambda a, b: map(add, a, b), axes, repeat(start)))
+    return array("Q", reduce(lambda one, other: map(add, one, other), axes))
 
 
 def box(grid: Grid, start: int, target: tuple[int, int, int]) -> Iterator[tuple[range, int]]:
