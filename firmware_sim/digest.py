@@ -67,7 +67,7 @@ def _ones(count: int) -> int:
 
 
 def _lanes(indices: Sequence[int]) -> int:
-    if isinstance(indices, range):
+    if isinstance(indices, range) and indices.step == 1:
         count = len(indices)
         ramp = _RAMP if count == _BLOCK else _RAMP & (1 << _LANE * count) - 1
         return ramp + _ones(count) * indices.start

@@ -210,7 +210,8 @@ class _Decoder:
     def dots(self, _: int) -> None:
         x, y, z = self._in.places(self._in.byte() + 1)
         self._check_place((max(x), max(y), max(z)))
-        voxels = list(map(self._grid.index, x, y, z))
+        _, row, plane = self._grid.strides
+        voxels = [i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)]
         self._page.plot(array("Q", set(voxels)), self._pen)
         self._cursor = voxels[-1]
 
