@@ -15,7 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_number, parse_refresh, parse_size
+from firmware_sim.config import (
+    FEATURES,
+    LIES,
+    Config,
+    parse_names,
+    parse_number,
+    parse_refresh,
+    parse_size,
+)
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
@@ -33,6 +41,18 @@ examples:
       a smaller one on TCP that swaps at once
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
+  voxdisplay-sim --fault down.stall=0.2@0.001,up.delay=0.05@0.02,reboot@100000
+      what the host sends stands still now and then, what it gets is late, and the device
+      starts again behind 100000 bytes
+  voxdisplay-sim --format index8 --features line,digest --lie credit
+      a device that has few ops, and announces more room than it has
+
+faults, with commas between them:
+  KIND=RATE           flip (bits), drop, double, insert (bytes), lose, reorder (packets),
+                      short (writes and reads end behind a byte)
+  KIND=SECONDS@RATE   stall (the line stands still, at bytes), delay (packets held back)
+  KIND=RATE, KIND@BYTES   reboot, unplug (behind a byte to the device)
+  down. or up. in front: only to, or only from the device
 """
 
 
@@ -54,7 +74,14 @@ def main(argv: list[str] | None = None) -> int:
     if options.link and options.tcp:
         parser.error("--link is a name for a pseudo-terminal: leave out --tcp")
     try:
-        config = Config(options.size, options.format, options.refresh, options.rx_buffer)
+        config = Config(
+            options.size,
+            options.format,
+            options.refresh,
+            options.rx_buffer,
+            features=options.features,
+            lies=options.lie,
+        )
         device = Device(config)
         if options.dump:
             _dump_swaps(device, options.dump)
@@ -118,11 +145,24 @@ def _parser() -> argparse.ArgumentParser:
         help="size of the receive ring, which is the credit (default: %(default)s)",
     )
     parser.add_argument(
+        "--features",
+        metavar="NAME,...",
+        type=parse_names,
+        help=f"what it can, of {', '.join(FEATURES)} (default: all that the format allows)",
+    )
+    parser.add_argument(
+        "--lie",
+        metavar="NAME,...",
+        type=parse_names,
+        default=default.lies,
+        help=f"announce what it does not do, of {', '.join(LIES)}",
+    )
+    parser.add_argument(
         "--fault",
         metavar="SPEC",
         type=_argument(parse_faults),
         default=(),
-        help="a bad line: KIND=RATE,... with the kinds flip (bits) and drop (bytes)",
+        help="a bad line, as below",
     )
     parser.add_argument(
         "--seed",

@@ -36,6 +36,8 @@ class Snapshot:
         Frame id, or None if no frame of the open session is on display.
     digest
         Digest of the page, section 8.
+    palette
+        256 colours of red, green and blue, a byte each; none if the format is not INDEX8.
     """
 
     pixels: bytes
@@ -43,6 +45,7 @@ class Snapshot:
     pixel_format: str
     frame: int | None
     digest: int
+    palette: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class Bench:
             device.config.pixel_format,
             device.session.shown if device.session else None,
             front.digest,
+            bytes(front.palette) if device.config.pixels.code == spec.FORMAT_INDEX8 else b"",
         )
 
     def counters(self) -> Counters:

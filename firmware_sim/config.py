@@ -4,6 +4,7 @@ Everything here is known before the device starts.
 """
 
 import re
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -12,7 +13,18 @@ from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, PixelFormat
 from firmware_sim.sender import wire_size
 
-FEATURES: Final = {"read": spec.FEATURE_READ, "digest": spec.FEATURE_DIGEST}
+FEATURES: Final = {
+    "line": spec.FEATURE_LINE,
+    "box": spec.FEATURE_BOX,
+    "dots": spec.FEATURE_DOTS,
+    "oct": spec.FEATURE_OCT,
+    "diff": spec.FEATURE_DIFF,
+    "palette": spec.FEATURE_PALETTE,
+    "read": spec.FEATURE_READ,
+    "digest": spec.FEATURE_DIGEST,
+}
+_INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the format INDEX8
+LIES: Final = ("grid", "credit", "format", "features", "payload", "boot")
 _INFO_FIXED: Final = 29  # bytes of an INFO's payload before its strings (5)
 _U32: Final = 0xFFFFFFFF
 
@@ -38,9 +50,11 @@ class Config:
     name, firmware, serial
         What INFO says.
     features
-        Names of what is announced: ``"read"``, ``"digest"``.
+        Names of what is announced, of `FEATURES`; None for all that the pixel format allows.
     silent
         How many ACKs in a row are left out while more packets can be taken, 0 to 8 (9).
+    lies
+        Names of what INFO announces and the device does not do, of `LIES`.
 
     Attributes
     ----------
@@ -48,6 +62,8 @@ class Config:
         The grid.
     pixels : PixelFormat
         The pixel format.
+    feature_bits : int
+        What is announced, a bit for each ``spec.FEATURE_*``.
 
     Raises
     ------
@@ -64,10 +80,12 @@ class Config:
     name: str = "voxdisplay emulator"
     firmware: str = "1.0"
     serial: str = ""
-    features: frozenset[str] = frozenset(FEATURES)
+    features: frozenset[str] | None = None
     silent: int = 0
+    lies: frozenset[str] = frozenset()
     shape: Grid = field(init=False, repr=False, compare=False)
     pixels: PixelFormat = field(init=False, repr=False, compare=False)
+    feature_bits: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", Grid(*self.grid))
@@ -76,9 +94,16 @@ class Config:
                 f"pixel format {self.pixel_format!r}: take one of {', '.join(FORMATS)}"
             )
         object.__setattr__(self, "pixels", FORMATS[self.pixel_format])
-        unknown = ", ".join(sorted(self.features - FEATURES.keys()))
-        if unknown:
-            raise ValueError(f"feature {unknown}: take of {', '.join(FEATURES)}")
+        allowed = [
+            name
+            for name in FEATURES
+            if name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8
+        ]
+        features = frozenset(allowed) if self.features is None else self.features
+        _check_names("feature", features, allowed, f" with the format {self.pixel_format}")
+        bits = sum(1 << FEATURES[name] for name in features)
+        object.__setattr__(self, "feature_bits", bits)
+        _check_names("lie", self.lies, LIES)
         _check("refresh", self.refresh, 0, _U32)
         _check("max_payload", self.max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
         longest = wire_size(self.max_payload + spec.LIMIT_OVERHEAD)
@@ -108,6 +133,12 @@ class Config:
 def _check(what: str, value: int, low: int, high: int) -> None:
     if not low <= value <= high:
         raise ValueError(f"{what} is {value}: take a number from {low} to {high}")
+
+
+def _check_names(what: str, names: Iterable[str], known: Collection[str], where: str = "") -> None:
+    unknown = ", ".join(sorted(name for name in names if name not in known))
+    if unknown:
+        raise ValueError(f"{what} {unknown}: take of {', '.join(known)}{where}")
 
 
 def parse_number(text: str) -> int:
@@ -158,6 +189,6 @@ def parse_refresh(text: str) -> int:
         raise ValueError(f"{text!r} is no number of hertz: write one like 30 or 29.97") from None
 
 
-def parse_features(text: str) -> frozenset[str]:
-    """Read names of features with commas between them."""
+def parse_names(text: str) -> frozenset[str]:
+    """Read names, as of features or of lies, with commas between them."""
     return frozenset(filter(None, text.lower().split(",")))

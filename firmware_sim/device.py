@@ -9,14 +9,15 @@ import struct
 from typing import TYPE_CHECKING
 
 from firmware_sim import spec
-from firmware_sim.config import FEATURES, Config
+from firmware_sim.config import Config
+from firmware_sim.info import announce
 from firmware_sim.memory import Memory
 from firmware_sim.pack import pack
 from firmware_sim.receiver import Receiver
 from firmware_sim.refusal import Refusal
 from firmware_sim.sender import send
 from firmware_sim.session import Session, State, Verdict
-from firmware_sim.unpack import unpack
+from firmware_sim.unpack import Unpacker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 TX_BUFFER = 65_536  # with so many bytes to be sent, the device takes no more packets
 _DATA_FLAGS = spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT
 _HELLO = struct.Struct("<BHBB")
-_INFO = struct.Struct("<BHHBBHHHBBHIII")
 _ACK = struct.Struct("<BHHIIIH")
 _READ = struct.Struct("<BII")
 _PAGE = struct.Struct("<BII")
@@ -61,10 +61,13 @@ class Device:
         self.config = config
         self.boot = random.randrange(0x10000) if config.boot is None else config.boot
         self.on_swap: Callable[[], object] = lambda: None
-        self._features = sum(1 << FEATURES[name] for name in config.features)
+        # What it does, which is what it announces unless it lies.
+        self._features = 0 if "features" in config.lies else config.feature_bits
+        self._unpacker = Unpacker(config.shape, config.pixels, self._features)
         self._start()
 
     def _start(self) -> None:
+        self._announcement = announce(self.config, self.boot)
         self.memory = Memory(self.config.shape, self.config.pixels)
         self.taken: dict[int, int] = {}
         self.refused: dict[int, int] = {}
@@ -236,22 +239,7 @@ class Device:
         if major == spec.VERSION_MAJOR:
             self.session = Session(number)
             self._unanswered = 0
-        config = self.config
-        info = _INFO.pack(
-            spec.VERSION_MAJOR,
-            number,
-            self.boot,
-            spec.VERSION_MINOR,
-            config.pixels.code,
-            *config.grid,
-            Memory.PAGES,
-            0,
-            config.max_payload,
-            config.rx_buffer,
-            config.refresh,
-            self._features,
-        )
-        self._send(spec.TYPE_INFO, 0, 0, 0, info + config.strings)
+        self._send(spec.TYPE_INFO, 0, 0, 0, self._announcement.payload(number))
 
     def _data(self, session: Session, packet: bytes, flags: int, seq: int, frame: int) -> None:
         if flags & ~_DATA_FLAGS:
@@ -261,7 +249,7 @@ class Device:
             session.begin(frame, flags)
             self.memory.begin(dark=bool(flags & spec.DATA_FLAG_CLEAR))
         if verdict in (Verdict.BEGIN, Verdict.APPLY):
-            unpack(packet, self.config.shape, self.config.pixels, self.memory.back)
+            self._unpacker.draw(packet, self.memory.back)
             session.mark(seq, flags)
         session.last = seq
         self._unanswered += 1
@@ -294,7 +282,7 @@ class Device:
             session.number,
             self.boot,
             session.received,
-            self.config.rx_buffer,
+            self._announcement.credit,
             self.memory.front.digest if self._features >> spec.FEATURE_DIGEST & 1 else 0,
             self.damaged & 0xFFFF,
         )

@@ -1,135 +1,122 @@
-"""A bad line: bytes are changed and lost at given rates, the same ones for the same seed.
+"""A bad line: which faults a text asks for, and one direction of a line that has them.
 
-It knows nothing of packets. Where a fault strikes depends on the bytes' places in the stream and
-not on how they are cut into pieces.
+It knows nothing of what the faults do.
 """
 
 import difflib
 import math
 import random
 import re
-from typing import Final, Protocol
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from firmware_sim import fault_kinds
+from firmware_sim.fault_kinds import Event, Fault, Piece, Strokes
+
+KINDS: Final[dict[str, type[Fault]]] = {
+    "flip": fault_kinds.Flip,
+    "drop": fault_kinds.Drop,
+    "double": fault_kinds.Double,
+    "insert": fault_kinds.Insert,
+    "lose": fault_kinds.Lose,
+    "delay": fault_kinds.Delay,
+    "reorder": fault_kinds.Reorder,
+    "short": fault_kinds.Short,
+    "stall": fault_kinds.Stall,
+    "reboot": fault_kinds.Reboot,
+    "unplug": fault_kinds.Unplug,
+}
+DIRECTIONS: Final = ("down", "up")  # to the device, and from it
+_TIMED: Final = ("delay", "stall")
+_EVENTS: Final = ("reboot", "unplug")
+_PART: Final = re.compile(r"(?:(\w+)\.)?(\w+)(?:[=:]([^@]*))?(?:@(.*))?")
 
 
-class Fault(Protocol):
-    """One kind of fault, on one direction of a line."""
-
-    def __init__(self, rate: float, rng: random.Random) -> None: ...
-
-    def apply(self, data: bytes) -> bytes:
-        """Return what becomes of the next bytes of the stream."""
-
-
-class _Strokes:
-    """Places at which something with a fixed chance happens, in a row of many chances."""
-
-    def __init__(self, rate: float, rng: random.Random) -> None:
-        self._rate = rate
-        self._rng = rng
-        self._next = self._gap()  # chances that go by before the next stroke
-
-    def _gap(self) -> float:
-        if self._rate >= 1:
-            return 0
-        if not self._rate:
-            return math.inf
-        return math.log(1 - self._rng.random()) // math.log1p(-self._rate)
-
-    def among(self, chances: int) -> list[int]:
-        """Return which of the next chances strike."""
-        hits = []
-        while self._next < chances:
-            hits.append(int(self._next))
-            self._next += 1 + self._gap()
-        self._next -= chances
-        return hits
-
-
-class Flip:
-    """Inverts bits; the rate is that of bits.
+@dataclass(frozen=True)
+class Spec:
+    """A fault as a text asks for it.
 
     Parameters
     ----------
+    kind
+        One of `KINDS`.
+    directions
+        Some of `DIRECTIONS`.
     rate
-        Chance of each bit, 0 to 1.
-    rng
-        Where chance comes from.
+        Chance of each bit, byte or packet, by its kind.
+    seconds
+        For how long, if its kind has a time.
+    after
+        Behind so many bytes, once, instead of a rate.
     """
 
-    def __init__(self, rate: float, rng: random.Random) -> None:
-        self._strokes = _Strokes(rate, rng)
-
-    def apply(self, data: bytes) -> bytes:
-        """Return the bytes with some bits inverted."""
-        hits = self._strokes.among(8 * len(data))
-        if not hits:
-            return data
-        changed = bytearray(data)
-        for hit in hits:
-            changed[hit >> 3] ^= 1 << (hit & 7)
-        return bytes(changed)
+    kind: str
+    directions: tuple[str, ...]
+    rate: float = 0.0
+    seconds: float = 0.0
+    after: int | None = None
 
 
-class Drop:
-    """Loses bytes; the rate is that of bytes.
-
-    Parameters
-    ----------
-    rate
-        Chance of each byte, 0 to 1.
-    rng
-        Where chance comes from.
-    """
-
-    def __init__(self, rate: float, rng: random.Random) -> None:
-        self._strokes = _Strokes(rate, rng)
-
-    def apply(self, data: bytes) -> bytes:
-        """Return the bytes without some of them."""
-        hits = self._strokes.among(len(data))
-        if not hits:
-            return data
-        changed = bytearray(data)
-        for hit in reversed(hits):
-            del changed[hit]
-        return bytes(changed)
-
-
-KINDS: Final[dict[str, type[Fault]]] = {"flip": Flip, "drop": Drop}
-
-
-def parse_faults(text: str) -> tuple[tuple[str, float], ...]:
-    """Read a list of faults such as ``flip=1e-5,drop=1e-6``; a colon may stand for ``=``.
+def parse_faults(text: str) -> tuple[Spec, ...]:
+    """Read a list of faults such as ``flip=1e-5,down.drop=1e-6,stall=0.2@0.01,reboot@5000``.
 
     Parameters
     ----------
     text
-        Kinds and rates; an empty text has none.
+        Faults with commas between them: ``KIND=RATE``, for delay and stall ``KIND=SECONDS@RATE``,
+        for reboot and unplug also ``KIND@BYTES``. A colon may stand for ``=``. ``down.`` or
+        ``up.`` in front has it on one direction; otherwise it is on both, but reboot and unplug
+        are on that to the device.
 
     Returns
     -------
-    tuple of (str, float)
-        Kind and rate, in the order in which they work.
+    tuple of Spec
+        The faults, in the order in which they work.
 
     Raises
     ------
     ValueError
-        If a kind is not known, or a rate not a number from 0 to 1.
+        If a kind is not known, or what stands behind it cannot be; the message says what can.
     """
-    faults = []
-    for part in filter(None, text.split(",")):
-        kind, *rest = re.split("[=:]", part, maxsplit=1)
-        if kind not in KINDS:
-            near = difflib.get_close_matches(kind, KINDS, 1) or KINDS
-            raise ValueError(f"fault {kind!r} is not known: did you mean {' or '.join(near)}?")
-        try:
-            rate = float(rest[0])
-        except (IndexError, ValueError):
-            rate = math.nan
-        if not 0 <= rate <= 1:
-            raise ValueError(f"fault {part!r}: write {kind}=RATE with a rate from 0 to 1")
-        faults.append((kind, rate))
-    return tuple(faults)
+    return tuple(_parse(part) for part in text.split(",") if part)
+
+
+def _parse(part: str) -> Spec:
+    match = _PART.fullmatch(part.strip())
+    direction, kind, value, behind = match.groups() if match else (None, part, None, None)
+    if kind not in KINDS:
+        near = difflib.get_close_matches(kind, KINDS, 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise ValueError(f"fault {kind!r} is not known: {hint}there are {', '.join(KINDS)}")
+    if direction not in (None, *DIRECTIONS):
+        raise ValueError(f"fault {part!r}: write down. (to the device) or up. (from it) in front")
+    one_way = DIRECTIONS[:1] if kind in _EVENTS else DIRECTIONS
+    directions = one_way if direction is None else (direction,)
+    if kind in _TIMED:
+        seconds, rate = _number(value), _number(behind)
+        if seconds < math.inf and rate <= 1:
+            return Spec(kind, directions, rate, seconds)
+        raise ValueError(
+            f"fault {part!r}: write {kind}=SECONDS@RATE with a time and a rate from 0 to 1"
+        )
+    if kind in _EVENTS and value is None and behind is not None and re.fullmatch("[0-9]+", behind):
+        after = int(behind)
+        if after:
+            return Spec(kind, directions, after=after)
+    if behind is None and _number(value) <= 1:
+        return Spec(kind, directions, _number(value))
+    also = f" or {kind}@BYTES with a number from 1 on" if kind in _EVENTS else ""
+    raise ValueError(f"fault {part!r}: write {kind}=RATE with a rate from 0 to 1{also}")
+
+
+def _number(text: str | None) -> float:
+    """Return a number from 0 on, infinity if it is none."""
+    try:
+        number = float(text or "")
+    except ValueError:
+        return math.inf
+    return number if number >= 0 else math.inf
 
 
 class Line:
@@ -142,17 +129,86 @@ class Line:
     seed
         Equal seeds strike equal places.
     direction
-        Name of the direction, so that the two of a line differ.
+        One of `DIRECTIONS`.
+
+    Attributes
+    ----------
+    backlog : int
+        How many bytes are on their way.
     """
 
-    def __init__(self, faults: tuple[tuple[str, float], ...], seed: int, direction: str) -> None:
+    def __init__(self, faults: tuple[Spec, ...], seed: int, direction: str) -> None:
         self._faults = [
-            KINDS[kind](rate, random.Random(f"{seed} {direction} {place} {kind}"))
-            for place, (kind, rate) in enumerate(faults)
+            _make(fault, f"{seed} {direction} {place} {fault.kind}")
+            for place, fault in enumerate(faults)
+            if direction in fault.directions
         ]
+        self.connect()
 
-    def carry(self, data: bytes) -> bytes:
-        """Return what arrives of the next bytes of the stream."""
+    def connect(self) -> None:
+        """Begin a connection; what was on its way is gone."""
+        self._pieces: deque[Piece] = deque()
+        self._last = -math.inf  # when the last piece comes
+        self.backlog = 0
         for fault in self._faults:
-            data = fault.apply(data)
-        return data
+            fault.connect()
+
+    def send(self, at: float, data: bytes) -> None:
+        """Let bytes set out.
+
+        Parameters
+        ----------
+        at
+            When, in seconds, never before those that set out before.
+        data
+            The bytes.
+        """
+        pieces = [Piece(at, data)]
+        for fault in self._faults:
+            pieces = [new for old in pieces for new in _through(fault, old)]
+        for when, what in pieces:
+            if what:
+                self._last = max(self._last, when)
+                self._pieces.append(Piece(self._last, what))
+                self.backlog += len(what) if isinstance(what, bytes) else 0
+
+    @property
+    def due(self) -> float:
+        """When the next piece comes, in seconds; infinity if none is on its way."""
+        return self._pieces[0].at if self._pieces else math.inf
+
+    def take(self, now: float) -> bytes | Event:
+        """Return what has come by now: bytes as far as an event, or the event.
+
+        Nothing is no bytes. Bytes that set out together come together, unless a fault has it
+        otherwise.
+        """
+        come = bytearray()
+        while self.due <= now:
+            what = self._pieces[0].what
+            if isinstance(what, bytes):
+                come += what
+                self.backlog -= len(what)
+            elif not come:
+                self._pieces.popleft()
+                return what
+            else:
+                break
+            self._pieces.popleft()
+        return bytes(come)
+
+
+def _make(fault: Spec, seed: str) -> Fault:
+    strokes: Strokes = (
+        fault_kinds.Random(fault.rate, random.Random(seed))
+        if fault.after is None
+        else fault_kinds.Once(fault.after)
+    )
+    return KINDS[fault.kind](strokes, fault.seconds, random.Random(f"{seed} besides"))
+
+
+def _through(fault: Fault, piece: Piece) -> list[Piece]:
+    """Return what becomes of a piece; what happens, happens."""
+    if isinstance(piece.what, Event):
+        return [piece]
+    return list(fault.apply(piece.at, piece.what))

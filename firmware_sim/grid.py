@@ -62,11 +62,19 @@ class Grid:
     def __str__(self) -> str:
         return f"{self.nx}x{self.ny}x{self.nz}"
 
-    def index(self, x: int, y: int, z: int) -> int | None:
-        """Return the index of a voxel, or None if it is not on the grid."""
-        if x >= self.nx or y >= self.ny or z >= self.nz:
-            return None
+    def holds(self, x: int, y: int, z: int) -> bool:
+        """Tell whether a voxel, with coordinates from 0 on, is on the grid."""
+        return x < self.nx and y < self.ny and z < self.nz
+
+    def index(self, x: int, y: int, z: int) -> int:
+        """Return the index of a voxel on the grid."""
         return x + self.nx * (y + self.ny * z)
+
+    def place(self, index: int) -> tuple[int, int, int]:
+        """Return the coordinates of the voxel with an index, x, y and z."""
+        row, x = divmod(index, self.nx)
+        z, y = divmod(row, self.ny)
+        return x, y, z
 
     def leaves(self, index: int, octant: int, moves: tuple[int, int, int]) -> bool:
         """Tell whether a chain leaves the grid.
@@ -83,11 +91,11 @@ class Grid:
             How many steps move on the main axis, on the one after it, and on the third.
         """
         main = octant >> 3
+        start = self.place(index)
         for k, count in enumerate(moves):
             axis = (main + k) % 3
-            place = index // self.strides[axis] % self.sides[axis]
-            place += -count if octant >> axis & 1 else count
-            if not 0 <= place < self.sides[axis]:
+            end = start[axis] + (-count if octant >> axis & 1 else count)
+            if not 0 <= end < self.sides[axis]:
                 return True
         return False
 

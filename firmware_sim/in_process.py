@@ -11,7 +11,7 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_features, parse_number, parse_refresh, parse_size
+from firmware_sim.config import Config, parse_names, parse_number, parse_refresh, parse_size
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.wire import Wire
@@ -27,8 +27,9 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "name": ("name", str),
     "firmware": ("firmware", str),
     "serial": ("serial", str),
-    "features": ("features", parse_features),
+    "features": ("features", parse_names),
     "silent": ("silent", parse_number),
+    "lie": ("lies", parse_names),
     "fault": ("faults", parse_faults),
     "seed": ("seed", parse_number),
 }
@@ -72,20 +73,19 @@ class InProcessPort:
         Raises
         ------
         ConnectionError
-            If the port is closed.
+            If the port is closed, or the device unplugged.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
             while True:
                 self._check_open()
                 data = self._wire.transmit()
-                left = deadline - time.monotonic()
-                if data or left <= 0:
+                if data:
                     return data
-                tick = self._wire.until_tick()
-                self._changed.wait(left if tick is None else min(left, tick))
+                if not self._wait(deadline):
+                    return b""
 
-    def write(self, data: bytes, timeout_s: float) -> None:  # noqa: ARG002 - it never waits
+    def write(self, data: bytes, timeout_s: float) -> None:
         """Send bytes to the device.
 
         Parameters
@@ -93,15 +93,23 @@ class InProcessPort:
         data
             Any bytes. What the device has no room for is lost, and it says so.
         timeout_s
-            Not needed: the device takes bytes at any time.
+            How many seconds to wait for a line that stands still and holds all that it can. Any
+            other takes bytes at once.
 
         Raises
         ------
         ConnectionError
-            If the port is closed.
+            If the port is closed, or the device unplugged.
+        TimeoutError
+            If the line stood still all the time; it has taken nothing.
         """
+        deadline = time.monotonic() + timeout_s
         with self._changed:
             self._check_open()
+            while not self._wire.takes():
+                if not self._wait(deadline):
+                    raise TimeoutError("the line stands still: none of these bytes were taken")
+                self._check_open()
             self._wire.receive(bytes(data))
             self._changed.notify_all()
 
@@ -110,6 +118,15 @@ class InProcessPort:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+
+    def _wait(self, deadline: float) -> bool:
+        """Wait until something happens; return whether there was time for it."""
+        left = deadline - time.monotonic()
+        if left <= 0:
+            return False
+        happens = self._wire.until_tick()
+        self._changed.wait(left if happens is None else min(left, happens))
+        return True
 
     def _check_open(self) -> None:
         if self._closed:
@@ -125,7 +142,8 @@ def open_in_process(url: str) -> InProcessPort:
         ``sim:``, or ``sim:?KEY=VALUE&KEY=VALUE...`` with the keys ``size`` (64x64x64), ``format``
         (mono1, index8, rgb565, rgb888), ``refresh`` (hertz; 0: at once), ``rx_buffer`` and
         ``max_payload`` (bytes), ``boot``, ``silent``, ``seed`` (numbers), ``features``
-        (read,digest), ``name``, ``firmware``, ``serial`` (text), ``fault`` (flip:1e-6,drop:1e-6).
+        (line,read,digest), ``lie`` (credit,boot), ``name``, ``firmware``, ``serial`` (text),
+        ``fault`` (flip:1e-6,stall:0.2@0.01; see `parse_faults`).
 
     Returns
     -------

@@ -1,18 +1,21 @@
-"""Video memory: two pages of pixels in scan order, and the digest of each (2.1, 6, 8).
+"""Video memory: two pages of pixels in scan order, palette and digest of each (2.1, 6, 7.6, 8).
 
 A pixel stands in memory as it does on the wire; MONO1 has a byte for each voxel. The memory knows
 nothing of packets and ops: its callers give it voxels that are on the grid.
 """
 
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from firmware_sim import spec
 from firmware_sim.digest import terms
 from firmware_sim.grid import Grid
 
-if TYPE_CHECKING:
-    from array import array
+_COLOR: Final = 3  # bytes of a colour: red, green, blue
+_LOG: Final = 4096  # so many voxels are written before the digest catches up with them
+_LONG: Final = 256  # so many voxels in scan order are worth a calculation of their own
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,18 @@ FORMATS: Final = {
 }
 
 
+def _default_palette() -> bytes:
+    """Return the default palette (2.1), its values times 255 rounded to the nearest (8)."""
+    return bytes(
+        (2 * 255 * level + top) // (2 * top)
+        for i in range(spec.LIMIT_MAX_COLORS)
+        for level, top in ((i >> 5, 7), (i >> 2 & 7, 7), (i & 3, 3))
+    )
+
+
+DEFAULT_PALETTE: Final = _default_palette()
+
+
 class Page:
     """Video memory for one whole picture, dark at first.
 
@@ -62,8 +77,8 @@ class Page:
     ----------
     pixels : bytearray
         All pixels in scan order, `volume` times `pixel_size` bytes.
-    digest : int
-        Section 8; every write keeps it up to date.
+    palette : bytearray
+        256 colours of red, green and blue, a byte each. Of use with INDEX8 only.
     """
 
     def __init__(self, volume: int, pixel_size: int) -> None:
@@ -72,14 +87,18 @@ class Page:
         self.clear()
 
     def clear(self) -> None:
-        """Make all voxels dark."""
+        """Make all voxels dark, and the palette the default one."""
         self.pixels = bytearray(self.volume * self.pixel_size)
-        self.digest = 0
+        self.palette = bytearray(DEFAULT_PALETTE)
+        self._digest = 0
+        self._forget()
 
     def copy(self, other: "Page") -> None:
-        """Take over the picture of another page of the same shape."""
+        """Take over picture and palette of another page of the same shape."""
         self.pixels[:] = other.pixels
-        self.digest = other.digest
+        self.palette[:] = other.palette
+        self._digest = other.digest
+        self._forget()
 
     def put(self, start: int, pixels: bytes) -> None:
         """Write pixels in scan order.
@@ -92,10 +111,26 @@ class Page:
             Pixels of voxels on the grid, one behind the other.
         """
         size = self.pixel_size
-        at = start * size
-        old = self.pixels[at : at + len(pixels)]
-        self.pixels[at : at + len(pixels)] = pixels
-        self._account(range(start, start + len(pixels) // size), old, pixels)
+        place = slice(start * size, start * size + len(pixels))
+        old = self.pixels[place]
+        self.pixels[place] = pixels
+        self._replaced(range(start, start + len(pixels) // size), old, pixels)
+
+    def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
+        """Write one pixel to runs of voxels in scan order.
+
+        Parameters
+        ----------
+        starts
+            Index of the first voxel of each run.
+        count
+            How many voxels each run has, all on the grid.
+        pixel
+            The pixel that all of them get.
+        """
+        run = pixel * count
+        for start in starts:
+            self.put(start, run)
 
     def plot(self, indices: "array[int]", pixel: bytes) -> None:
         """Write one pixel to many voxels.
@@ -109,19 +144,68 @@ class Page:
         """
         pixels = self.pixels
         size = self.pixel_size
-        old = bytearray()
-        for index in indices:
-            at = index * size
-            place = slice(at, at + size)
-            old += pixels[place]
-            pixels[place] = pixel
-        self._account(indices, old, pixel * len(indices))
+        old = bytearray(len(indices) * size)
+        for k, value in enumerate(pixel):
+            places = indices if size == 1 else [index * size + k for index in indices]
+            old[k::size] = bytes(map(pixels.__getitem__, places))
+            for place in places:
+                pixels[place] = value
+        self._replaced(indices, old, pixel * len(indices))
 
-    def _account(self, indices: "array[int] | range", old: bytes | bytearray, new: bytes) -> None:
+    def color(self, first: int, colors: bytes) -> None:
+        """Set entries of the palette.
+
+        Parameters
+        ----------
+        first
+            The first entry.
+        colors
+            Red, green and blue of each; none behind the palette's end.
+        """
+        place = slice(first * _COLOR, first * _COLOR + len(colors))
+        gain = -self._color_terms(place)
+        self.palette[place] = colors
+        self._digest += gain + self._color_terms(place)
+
+    # The digest
+
+    @property
+    def digest(self) -> int:
+        """Section 8: of the picture as it is now."""
+        size = self.pixel_size
+        gain = terms(self._written, self._new, size) - terms(self._written, self._old, size)
+        self._digest = (self._digest + gain) & 0xFFFFFFFF
+        self._forget()
+        return self._digest
+
+    def _forget(self) -> None:
+        """Begin a new log of what has been written and is not in the digest yet."""
+        self._written = array("Q")  # indices in the order of the writes, the same one perhaps twice
+        self._old = bytearray()  # their pixels before
+        self._new = bytearray()  # and after
+
+    def _replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
         if old == new:
             return
-        gain = terms(indices, new, self.pixel_size) - terms(indices, old, self.pixel_size)
-        self.digest = (self.digest + gain) & 0xFFFFFFFF
+        size = self.pixel_size
+        if len(indices) >= _LONG:
+            self._digest += terms(indices, new, size) - terms(indices, old, size)
+            return
+        self._written.extend(indices)
+        self._old += old
+        self._new += new
+        if len(self._written) >= _LOG:
+            self._digest = self.digest
+
+    def _color_terms(self, place: slice) -> int:
+        """Return what a part of the palette adds to the digest."""
+        entries = [
+            at
+            for at in range(place.start, place.stop, _COLOR)
+            if self.palette[at : at + _COLOR] != DEFAULT_PALETTE[at : at + _COLOR]
+        ]
+        values = b"".join(self.palette[at : at + _COLOR] + b"\1" for at in entries)
+        return terms([self.volume + at // _COLOR for at in entries], values, _COLOR + 1)
 
 
 class Memory:
@@ -149,7 +233,7 @@ class Memory:
         self.back = Page(grid.volume, pixel_format.size)
 
     def begin(self, dark: bool) -> None:
-        """Prepare the back page for a frame: dark, or a copy of the front page."""
+        """Prepare the back page for a frame: dark, or a copy of the front page and its palette."""
         if dark:
             self.back.clear()
         else:

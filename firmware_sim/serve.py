@@ -45,19 +45,20 @@ def serve_wire(wire: Wire, line: int, stop: int) -> bool:
     Returns
     -------
     bool
-        Whether it was told to stop; else the line has ended.
+        Whether it was told to stop; else the line has ended, at either end.
     """
     out = bytearray()
     while True:
-        readers = [stop]
-        if len(out) < _CLOGGED:
-            out += wire.transmit()
-            readers.append(line)
-        writers = [line] if out else []
-        readable, writable, _ = select.select(readers, writers, [], wire.until_tick())
-        if stop in readable:
-            return True
         try:
+            readers = [stop]
+            if len(out) < _CLOGGED:
+                out += wire.transmit()
+                if wire.takes():
+                    readers.append(line)
+            writers = [line] if out else []
+            readable, writable, _ = select.select(readers, writers, [], wire.until_tick())
+            if stop in readable:
+                return True
             if writable:
                 del out[: os.write(line, out)]
             if line in readable:

@@ -76,11 +76,17 @@ DATA_FLAG_COMMIT: Final = 4
 OP_END: Final = 0x00
 OP_PEN: Final = 0x01
 OP_MOVE: Final = 0x02
+OP_LINE: Final = 0x03
+OP_BOX: Final = 0x04
+OP_DOTS: Final = 0x05
+OP_COLORS: Final = 0x06
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
+OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
 OP_RUN: Final = 0xA0
 OP_LIT: Final = 0xC0
+OP_DIFF: Final = 0xE0
 
 # 8 The digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1
@@ -141,6 +147,9 @@ LIMIT_MAX_SIDE: Final = 65535
 LIMIT_MAX_VOXELS: Final = 0x7FFFFFFF
 LIMIT_MAX_STEPS: Final = 256
 LIMIT_MAX_OCTANT: Final = 23
+LIMIT_MAX_DOTS: Final = 256
+LIMIT_MAX_LEVEL: Final = 4
+LIMIT_MAX_COLORS: Final = 256
 LIMIT_MAX_STATUS: Final = 4
 LIMIT_MAX_SILENT: Final = 8
 

@@ -5,157 +5,142 @@ on that only what is on the grid.
 """
 
 from array import array
+from collections.abc import Callable
 from itertools import accumulate
 from typing import Final
 
 from firmware_sim import spec
 from firmware_sim.grid import Grid
 from firmware_sim.memory import Page, PixelFormat
+from firmware_sim.operands import OPERAND, Operands
 from firmware_sim.refusal import Refusal
+from firmware_sim.shapes import Brick, box, brick_strides, line
 
-_OPERAND: Final = 0x1F  # the low five bits of an op byte
-_COUNT_BYTES: Final = 5  # section 7.2: the longest LEB128
-_COUNT_LIMIT: Final = 1 << 32  # section 7.2: n MUST be below
-
-# The four crumbs of a byte, and the eight pixels of MONO1: a byte each, the lowest bits first.
+# The four crumbs of a byte, the eight pixels of MONO1 and the two differences: a byte each, the
+# lowest bits first. A difference below 0 is one modulo 256.
 _CRUMBS: Final = [bytes(byte >> k & 3 for k in (0, 2, 4, 6)) for byte in range(256)]
 _BITS: Final = [bytes(byte >> k & 1 for k in range(8)) for byte in range(256)]
+_DIFFERENCES: Final = [
+    bytes(((byte >> k & 15 ^ 8) - 8) % 256 for k in (0, 4)) for byte in range(256)
+]
 
 
-def unpack(packet: bytes, grid: Grid, pixel_format: PixelFormat, page: Page) -> None:
-    """Draw the ops of a packet.
+class Unpacker:
+    """Draws packets.
 
     Parameters
     ----------
-    packet
-        Header and payload of a DATA packet.
     grid, pixel_format
-        Those of the page.
-    page
-        Where to draw.
-
-    Raises
-    ------
-    Refusal
-        At the first fault, when the ops before it have been drawn.
+        Those of the pages.
+    features
+        What is announced: a bit for each ``spec.FEATURE_*``.
     """
-    _Decoder(packet, grid, pixel_format, page).run()
+
+    def __init__(self, grid: Grid, pixel_format: PixelFormat, features: int) -> None:
+        self.grid = grid
+        self.pixel_format = pixel_format
+        self.mono = pixel_format.code == spec.FORMAT_MONO1
+        self.ops = _ops(features)
+        self.steps = [grid.steps(octant) for octant in range(spec.LIMIT_MAX_OCTANT + 1)]
+        self.brick_strides = brick_strides(grid)
+
+    def draw(self, packet: bytes, page: Page) -> None:
+        """Draw the ops of a packet.
+
+        Parameters
+        ----------
+        packet
+            Header and payload of a DATA packet.
+        page
+            Where to draw.
+
+        Raises
+        ------
+        Refusal
+            At the first fault, when the ops before it have been drawn.
+        """
+        operands = Operands(packet, self.grid.coordinate_size)
+        decoder = _Decoder(self, operands, page)
+        while (op := operands.op()) is not None:
+            draw = self.ops[op]
+            if draw is None:
+                raise operands.refusal(spec.CODE_OP, f"op {op:02X} is reserved or not announced")
+            draw(decoder, op & OPERAND)
 
 
 class _Decoder:
-    """Decoder of one packet: a place in the packet, a cursor and a pen."""
+    """Decoder of one packet: a cursor and a pen. A method for each op gets its low five bits."""
 
-    def __init__(self, packet: bytes, grid: Grid, pixel_format: PixelFormat, page: Page) -> None:
-        self._packet = packet
-        self._grid = grid
-        self._format = pixel_format
+    def __init__(self, device: Unpacker, operands: Operands, page: Page) -> None:
+        self._device = device
+        self._grid = device.grid
+        self._format = device.pixel_format
+        self._in = operands
         self._page = page
-        self._at = len(spec.LAYOUT_HEADER)  # its three fields have a byte each
-        self._op_at = self._at
         self._cursor = 0
-        self._pen = pixel_format.full
+        self._pen = device.pixel_format.full
 
-    def run(self) -> None:
-        packet = self._packet
-        while self._at < len(packet):
-            op = packet[self._at]
-            self._op_at = self._at
-            self._at += 1
-            kind, operand = op & ~_OPERAND, op & _OPERAND
-            if kind == spec.OP_STEP and operand <= spec.LIMIT_MAX_OCTANT:
-                self._walk(operand, *self._crumbs())
-            elif kind == spec.OP_FROM and operand <= spec.LIMIT_MAX_OCTANT:
-                target = self._coordinates()
-                crumbs = self._crumbs()
-                self._move(target)
-                self._walk(operand, *crumbs)
-            elif kind == spec.OP_SKIP:
-                self._cursor += self._room(self._count(operand))
-            elif kind == spec.OP_RUN:
-                self._write(self._pen * self._room(self._count(operand)))
-            elif kind == spec.OP_LIT:
-                self._literal(self._count(operand))
-            elif op == spec.OP_PEN:
-                self._dip()
-            elif op == spec.OP_MOVE:
-                self._move(self._coordinates())
-            elif op == spec.OP_END:
-                self._finish()
-            else:
-                raise self._refusal(spec.CODE_OP, f"op {op:02X} is reserved")
+    # Where it leads
 
-    def _refusal(self, code: int, text: str) -> Refusal:
-        return Refusal(code, self._op_at, text)
+    def _outside(self, text: str) -> Refusal:
+        return self._in.refusal(spec.CODE_OUTSIDE, text)
 
-    # Operands
+    def _check_cursor(self) -> None:
+        if self._cursor == self._grid.volume:
+            raise self._outside("the cursor is behind the last voxel")
 
-    def _take(self, size: int) -> bytes:
-        start = self._at
-        self._at += size
-        if self._at > len(self._packet):
-            raise self._refusal(spec.CODE_TRUNCATED, "the payload ends inside the op")
-        return self._packet[start : self._at]
-
-    def _coordinates(self) -> tuple[int, int, int]:
-        size = self._grid.coordinate_size
-        raw = self._take(3 * size)
-        x, y, z = (int.from_bytes(raw[k : k + size], "little") for k in range(0, 3 * size, size))
-        return x, y, z
-
-    def _count(self, operand: int) -> int:
-        """Return the count of a SKIP, RUN or LIT (7.2)."""
-        if operand < _OPERAND:
-            return operand + 1
-        count = 0
-        for k in range(_COUNT_BYTES):
-            byte = self._take(1)[0]
-            count |= (byte & 0x7F) << 7 * k
-            if byte < 0x80:
-                break
-        else:
-            raise self._refusal(spec.CODE_COUNT, "the count has more than 5 bytes")
-        if k and not byte:
-            raise self._refusal(spec.CODE_COUNT, "the count is not in its shortest form")
-        count += _OPERAND + 1
-        if count >= _COUNT_LIMIT:
-            raise self._refusal(spec.CODE_COUNT, "the count is 2^32 or more")
-        return count
-
-    def _crumbs(self) -> tuple[int, bytes]:
-        """Return the number of steps of a chain and the bytes of its crumbs (7.1)."""
-        count = self._take(1)[0] + 1
-        raw = self._take((count + 3) // 4)
-        if count % 4 and raw[-1] >> count % 4 * 2:
-            raise self._refusal(spec.CODE_PADDING, "unused crumbs are not 0")
-        return count, raw
+    def _check_place(self, place: tuple[int, int, int]) -> None:
+        if not self._grid.holds(*place):
+            raise self._outside("({}, {}, {})".format(*place))
 
     def _room(self, count: int) -> int:
         """Return a count, if so many voxels follow from the cursor on."""
         if count > self._grid.volume - self._cursor:
-            raise self._refusal(spec.CODE_OUTSIDE, f"{count} voxels from {self._cursor} on")
+            raise self._outside(f"{count} voxels from {self._cursor} on")
         return count
 
-    # Ops
+    # Cursor, pen and palette
 
-    def _finish(self) -> None:
-        rest = self._take(len(self._packet) - self._at)
+    def end(self, _: int) -> None:
+        rest = self._in.rest()
         if rest.count(0) < len(rest):
-            raise self._refusal(spec.CODE_PADDING, "bytes behind END are not 0")
+            raise self._in.refusal(spec.CODE_PADDING, "bytes behind END are not 0")
 
-    def _dip(self) -> None:
-        pixel = self._take(self._format.size)
-        if self._format.code == spec.FORMAT_MONO1 and pixel[0] > 1:
-            raise self._refusal(spec.CODE_PIXEL, "a pixel of MONO1 is 00 or 01")
+    def pen(self, _: int) -> None:
+        pixel = self._in.take(self._format.size)
+        if self._device.mono and pixel[0] > 1:
+            raise self._in.refusal(spec.CODE_PIXEL, "a pixel of MONO1 is 00 or 01")
         self._pen = pixel
 
-    def _move(self, target: tuple[int, int, int]) -> None:
-        index = self._grid.index(*target)
-        if index is None:
-            raise self._refusal(spec.CODE_OUTSIDE, "({}, {}, {})".format(*target))
-        self._cursor = index
+    def move(self, _: int) -> None:
+        place = self._in.place()
+        self._check_place(place)
+        self._cursor = self._grid.index(*place)
+
+    def colors(self, _: int) -> None:
+        first = self._in.byte()
+        count = self._in.byte() + 1
+        colors = self._in.take(3 * count)
+        if first + count > spec.LIMIT_MAX_COLORS:
+            raise self._outside(f"{count} colours from {first} on")
+        self._page.color(first, colors)
+
+    # Chains
+
+    def step(self, octant: int) -> None:
+        count = self._in.byte() + 1
+        self._walk(octant, count, self._in.small(count, 2))
+
+    def begin(self, octant: int) -> None:
+        place = self._in.place()
+        count = self._in.byte() + 1
+        crumbs = self._in.small(count, 2)
+        self._check_place(place)
+        self._cursor = self._grid.index(*place)
+        self._walk(octant, count, crumbs)
 
     def _walk(self, octant: int, count: int, raw: bytes) -> None:
-        self._room(1)
+        self._check_cursor()
         crumbs = int.from_bytes(raw, "little")
         every_other = (4**count - 1) // 3  # 0101...01, a one for each crumb
         moves = (
@@ -164,26 +149,112 @@ class _Decoder:
             (crumbs >> 1 & every_other).bit_count(),
         )
         if self._grid.leaves(self._cursor, octant, moves):
-            raise self._refusal(spec.CODE_OUTSIDE, "a step leaves the grid")
-        steps = self._grid.steps(octant)
+            raise self._outside("a step leaves the grid")
+        steps = self._device.steps[octant]
         path = b"".join([_CRUMBS[byte] for byte in raw])[:count]
-        indices = accumulate(map(steps.__getitem__, path), initial=self._cursor)
-        chain = array("Q", indices)
+        chain = array("Q", accumulate(map(steps.__getitem__, path), initial=self._cursor))
         self._page.plot(chain, self._pen)
         self._cursor = chain[-1]
 
-    def _literal(self, count: int) -> None:
-        if self._format.code == spec.FORMAT_MONO1:
-            raw = self._take((count + 7) // 8)
-            if count % 8 and raw[-1] >> count % 8:
-                raise self._refusal(spec.CODE_PADDING, "unused bits of the pixel run are not 0")
+    # Runs
+
+    def skip(self, operand: int) -> None:
+        self._cursor += self._room(self._in.count(operand))
+
+    def run(self, operand: int) -> None:
+        count = self._room(self._in.count(operand))
+        self._page.put(self._cursor, self._pen * count)
+        self._cursor += count
+
+    def literal(self, operand: int) -> None:
+        count = self._in.count(operand)
+        if self._device.mono:
+            raw = self._in.small(count, 1)
+            self._room(count)
             pixels = b"".join([_BITS[byte] for byte in raw])[:count]
         else:
-            pixels = self._take(count * self._format.size)
+            pixels = self._in.take(count * self._format.size)
+            self._room(count)
+        self._write(count, pixels)
+
+    def differences(self, operand: int) -> None:
+        count = self._in.count(operand)
+        raw = self._in.small(count, 4)
         self._room(count)
-        self._write(pixels)
+        steps = b"".join([_DIFFERENCES[byte] for byte in raw])[:count]
+        values = accumulate(steps, initial=self._pen[0])
+        self._write(count, bytes([value & 0xFF for value in values])[1:])
+
+    def _write(self, count: int, pixels: bytes) -> None:
+        self._page.put(self._cursor, pixels)
+        self._cursor += count
         self._pen = pixels[-self._format.size :]
 
-    def _write(self, pixels: bytes) -> None:
-        self._page.put(self._cursor, pixels)
-        self._cursor += len(pixels) // self._format.size
+    # Shapes
+
+    def line(self, _: int) -> None:
+        place = self._in.place()
+        self._check_cursor()
+        self._check_place(place)
+        self._page.plot(line(self._grid, self._cursor, place), self._pen)
+        self._cursor = self._grid.index(*place)
+
+    def box(self, _: int) -> None:
+        place = self._in.place()
+        self._check_cursor()
+        self._check_place(place)
+        for starts, count in box(self._grid, self._cursor, place):
+            self._page.fill(starts, count, self._pen)
+        self._cursor = self._grid.index(*place)
+
+    def dots(self, _: int) -> None:
+        x, y, z = self._in.places(self._in.byte() + 1)
+        self._check_place((max(x), max(y), max(z)))
+        _, row, plane = self._grid.strides
+        voxels = [i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)]
+        self._page.plot(array("Q", set(voxels)), self._pen)
+        self._cursor = voxels[-1]
+
+    def brick(self, level: int) -> None:
+        x, y, z = (axis << level for axis in self._in.place())
+        brick = Brick(level, self._in.take)
+        nx, ny, nz = self._grid.sides
+        if not brick.fits((nx - x, ny - y, nz - z)):
+            raise self._outside(f"a brick at ({x}, {y}, {z}) leaves the grid")
+        first = self._grid.index(x, y, z)
+        strides = self._device.brick_strides
+        for count, places in brick.rows:
+            voxels = array("Q", [first + strides[place] for place in places])
+            if count > 1:
+                self._page.fill(voxels, count, self._pen)
+            else:
+                self._page.plot(voxels, self._pen)
+
+
+_Op = Callable[[_Decoder, int], None]
+
+
+def _ops(features: int) -> list[_Op | None]:
+    """Return what draws each op byte; None where it is reserved or not announced."""
+    ops: list[_Op | None] = [None] * 256
+    last = OPERAND
+    for feature, op, low_bits, draw in (
+        (None, spec.OP_END, 0, _Decoder.end),
+        (None, spec.OP_PEN, 0, _Decoder.pen),
+        (None, spec.OP_MOVE, 0, _Decoder.move),
+        (spec.FEATURE_LINE, spec.OP_LINE, 0, _Decoder.line),
+        (spec.FEATURE_BOX, spec.OP_BOX, 0, _Decoder.box),
+        (spec.FEATURE_DOTS, spec.OP_DOTS, 0, _Decoder.dots),
+        (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _Decoder.colors),
+        (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _Decoder.step),
+        (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _Decoder.begin),
+        (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _Decoder.brick),
+        (None, spec.OP_SKIP, last, _Decoder.skip),
+        (None, spec.OP_RUN, last, _Decoder.run),
+        (None, spec.OP_LIT, last, _Decoder.literal),
+        (spec.FEATURE_DIFF, spec.OP_DIFF, last, _Decoder.differences),
+    ):
+        if feature is None or features >> feature & 1:
+            for low in range(low_bits + 1):
+                ops[op | low] = draw
+    return ops

@@ -1,13 +1,19 @@
 """A device on a line: its refresh ticks by a real clock, and the faults of the line.
 
-It knows nothing of what the line is made of.
+All that happens, happens in the order of its time, however seldom somebody looks. It knows nothing
+of what the line is made of.
 """
 
+import math
 import time
 from collections.abc import Callable
+from typing import Final
 
 from firmware_sim.device import Device
-from firmware_sim.faults import Line
+from firmware_sim.fault_kinds import Event
+from firmware_sim.faults import Line, Spec
+
+_BACKLOG: Final = 65_536  # with so many bytes on its way, a direction takes no more
 
 
 class Wire:
@@ -18,7 +24,7 @@ class Wire:
     device
         The device.
     faults
-        Faults of the line, both ways, as from `parse_faults`.
+        Faults of the line, as from `parse_faults`.
     seed
         Where their chance begins.
     clock
@@ -28,56 +34,119 @@ class Wire:
     ----------
     device : Device
         The device.
+
+    Raises
+    ------
+    ConnectionError
+        From every method but `disconnect`, once the pipe has ended.
     """
 
     def __init__(
         self,
         device: Device,
-        faults: tuple[tuple[str, float], ...] = (),
+        faults: tuple[Spec, ...] = (),
         seed: int = 0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.device = device
-        self._in = Line(faults, seed, "in")
-        self._out = Line(faults, seed, "out")
+        self._unplugged = False
+        self._down = Line(faults, seed, "down")
+        self._up = Line(faults, seed, "up")
         self._clock = clock
         self._epoch = clock()
         self._due: int | None = None  # number of the tick that a swap waits for
 
     def receive(self, data: bytes) -> None:
         """Carry bytes from the host to the device."""
-        self.advance()
-        self.device.receive(self._in.carry(data))
-        self.advance()
+        now = self._clock()
+        self._run(now)
+        self._down.send(now, data)
+        self._run(now)
 
     def transmit(self) -> bytes:
-        """Carry all that the device has to send to the host."""
+        """Carry to the host what the device has sent, or as much of it as comes together."""
+        now = self._clock()
+        self._run(now)
+        while self._up.due <= now:
+            come = self._up.take(now)
+            if isinstance(come, bytes):
+                self._settle(now)
+                return come
+            self._happen(come, now)
+        return b""
+
+    def takes(self) -> bool:
+        """Tell whether the line takes bytes from the host: not if it stands still and is full."""
         self.advance()
-        return self._out.carry(self.device.transmit())
+        return self._down.backlog < _BACKLOG
 
     def advance(self) -> None:
-        """Let the refresh ticks pass that have come due.
+        """Let all happen that has come due."""
+        self._run(self._clock())
+
+    def until_tick(self) -> float | None:
+        """Return the seconds until something happens; None if nothing is in sight.
+
+        That is a tick that swaps, or the arrival of bytes that the line has held back.
+        """
+        now = self._clock()
+        self._run(now)
+        up = self._up.due if self._up.due > now else math.inf  # what has come need not be awaited
+        at = min(self._tick_at(), self._down.due, up)
+        return at - now if at < math.inf else None
+
+    def disconnect(self) -> None:
+        """Break the connection: the session ends, and what is on its way is gone."""
+        self.device.disconnect()
+        self._down.connect()
+        self._up.connect()
+        self._due = None
+        self._unplugged = False
+
+    def _tick_at(self) -> float:
+        """Return when the tick comes that a swap waits for; infinity if none does.
 
         Only those that swap matter. They are counted from the start, so that none drifts.
         """
-        device = self.device
-        tick = int((self._clock() - self._epoch) * device.config.refresh / 1000)
         if self._due is None:
-            self._due = tick + 1  # at first, or when the frame has just become whole
-        while device.pending and self._due <= tick:
-            device.tick()
-            self._due += 1
-        if not device.pending:
+            return math.inf
+        return self._epoch + self._due * 1000 / self.device.config.refresh
+
+    def _run(self, now: float) -> None:
+        while True:
+            self._check_plug()
+            tick, comes = self._tick_at(), self._down.due
+            if min(tick, comes) > now:
+                return
+            if self._due is not None and tick <= comes:
+                self._due += 1
+                self.device.tick()
+                self._settle(tick)
+                continue
+            come = self._down.take(comes)
+            if isinstance(come, bytes):
+                self.device.receive(come)
+                self._settle(comes)
+            else:
+                self._happen(come, comes)
+
+    def _happen(self, event: Event, at: float) -> None:
+        if event is Event.REBOOT:
+            self.device.power_cycle()
+            self._settle(at)
+        elif event is Event.UNPLUG:
+            self._unplugged = True
+            self._check_plug()
+
+    def _check_plug(self) -> None:
+        if self._unplugged:
+            raise ConnectionError("the device is unplugged")
+
+    def _settle(self, at: float) -> None:
+        """Let the device send, and see whether a swap waits for a tick."""
+        while self._up.backlog < _BACKLOG and (data := self.device.transmit()):
+            self._up.send(at, data)
+        if not self.device.pending:
             self._due = None
-
-    def until_tick(self) -> float | None:
-        """Return the seconds until the next tick that swaps; None if none is in sight."""
-        self.advance()
-        if self._due is None:
-            return None
-        due = self._epoch + self._due * 1000 / self.device.config.refresh
-        return max(0.0, due - self._clock())
-
-    def disconnect(self) -> None:
-        """Break the connection: the session ends."""
-        self.device.disconnect()
+        elif self._due is None:  # the frame has just become whole
+            self._due = int((at - self._epoch) * self.device.config.refresh / 1000) + 1

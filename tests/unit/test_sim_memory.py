@@ -1,20 +1,26 @@
-"""Pages, the digest, and the ops that draw: sections 2, 7, 8 and 10."""
+"""Pages, palettes, the digest, and the ops that draw: sections 2, 7, 8 and 10."""
 
+import math
 import random
 from array import array
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import product
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_sim import spec
+from firmware_sim.config import Config
 from firmware_sim.digest import terms
 from firmware_sim.grid import Grid
-from firmware_sim.memory import FORMATS, Memory, Page
+from firmware_sim.memory import DEFAULT_PALETTE, FORMATS, Memory, Page
 from firmware_sim.pack import pack
 from firmware_sim.refusal import Refusal
-from firmware_sim.unpack import unpack
+from firmware_sim.unpack import Unpacker
 
+CLEAR = b"\x11\0\0"  # the header of a DATA packet
 GRIDS = [(3, 5, 7), (17, 64, 40), (300, 4, 3), (1, 1, 1), (256, 2, 2)]
 
 
@@ -28,9 +34,26 @@ def mix(index: int, value: int) -> int:
     return h ^ h >> 15
 
 
-def digest(pixels: bytes, size: int) -> int:
+def digest(pixels: bytes, size: int, palette: bytes = DEFAULT_PALETTE) -> int:
     values = [int.from_bytes(pixels[i : i + size], "little") for i in range(0, len(pixels), size)]
-    return sum(mix(index, value) for index, value in enumerate(values) if value) % 2**32
+    total = sum(mix(index, value) for index, value in enumerate(values) if value)
+    for i in range(256):
+        red, green, blue = palette[3 * i : 3 * i + 3]
+        if bytes((red, green, blue)) != default_color(i):
+            total += mix(len(values) + i, 0x1000000 + red + 256 * green + 65536 * blue)
+    return total % 2**32
+
+
+def default_color(i: int) -> bytes:
+    """Sections 2.1 and 8, word for word."""
+    values = (Fraction(i >> 5, 7), Fraction((i >> 2) & 7, 7), Fraction(i & 3, 3))
+    return bytes(math.floor(255 * value + Fraction(1, 2)) for value in values)
+
+
+def unpack(ops: bytes, grid: Grid, name: str, page: Page, features: int | None = None) -> None:
+    """Draw ops as a device with all features does, if not told otherwise."""
+    bits = Config(grid.sides, name).feature_bits if features is None else features
+    Unpacker(grid, FORMATS[name], bits).draw(CLEAR + ops, page)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
@@ -62,20 +85,53 @@ def test_the_digest_is_kept_at_every_write(data: st.DataObject) -> None:
     page = Page(60, size)
     expected = bytearray(60 * size)
     pixel = st.one_of(st.just(bytes(size)), st.binary(min_size=size, max_size=size))
+    palette = bytearray(DEFAULT_PALETTE)
     for _ in range(data.draw(st.integers(1, 6))):
-        if data.draw(st.booleans()):
+        what = data.draw(st.sampled_from(("put", "plot", "fill", "color")))
+        if what == "put":
             start = data.draw(st.integers(0, 59))
             run = b"".join(data.draw(st.lists(pixel, min_size=1, max_size=60 - start)))
             page.put(start, run)
             expected[start * size : start * size + len(run)] = run
+        elif what == "color":
+            first = data.draw(st.integers(0, 255))
+            shades = st.sampled_from((default_color(first), b"abc", b"\xff\0\0"))
+            colors = b"".join(data.draw(st.lists(shades, min_size=1, max_size=256 - first)))
+            page.color(first, colors)
+            palette[3 * first : 3 * first + len(colors)] = colors
         else:
-            indices = data.draw(st.sets(st.integers(0, 59), min_size=1))
+            count = data.draw(st.integers(1, 3)) if what == "fill" else 1
+            starts = data.draw(st.sets(st.integers(0, 60 - count), min_size=1))
             pen = data.draw(pixel)
-            page.plot(array("Q", indices), pen)
-            for i in indices:
-                expected[i * size : i * size + size] = pen
+            if what == "fill":
+                page.fill(sorted(starts), count, pen)
+            else:
+                page.plot(array("Q", starts), pen)
+            for i in starts:
+                expected[i * size : (i + count) * size] = pen * count
         assert page.pixels == expected
-        assert page.digest == digest(expected, size)
+        assert page.palette == palette
+        if data.draw(st.booleans()):
+            assert page.digest == digest(expected, size, palette)
+    assert page.digest == digest(expected, size, palette)
+
+
+def test_the_digest_catches_up_with_many_writes() -> None:
+    rng = random.Random(9)
+    page = Page(9000, 2)
+    for _ in range(300):
+        page.put(rng.randrange(8000), rng.randbytes(2) * rng.choice((1, 100, 255, 256, 1000)))
+    assert page.digest == digest(page.pixels, 2)
+
+
+def test_the_default_palette() -> None:
+    """Floor(255 * value + 1/2)."""
+    assert b"".join(map(default_color, range(256))) == DEFAULT_PALETTE
+    page = Page(8, 1)
+    page.color(7, b"\x01\x02\x03" + DEFAULT_PALETTE[24:27])
+    assert page.digest == mix(8 + 7, 0x1030201)
+    page.color(0, DEFAULT_PALETTE)
+    assert page.digest == 0
 
 
 def test_pages_are_cleared_copied_and_exchanged() -> None:
@@ -87,8 +143,14 @@ def test_pages_are_cleared_copied_and_exchanged() -> None:
     assert memory.back.digest == memory.front.digest == mix(4, 0x2211)
     memory.back.put(5, b"\x11\x22")
     assert memory.front.digest == mix(4, 0x2211)
+    memory.back.color(1, b"abc")
+    memory.swap()
+    memory.begin(dark=False)
+    assert memory.back.palette == memory.front.palette != DEFAULT_PALETTE
+    assert memory.back.digest == memory.front.digest
     memory.begin(dark=True)
     assert not any(memory.back.pixels)
+    assert memory.back.palette == DEFAULT_PALETTE
     assert memory.back.digest == 0
 
 
@@ -104,6 +166,7 @@ class Plain:
         self.size = FORMATS[name].size
         self.mono = name == "mono1"
         self.voxels = {}
+        self.palette = bytearray(DEFAULT_PALETTE)
         self.pen = 1 if self.mono else 256**self.size - 1
         self.cursor = 0
 
@@ -128,6 +191,35 @@ class Plain:
             self.cursor = place[0] + nx * (place[1] + ny * place[2])
             self.voxels[self.cursor] = self.pen
 
+    def at(self, index: int) -> tuple[int, int, int]:
+        nx, ny, _ = self.grid
+        return index % nx, index // nx % ny, index // nx // ny
+
+    def index(self, place: Sequence[int]) -> int:
+        x, y, z = place
+        assert all(0 <= a < side for a, side in zip(place, self.grid, strict=True))
+        return x + self.grid[0] * (y + self.grid[1] * z)
+
+    def line(self, target: tuple[int, int, int]) -> None:
+        p = self.at(self.cursor)
+        d = [b - a for a, b in zip(p, target, strict=True)]
+        length = max(map(abs, d))
+        for k in range(length + 1):
+            voxel = [
+                a + math.floor(Fraction(2 * k * da + length, 2 * length)) if length else a
+                for a, da in zip(p, d, strict=True)
+            ]
+            self.voxels[self.index(voxel)] = self.pen
+        self.cursor = self.index(target)
+
+    def box(self, target: tuple[int, int, int]) -> None:
+        (x, u), (y, v), (z, w) = (
+            sorted(pair) for pair in zip(self.at(self.cursor), target, strict=True)
+        )
+        for k, j, i in product(range(z, w + 1), range(y, v + 1), range(x, u + 1)):
+            self.voxels[self.index((i, j, k))] = self.pen
+        self.cursor = self.index(target)
+
     def pixels(self) -> bytes:
         return b"".join(
             self.voxels.get(i, 0).to_bytes(self.size, "little") for i in range(self.volume)
@@ -146,14 +238,29 @@ def leb(op: int, count: int) -> bytes:
             return bytes(out)
 
 
-def random_ops(rng: random.Random, plain: Plain) -> bytes:
+def random_ops(rng: random.Random, plain: Plain, name: str) -> bytes:
     """Draw at random, with a plain decoder beside; return the ops."""
     out = b""
     for _ in range(rng.randrange(1, 12)):
         room = plain.volume - plain.cursor
         count = min(rng.choice((1, rng.randrange(1, 40), 32, 160)), room)
-        kind = rng.choice(("pen", "move", "step", "from", "skip", "run", "lit"))
-        if kind == "pen":
+        kinds = ["pen", "move", "step", "from", "skip", "run", "lit", "line", "box", "dots", "oct"]
+        kind = rng.choice(kinds + ["diff", "colors"] * (name == "index8"))
+        if kind == "colors":
+            first = rng.randrange(256)
+            colors = rng.randbytes(3 * rng.randrange(1, min(5, 257 - first)))
+            plain.palette[3 * first : 3 * first + len(colors)] = colors
+            out += bytes((6, first, len(colors) // 3 - 1)) + colors
+        elif kind == "dots":
+            places = [random_dot(rng, plain) for _ in range(rng.choice((1, 2, 256)))]
+            out += bytes((5, len(places) - 1)) + b"".join(places)
+        elif kind == "oct":
+            out += random_brick(rng, plain)
+        elif kind in ("line", "box") and count:
+            target = plain.at(rng.randrange(plain.volume))
+            (plain.line if kind == "line" else plain.box)(target)
+            out += bytes((3 if kind == "line" else 4,)) + coordinates(plain, target)
+        elif kind == "pen":
             plain.pen = random_pixel(rng, plain)
             out += b"\x01" + plain.pen.to_bytes(plain.size, "little")
         elif not count or kind in ("move", "from"):
@@ -173,10 +280,54 @@ def random_pixel(rng: random.Random, plain: Plain) -> int:
 
 
 def random_place(rng: random.Random, plain: Plain) -> bytes:
-    x, y, z = (rng.randrange(side) for side in plain.grid)
-    plain.cursor = x + plain.grid[0] * (y + plain.grid[1] * z)
+    plain.cursor = rng.randrange(plain.volume)
+    return coordinates(plain, plain.at(plain.cursor))
+
+
+def random_dot(rng: random.Random, plain: Plain) -> bytes:
+    place = random_place(rng, plain)
+    plain.voxels[plain.cursor] = plain.pen
+    return place
+
+
+def coordinates(plain: Plain, place: Sequence[int]) -> bytes:
     width = 1 if max(plain.grid) <= 256 else 2
-    return b"".join(axis.to_bytes(width, "little") for axis in (x, y, z))
+    return b"".join(axis.to_bytes(width, "little") for axis in place)
+
+
+def random_brick(rng: random.Random, plain: Plain) -> bytes:
+    """Section 7.4, node by node, along one voxel at least that is on the grid."""
+    level = rng.randrange(5)
+    seed = plain.at(rng.randrange(plain.volume))
+    origin = [axis >> level << level for axis in seed]
+    out = bytes((0x60 | level,)) + coordinates(plain, [axis >> level for axis in seed])
+    nodes = [origin]
+    chance = rng.random()
+    for j in range(level, 0, -1):
+        half = 1 << j - 1
+        following = []
+        for node in nodes:
+            end = [a + 2 * half <= side for a, side in zip(node, plain.grid, strict=True)]
+            if all(end) and rng.random() < 0.2:
+                out += b"\0"
+                for k, b, a in product(range(2 * half), repeat=3):
+                    plain.voxels[plain.index((node[0] + a, node[1] + b, node[2] + k))] = plain.pen
+                continue
+            children = []
+            for c in range(8):
+                child = [a + half * (c >> k & 1) for k, a in enumerate(node)]
+                seeded = all(a <= s < a + half for a, s in zip(child, seed, strict=True))
+                on_grid = all(a < side for a, side in zip(child, plain.grid, strict=True))
+                if on_grid and (seeded or rng.random() < chance):
+                    children.append((c, child))
+            if not children:  # the node's first child is on the grid, for the node is
+                children = [(0, node)]
+            out += bytes((sum(1 << c for c, _ in children),))
+            following += [child for _, child in children]
+        nodes = following
+    for voxel in nodes:
+        plain.voxels[plain.index(voxel)] = plain.pen
+    return out
 
 
 def random_run(rng: random.Random, plain: Plain, kind: str, count: int) -> bytes:
@@ -187,6 +338,13 @@ def random_run(rng: random.Random, plain: Plain, kind: str, count: int) -> bytes
         for _ in range(count):
             plain.write()
         return leb(0xA0, count)
+    if kind == "diff":
+        steps = [rng.randrange(-8, 8) for _ in range(count)]
+        for step in steps:
+            plain.pen = (plain.pen + step) % 256
+            plain.write()
+        nibbles = sum((step & 15) << 4 * k for k, step in enumerate(steps))
+        return leb(0xE0, count) + nibbles.to_bytes((count + 1) // 2, "little")
     values = [random_pixel(rng, plain) for _ in range(count)]
     for plain.pen in values:
         plain.write()
@@ -224,20 +382,21 @@ def random_chain(rng: random.Random, plain: Plain) -> tuple[int, bytes] | None:
 def test_ops_draw_what_the_plainest_decoder_draws(name: str, sides: tuple[int, int, int]) -> None:
     rng = random.Random(f"{name} {sides}")
     grid = Grid(*sides)
-    for _ in range(60 if grid.volume < 10_000 else 4):
+    for _ in range(60 if grid.volume < 10_000 else 8):
         plain = Plain(sides, name)
-        ops = random_ops(rng, plain)
+        ops = random_ops(rng, plain, name)
         page = Page(grid.volume, FORMATS[name].size)
-        unpack(b"\x11\0\0" + ops, grid, FORMATS[name], page)
+        unpack(ops, grid, name, page)
         assert page.pixels == plain.pixels()
-        assert page.digest == digest(page.pixels, page.pixel_size)
+        assert page.palette == plain.palette
+        assert page.digest == digest(page.pixels, page.pixel_size, page.palette)
 
 
 def test_a_chain_of_256_steps() -> None:
     plain = Plain((300, 4, 3), "rgb888")
     plain.chain(0, [0] * 256)
     page = Page(3600, 3)
-    unpack(b"\x11\0\0\x20\xff" + bytes(64), Grid(300, 4, 3), FORMATS["rgb888"], page)
+    unpack(b"\x20\xff" + bytes(64), Grid(300, 4, 3), "rgb888", page)
     assert page.pixels == plain.pixels()
 
 
@@ -247,8 +406,8 @@ OP, COUNT, TRUNCATED, PADDING, PIXEL, OUTSIDE = range(7, 13)
 @pytest.mark.parametrize(
     ("name", "ops", "code", "offset"),
     [
-        *(("index8", f"a0 {op:02x}", OP, 4) for op in (*range(3, 32), *range(0x60, 0x80))),
-        *(("index8", f"{op:02x}", OP, 3) for op in range(0xE0, 0x100)),
+        *(("index8", f"a0 {op:02x}", OP, 4) for op in (*range(7, 32), *range(0x65, 0x80))),
+        *(("rgb565", f"{op:02x}", OP, 3) for op in (6, *range(0xE0, 0x100))),
         *(("index8", f"{op:02x} 00 00 00 00 00", OP, 3) for op in (*range(0x38, 0x40), 0x58, 0x5F)),
         ("index8", "9f 80 00", COUNT, 3),
         ("index8", "bf 80 80 00", COUNT, 3),
@@ -292,6 +451,38 @@ OP, COUNT, TRUNCATED, PADDING, PIXEL, OUTSIDE = range(7, 13)
         ("index8", "9f 4a", OUTSIDE, 3),
         ("index8", "bf 4a", OUTSIDE, 3),
         ("index8", "9f 48 c1 01 01", OUTSIDE, 5),
+        ("index8", "a0 03 02 04", TRUNCATED, 4),
+        ("index8", "a0 04 02 04", TRUNCATED, 4),
+        ("index8", "a0 05", TRUNCATED, 4),
+        ("index8", "a0 05 01 03 00 00 09 09", TRUNCATED, 4),
+        ("index8", "a0 06 00", TRUNCATED, 4),
+        ("index8", "06 ff 01 00 00 00 00 00", TRUNCATED, 3),
+        ("index8", "60 02 04", TRUNCATED, 3),
+        ("index8", "62 00 00 00 03 01", TRUNCATED, 3),
+        ("index8", "62 09 09 09 03 01", TRUNCATED, 3),
+        ("index8", "ff 80 00", COUNT, 3),
+        ("index8", "ff 80 80", TRUNCATED, 3),
+        ("index8", "9f 49 e2 00 f0", PADDING, 5),
+        ("index8", "9f 49 e2 00 00", OUTSIDE, 5),
+        ("index8", "03 03 00 00", OUTSIDE, 3),
+        ("index8", "03 00 05 00", OUTSIDE, 3),
+        ("index8", "03 00 00 07", OUTSIDE, 3),
+        ("index8", "04 00 05 00", OUTSIDE, 3),
+        ("index8", "9f 49 03 02 04 06", OUTSIDE, 5),
+        ("index8", "9f 49 04 02 04 06", OUTSIDE, 5),
+        ("index8", "05 01 00 00 00 03 00 00", OUTSIDE, 3),
+        ("index8", "05 01 00 05 00 00 00 00", OUTSIDE, 3),
+        ("index8", "05 00 00 00 07", OUTSIDE, 3),
+        ("index8", "06 ff 01 00 00 00 00 00 00", OUTSIDE, 3),
+        ("index8", "06 01 ff" + " 00" * 768, OUTSIDE, 3),
+        ("index8", "60 03 00 00", OUTSIDE, 3),
+        ("index8", "61 01 00 00 02", OUTSIDE, 3),
+        ("index8", "61 00 02 00 04", OUTSIDE, 3),
+        ("index8", "61 00 00 03 10", OUTSIDE, 3),
+        ("index8", "61 01 00 00 00", OUTSIDE, 3),
+        ("index8", "62 00 00 00 00", OUTSIDE, 3),
+        ("index8", "a0 62 00 01 01 01 04", OUTSIDE, 4),
+        ("index8", "64 ff ff ff 01 01 01 01", OUTSIDE, 3),
     ],
 )
 def test_the_first_fault_is_refused(name: str, ops: str, code: int, offset: int) -> None:
@@ -299,11 +490,76 @@ def test_the_first_fault_is_refused(name: str, ops: str, code: int, offset: int)
     grid, pixel_format = Grid(3, 5, 7), FORMATS[name]
     page = Page(grid.volume, pixel_format.size)
     with pytest.raises(Refusal) as refusal:
-        unpack(b"\x11\0\0" + bytes.fromhex(ops), grid, pixel_format, page)
+        unpack(bytes.fromhex(ops), grid, name, page)
     assert (refusal.value.code, refusal.value.offset) == (code, offset)
     assert len(refusal.value.text.encode()) <= 59
     assert len(page.pixels) == grid.volume * pixel_format.size
     assert page.digest == digest(page.pixels, page.pixel_size)
+
+
+@pytest.mark.parametrize(
+    ("feature", "ops"),
+    [
+        ("line", "03 01 02 03"),
+        ("box", "04 01 02 03"),
+        ("dots", "05 00 01 02 03"),
+        ("palette", "06 00 00 01 02 03"),
+        *(("oct", f"6{level} 00 00 00 01 01 01 01"[: 11 + 3 * level]) for level in range(3)),
+        *(("diff", f"{op:02x}" + " 00" * 16) for op in range(0xE0, 0xFF)),
+    ],
+)
+def test_ops_of_features_are_reserved_if_not_announced(feature: str, ops: str) -> None:
+    """So is every op of a feature that the device has not announced."""
+    grid = Grid(4, 5, 7)
+    config = Config(grid.sides, "index8", features=frozenset({feature}))
+    others = Config(grid.sides, "index8").feature_bits & ~config.feature_bits
+    page = Page(grid.volume, 1)
+    unpack(bytes.fromhex(ops), grid, "index8", page, config.feature_bits)
+    with pytest.raises(Refusal) as refusal:
+        unpack(bytes.fromhex("a0" + ops), grid, "index8", page, others)
+    assert (refusal.value.code, refusal.value.offset) == (OP, 4)
+
+
+def test_a_line_goes_up_from_the_middle_and_back_over_the_same_voxels() -> None:
+    """The line from q to p has the same voxels."""
+    rng = random.Random(2)
+    sides = (17, 23, 9)
+    for _ in range(200):
+        plain = Plain(sides, "mono1")
+        p, q = (plain.at(rng.randrange(plain.volume)) for _ in range(2))
+        pictures = []
+        for start, end in ((p, q), (q, p)):
+            page = Page(plain.volume, 1)
+            ops = bytes((2, *start, 3, *end))
+            unpack(ops, Grid(*sides), "mono1", page)
+            pictures.append(page.pixels)
+        plain.cursor = plain.index(p)
+        plain.line(q)
+        assert pictures == [plain.pixels()] * 2
+
+
+def test_a_box_may_be_flat_or_thin_on_every_axis() -> None:
+    sides = (5, 4, 6)
+    for p in product((0, 1, 3), (0, 3), (0, 2, 5)):
+        for q in product((0, 4), (0, 1, 3), (0, 5)):
+            plain = Plain(sides, "index8")
+            plain.cursor = plain.index(p)
+            plain.box(q)
+            page = Page(plain.volume, 1)
+            unpack(bytes((2, *p, 4, *q)), Grid(*sides), "index8", page)
+            assert page.pixels == plain.pixels()
+
+
+def test_a_full_brick_and_all_its_masks_are_the_same() -> None:
+    sides = (20, 18, 33)
+    pictures = []
+    for masks in (b"\0", b"\xff" + bytes(8), b"\xff" * 9 + bytes(64), b"\xff" * 585):
+        page = Page(Grid(*sides).volume, 3)
+        unpack(b"\x64\0\0\1" + masks, Grid(*sides), "rgb888", page)
+        assert page.digest == digest(page.pixels, 3)
+        pictures.append(page.pixels)
+    assert pictures[1:] == pictures[:1] * 3
+    assert pictures[0].count(255) == 3 * 4096
 
 
 @given(st.binary(max_size=80), st.sampled_from(sorted(FORMATS)), st.sampled_from(GRIDS))
@@ -314,7 +570,7 @@ def test_no_ops_write_outside_the_page(ops: bytes, name: str, sides: tuple[int, 
     page = Page(grid.volume, pixel_format.size)
     refusal = None
     try:
-        unpack(b"\x11\0\0" + ops, grid, pixel_format, page)
+        unpack(ops, grid, name, page)
     except Refusal as raised:
         refusal = raised
     assert refusal is None or OP <= refusal.code <= OUTSIDE
@@ -322,8 +578,9 @@ def test_no_ops_write_outside_the_page(ops: bytes, name: str, sides: tuple[int, 
     assert len(page.pixels) == grid.volume * pixel_format.size
     if name == "mono1":
         assert max(page.pixels) <= 1
+    assert len(page.palette) == 768
     if grid.volume < 5000:
-        assert page.digest == digest(page.pixels, page.pixel_size)
+        assert page.digest == digest(page.pixels, page.pixel_size, page.palette)
 
 
 # PAGE
@@ -361,7 +618,7 @@ def test_a_page_unpacks_to_what_was_packed(name: str, data: st.DataObject) -> No
     assert covered == count or len(ops) > room - 12
     back = Page(covered, size)
     if covered <= 256 * 256:
-        unpack(b"\x11\0\0" + ops, Grid(covered, 1, 1), pixel_format, back)
+        unpack(ops, Grid(covered, 1, 1), name, back, features=0)
     assert back.pixels == pixels[start * size : (start + covered) * size]
 
 
