@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 
+import document
 import numpy as np
 import pytest
 from conftest import ROOT
@@ -43,7 +44,7 @@ def test_the_port_may_come_from_the_environment(run):
     facts = json.loads(pushed.stdout)
     assert facts["size"] == [3, 5, 7]
     assert facts["format"] == "index8"
-    assert facts["features"] == ["read", "digest"]
+    assert {"read", "digest", "palette"} <= set(facts["features"])
     assert pushed.stderr == ""
 
 
@@ -172,3 +173,23 @@ def test_a_reader_that_has_enough_is_no_error():
     assert piped.stdout == "object,x,y,z\n"
     assert piped.stderr == ""
     assert piped.returncode == 0
+
+
+def test_a_capture_has_every_byte_of_both_directions(run, tmp_path):
+    file = tmp_path / "capture.jsonl"
+    pushed = run("push", PAPER, "--port", "sim:", "--json", "--capture", file)
+    head, *portions = map(json.loads, file.read_text().splitlines())
+    assert head == {"voxdisplay_capture": 1, "port": "sim:"}
+    assert [portion["s"] for portion in portions] == sorted(portion["s"] for portion in portions)
+    sent = b"".join(bytes.fromhex(p["hex"]) for p in portions if p["to"] == "device")
+    heard = b"".join(bytes.fromhex(p["hex"]) for p in portions if p["to"] == "host")
+    kinds = [body[0] >> 4 for body in document.off_wire(sent.lstrip(b"\0"))]
+    assert kinds == [3, 1]
+    assert document.off_wire(heard.lstrip(b"\0"))[0][0] == 0x90
+    assert len(sent) >= json.loads(pushed.stdout)["wire_bytes"]
+
+
+def test_a_capture_that_cannot_be_written_is_said_before_anything_is_sent(run, tmp_path):
+    pushed = run("push", PAPER, "--port", "sim:", "--capture", tmp_path / "no" / "capture.jsonl")
+    assert pushed.returncode == 2
+    assert "No such file" in pushed.stderr

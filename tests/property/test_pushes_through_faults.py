@@ -73,7 +73,9 @@ class Line:
 
 def faults_of(rng):
     kinds = rng.sample(sorted(FAULTS), rng.choice([1, 1, 2, 3]))
-    return ",".join(f"{rng.choice(['', '', 'down.', 'up.'])}{k}={rng.choice(FAULTS[k])}" for k in kinds)
+    return ",".join(
+        f"{rng.choice(['', '', 'down.', 'up.'])}{k}={rng.choice(FAULTS[k])}" for k in kinds
+    )
 
 
 def random_frame(rng, display):

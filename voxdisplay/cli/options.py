@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TextIO, TypeVar
 
 import click
 
 import voxdisplay as vd
+from voxdisplay.transport import open_transport
+from voxdisplay.transport.capture import Capture
 from voxdisplay.transport.discovery import all_ports
 
 _C = TypeVar("_C", bound=Callable[..., Any])
@@ -57,12 +59,25 @@ def port_options(function: _C) -> _C:
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
-def open_display(port: str | None, baud: int, timeout_s: float) -> vd.Display:
+capture_option = click.option(
+    "--capture",
+    type=click.File("w", encoding="utf-8", lazy=False),
+    metavar="FILE",
+    help="Write all bytes to and from the device to FILE, with times: see tools/annotate.py.",
+)
+
+
+def open_display(
+    port: str | None, baud: int, timeout_s: float, capture: TextIO | None = None
+) -> vd.Display:
     """Open what ``--port`` names, or the emulator, and say so."""
     if not port:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
-    return vd.open(port, baud=baud, timeout_s=timeout_s)
+    if capture is None:
+        return vd.open(port, baud=baud, timeout_s=timeout_s)
+    pipe = Capture(open_transport(port, baud=baud), capture)
+    return vd.open(pipe, timeout_s=timeout_s)
 
 
 def note(text: str) -> None:

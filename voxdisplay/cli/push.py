@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from typing import Literal
+from typing import Literal, TextIO
 
 import click
 
 import voxdisplay as vd
 from voxdisplay.cli.options import (
+    capture_option,
     device_json,
     json_option,
     note,
@@ -41,6 +42,7 @@ from voxdisplay.cli.scenes import voxelize_scene
     "and clip.",
 )
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
+@capture_option
 @json_option
 def push(
     *,
@@ -50,6 +52,7 @@ def push(
     timeout_s: float,
     fit: Literal["contain", "none"],
     verify: bool,
+    capture: TextIO | None,
     as_json: bool,
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
@@ -57,7 +60,7 @@ def push(
     Waits until the device has shown it and its digest agrees.
     """
     loaded = vd.load_scene(scene)
-    with open_display(port, baud, timeout_s) as display:
+    with open_display(port, baud, timeout_s, capture) as display:
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
