@@ -1,0 +1,448 @@
+"""What protocol.md demands of both ends of a line, checked on a capture of the host's end.
+
+A `Monitor` sees packets in the order in which the host wrote and read them, and says of each what it
+does and which rules it breaks. What the host sent may have been lost: only what the device has said
+since is certain. It keeps a model of the device's pages, so that a digest or a PAGE that is wrong is
+found. Knows no file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from voxdisplay.conformance import packets
+from voxdisplay.conformance.decoder import Decoder, Refused
+from voxdisplay.conformance.page import Page
+from voxdisplay.conformance.said import Said
+from voxdisplay.wire import spec
+
+HOST, DEVICE = "host", "device"
+_OPS = {
+    spec.OP_END: "END",
+    spec.OP_PEN: "PEN",
+    spec.OP_MOVE: "MOVE",
+    spec.OP_LINE: "LINE",
+    spec.OP_BOX: "BOX",
+    spec.OP_DOTS: "DOTS",
+    spec.OP_COLORS: "COLORS",
+    spec.OP_ARC: "ARC",
+    spec.OP_STEP: "STEP",
+    spec.OP_FROM: "FROM",
+    spec.OP_OCT: "OCT",
+    spec.OP_SKIP: "SKIP",
+    spec.OP_RUN: "RUN",
+    spec.OP_LIT: "LIT",
+    spec.OP_DIFF: "DIFF",
+}
+_FROM_HOST = {spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ}
+_PAGE_OPS = {spec.OP_END, spec.OP_PEN, spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT}
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something to say of a packet; with a section of protocol.md, if it breaks that."""
+
+    text: str
+    section: str = ""
+
+
+def op_name(op: int) -> str:
+    """Give the name of an op byte."""
+    return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
+
+
+class _Reader(Decoder):
+    """The plain decoder, which notes each op as it draws."""
+
+    def __init__(self, said: Said, page: Page) -> None:
+        super().__init__(said, page)
+        self.notes: list[Note] = []
+        self.written: dict[int, int] = {}
+        self.used: set[int] = set()
+        self._drawn = 0
+
+    def _op(self, op: int) -> None:
+        at, pen, self._drawn = self._op_at, self.pen, 0
+        super()._op(op)
+        self.used.add(op if op in _OPS else op & 0xE0)
+        self.notes.append(Note(f"{at + packets.HEADER_BYTES:>5}  {self._said_of(op, at, pen)}"))
+
+    def _said_of(self, op: int, at: int, pen: int) -> str:
+        operands = self._payload[at + 1 : self._at]
+        words = [f"{op_name(op):6}"]
+        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op != spec.OP_ARC:
+            main, signs = self.axes_of(op & 0x1F)
+            words.append("".join("-+"[sign > 0] + "xyz"[axis] for axis, sign in enumerate(signs)))
+            words.append(f"by {'xyz'[main]},")
+        elif op & 0xE0 == spec.OP_OCT:
+            words.append(f"side {1 << (op & 0x1F)},")
+        if op in {spec.OP_PEN, spec.OP_COLORS}:
+            words.append(operands[:16].hex(" ") + (" ..." if len(operands) > 16 else ""))
+        if self._drawn:
+            words.append(f"{self._drawn} voxels,")
+        if self.pen != pen and op != spec.OP_PEN:
+            words.append(f"pen {self.pen:X}h,")
+        if op != spec.OP_END:
+            words.append(f"cursor {self._cursor_place()}")
+        return " ".join(words)
+
+    def _cursor_place(self) -> str:
+        if self.cursor >= self.said.voxels:
+            return "behind the end"
+        return "({}, {}, {})".format(*self.said.place(self.cursor))
+
+    def count(self, index: int, value: int) -> None:
+        """Note a voxel that is written."""
+        self.written[index] = value
+        self._drawn += 1
+
+
+class _Watched(Page):
+    """A page that tells its reader what is written."""
+
+    def __init__(self, page: Page) -> None:
+        super().__init__(page.pixels, page.palette)
+        self.reader: _Reader | None = None
+
+    def write(self, index: int, value: int) -> None:
+        super().write(index, value)
+        if self.reader:
+            self.reader.count(index, value)
+
+
+@dataclass
+class _Frame:
+    """A frame that the host has begun: its packets by number, and what each writes."""
+
+    number: int
+    clear: bool
+    payloads: dict[int, bytes] = field(default_factory=dict)
+    written: dict[int, tuple[int, int]] = field(default_factory=dict)  # index -> (value, seq)
+    commit: int | None = None
+
+
+@dataclass
+class _Session:
+    """What has been said since a HELLO."""
+
+    number: int
+    next: int = 0
+    ahead: int = 0  # the next number that was never sent
+    sent: dict[int, bytes] = field(default_factory=dict)
+    ends: dict[tuple[str, int], int] = field(default_factory=dict)  # what `last` may name
+    credit_until: int = 0
+    frames: list[_Frame] = field(default_factory=list)
+    asked: list[int] = field(default_factory=list)
+    reads: dict[int, tuple[int, int, bool]] = field(default_factory=dict)
+    newest: int = -1  # frame number, not modulo 256
+    shown: int = -1
+
+
+class Monitor:
+    """Both ends of one line."""
+
+    def __init__(self) -> None:
+        self.said: Said | None = None
+        self._session: _Session | None = None
+        self._greeting: int | None = None
+        self._delimited = {HOST: False, DEVICE: False}
+        self._position = 0  # bytes that the host has sent
+        self._hellos: list[int] = []  # where each HELLO of the greeting ended
+        self._front: Page | None = None  # None: nobody knows
+        self._notes: list[Note] = []
+
+    # -- what comes
+
+    def delimiter(self, to: str) -> None:
+        """Take a 00 that ends nothing."""
+        self._delimited[to] = True
+
+    def noise(self, to: str, data: bytes) -> list[Note]:
+        """Take what is no packet."""
+        self._delimited[to] = True
+        if to == DEVICE:
+            self._position += len(data) + 1
+            return [Note("the host sends what is no packet", "3")]
+        return []
+
+    def packet(self, to: str, body: bytes, size: int) -> list[Note]:
+        """Take a packet of so many bytes on the wire; give what is to be said of it."""
+        self._notes = []
+        if to == DEVICE:
+            self._position += size
+            self._sent(body)
+            self._delimited[to] = True
+        else:
+            self._heard(body)
+        return self._notes
+
+    def _note(self, text: str, section: str = "") -> None:
+        self._notes.append(Note(text, section))
+
+    # -- what the host sends
+
+    def _sent(self, body: bytes) -> None:
+        kind, flags, seq, frame = body[0] >> 4, body[0] & 15, body[1], body[2]
+        if kind not in _FROM_HOST:
+            self._note(f"a host sends no packet of type {kind}", "4")
+            return
+        if kind == spec.TYPE_HELLO:
+            self._hello(body)
+            return
+        session = self._session
+        if session is None or self.said is None:
+            self._note("no session is open", "5")
+            return
+        if len(body) - packets.HEADER_BYTES > self.said.max_payload:
+            self._note(f"a payload of more than {self.said.max_payload} bytes", "4")
+        room = session.credit_until - self._position
+        reserve = 0 if kind == spec.TYPE_STATUS else spec.LIMIT_RESERVE
+        if room < reserve:
+            self._note(f"credit is exceeded by {reserve - room} bytes", "9.2")
+        if kind == spec.TYPE_DATA:
+            self._data(session, body, flags, seq, frame)
+        elif kind == spec.TYPE_STATUS:
+            self._status(session, body, flags, seq, frame)
+        else:
+            self._read(session, body, flags, seq, frame)
+
+    def _hello(self, body: bytes) -> None:
+        answer = packets.HEADER_BYTES + 3
+        if len(body) < answer + 2:
+            self._note("a HELLO that ends before offset 8", "5")
+            return
+        number = int.from_bytes(body[4:6], "little")
+        if number == 0:
+            self._note("session 0", "5")
+        if not self._delimited[DEVICE]:
+            self._note("no 00 was sent before the first packet", "3")
+        if self._greeting != number:
+            self._greeting, self._hellos = number, []
+        self._session = None
+        self._hellos.append(self._position)
+
+    def _status(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
+        if flags or frame or len(body) > packets.HEADER_BYTES:
+            self._note("a STATUS with reserved bits, or a payload", "9")
+        session.asked.append(seq)
+        if len(session.asked) > spec.LIMIT_MAX_STATUS:
+            self._note(f"{len(session.asked)} STATUS without answer", "9.3")
+        session.ends["tag", seq] = self._position
+
+    def _read(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
+        said = self._said
+        start, count = (int.from_bytes(body[at : at + 4], "little") for at in (4, 8))
+        if not said.has("READ"):
+            self._note("the device has not announced READ", "5")
+        if flags & ~spec.READ_FLAG_BACK or frame or body[3] or len(body) != 12:
+            self._note("a READ with reserved bits, or of another length", "10")
+        if count == 0 or start + count > said.voxels:
+            self._note("a READ of nothing, or beyond the last voxel", "10")
+        session.reads[seq] = (start, count, bool(flags & spec.READ_FLAG_BACK))
+        session.ends["tag", seq] = self._position
+
+    @property
+    def _said(self) -> Said:
+        if self.said is None:
+            raise AssertionError("asked only in a session")
+        return self.said
+
+    def _data(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
+        if flags & ~(spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT):
+            self._note(f"reserved flags {flags:X}", "6")
+        if (seq - session.next) % 256 >= spec.LIMIT_WINDOW and seq == session.ahead % 256:
+            self._note(f"number {seq} is outside the window from {session.next}", "9.1")
+        again = session.sent.get(seq) if (session.ahead - 1 - seq) % 256 < 224 else None
+        session.ends["data", seq] = self._position
+        if seq != session.ahead % 256:
+            if again != body:
+                self._note(f"number {seq} is sent again, with other bytes, or out of turn", "9.1")
+            else:
+                self._note("sent again")
+            return
+        session.ahead += 1
+        session.sent[seq] = body
+        self._enter(session, body, flags, seq, frame)
+
+    def _enter(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
+        clear, commit = bool(flags & spec.DATA_FLAG_CLEAR), bool(flags & spec.DATA_FLAG_COMMIT)
+        if not session.frames or session.newest % 256 != frame or self._is_over(session):
+            if frame != (session.newest + 1) % 256:
+                self._note(f"frame {frame} follows frame {session.newest % 256}", "6")
+            session.newest += 1
+            session.frames.append(_Frame(session.newest, clear))
+        current = session.frames[-1]
+        if current.clear != clear:
+            self._note("CLEAR is not the same as in the frame's other packets", "6")
+        if commit:
+            current.commit = seq
+        payload = body[packets.HEADER_BYTES :]
+        current.payloads[seq] = payload
+        for index, value in self._ops(payload).items():
+            before, by = current.written.setdefault(index, (value, seq))
+            if before != value and by != seq:
+                place = self._said.place(index)
+                self._note(f"voxel {place} has another pixel in packet {by}", "6")
+                break
+            current.written[index] = (value, seq)
+
+    @staticmethod
+    def _is_over(session: _Session) -> bool:
+        return session.frames[-1].commit is not None
+
+    def _ops(self, payload: bytes) -> dict[int, int]:
+        """Note what ops do; give what they write."""
+        page = _Watched(Page())
+        page.reader = reader = _Reader(self._said, page)
+        try:
+            reader.draw(payload)
+        except Refused as refused:
+            self._notes += reader.notes
+            code = packets.CODE_NAMES[refused.code]
+            at = refused.at + packets.HEADER_BYTES
+            self._note(f"{at:>5}  {op_name(payload[refused.at])} must be refused: {code}", "11")
+        else:
+            self._notes += reader.notes
+        return reader.written
+
+    # -- what the device says
+
+    def _heard(self, body: bytes) -> None:
+        answer = packets.Answer(body)
+        if answer.kind not in packets.LAYOUTS:
+            self._note(f"a device sends no packet of type {answer.kind}", "4")
+        elif not answer.whole:
+            self._note("shorter than the fields of its type", "4")
+        elif answer.kind == spec.TYPE_INFO:
+            self._info(answer)
+        elif self._session is None or self.said is None:
+            self._note("no session is open: a host drops it")
+        elif answer.kind == spec.TYPE_ACK:
+            self._ack(self._session, answer)
+        elif answer.kind == spec.TYPE_PAGE:
+            self._page(self._session, answer)
+        else:
+            self._error(self._session, answer)
+
+    def _info(self, info: packets.Answer) -> None:
+        said = Said.of(info)
+        self._note(str(said))
+        if self.said and self.said.boot != said.boot:
+            self._note("the device has restarted")
+            self._front = None
+        self.said = said
+        if info.session != self._greeting:
+            self._note("not of the session that was asked for: a host drops it")
+            return
+        if self._session is None:
+            # It may answer any of them: the first leaves least room.
+            self._session = _Session(info.session, credit_until=self._hellos[0] + said.rx_buffer)
+
+    def _ack(self, session: _Session, ack: packets.Answer) -> None:
+        if ack.session != session.number or ack.boot != self._said.boot:
+            self._note("of another session or start of the device: a host begins again")
+            return
+        if (ack.next - session.next) % 256 > (session.ahead - session.next) % 256:
+            self._note(f"next is {ack.next}, which was never sent", "9")
+            return
+        session.next = ack.next
+        self._credit(session, ack)
+        if ack.flags & spec.ACK_FLAG_ASKED:
+            if ack.last not in session.asked:
+                self._note(f"answers a STATUS {ack.last} that nobody asked", "9")
+            else:
+                del session.asked[: session.asked.index(ack.last) + 1]
+        if ack.flags & spec.ACK_FLAG_SHOWN:
+            self._shown(session, ack)
+        elif ack.frame:
+            self._note("frame is not 0 though SHOWN is clear", "9")
+
+    def _credit(self, session: _Session, ack: packets.Answer) -> None:
+        kind = "tag" if ack.flags & spec.ACK_FLAG_ASKED else "data"
+        end = session.ends.get((kind, ack.last))
+        if end is not None:
+            session.credit_until = max(session.credit_until, end + ack.credit)
+        for bit in range(32):
+            seq = (ack.next + 1 + bit) % 256
+            if ack.received >> bit & 1 and (seq - ack.next) % 256 > (session.ahead - ack.next) % 256:
+                self._note(f"received has number {seq}, which was never sent", "9")
+
+    def _shown(self, session: _Session, ack: packets.Answer) -> None:
+        shown = next((f for f in session.frames if f.number % 256 == ack.frame), None)
+        if shown is None:
+            if session.shown % 256 != ack.frame or session.shown < 0:
+                self._note(f"frame {ack.frame} is on display, but was never sent", "6")
+        elif shown.commit is None or (shown.commit - ack.next) % 256 < spec.LIMIT_WINDOW:
+            self._note(f"frame {ack.frame} is on display, but is not whole", "6")
+        else:
+            self._swap(session, shown)
+        if self._front is not None and self._said.has("DIGEST"):
+            meant = self._front.digest(self._said)
+            if ack.digest != meant:
+                self._note(f"the digest is {ack.digest:08X}h, that of the frame {meant:08X}h", "8")
+
+    def _swap(self, session: _Session, shown: _Frame) -> None:
+        """Draw the frame on the model of the device's pages."""
+        if shown.clear:
+            page: Page | None = Page()
+        else:
+            page = None if self._front is None else self._front.copy()
+        if page is not None:
+            decoder = Decoder(self._said, page)
+            for payload in shown.payloads.values():
+                try:
+                    decoder.draw(payload)
+                except Refused:
+                    self._note("shows a frame that it must refuse", "11")
+            lit = len(page.pixels)
+            self._note(f"frame {shown.number % 256} is on display: {lit} voxels lit")
+        self._front = page
+        session.shown = shown.number
+        session.frames = [f for f in session.frames if f.number > shown.number]
+
+    def _page(self, session: _Session, answer: packets.Answer) -> None:
+        asked = session.reads.get(answer.seq)
+        if asked is None:
+            self._note(f"answers a READ {answer.seq} that nobody asked", "10")
+            return
+        start, count, back = asked
+        if answer.start != start or not 1 <= answer.count <= count:
+            self._note(f"covers {answer.count} voxels from {answer.start}, asked was another", "10")
+            return
+        got = self._pixels(answer)
+        if got is None or back or self._front is None:
+            return
+        for place, value in enumerate(got):
+            meant = self._front.pixels.get(start + place, 0)
+            if value != meant:
+                where = self._said.place(start + place)
+                self._note(f"voxel {where} is {value:X}h, shown was {meant:X}h", "10")
+                return
+        self._note("the pixels are those of the frame on display")
+
+    def _pixels(self, answer: packets.Answer) -> list[int] | None:
+        """Read the ops of a PAGE: they draw from index 0 of a page that is long enough."""
+        page = _Watched(Page())
+        page.reader = reader = _Reader(self._said, page)
+        try:
+            reader.draw(answer.tail)
+        except Refused as refused:
+            self._note(f"its ops must be refused: {packets.CODE_NAMES[refused.code]}", "10")
+            return None
+        if reader.used - _PAGE_OPS:
+            self._note("ops that a PAGE may not have", "10")
+        if reader.cursor != answer.count:
+            self._note(f"its ops cover {reader.cursor} voxels, not {answer.count}", "10")
+            return None
+        return [page.pixels.get(index, 0) for index in range(answer.count)]
+
+    def _error(self, session: _Session, error: packets.Answer) -> None:
+        if error.code == spec.CODE_NO_SESSION:
+            self._note("the device has lost the session: a host begins again")
+            self._session = None
+        elif error.seq in session.sent and error.code != spec.CODE_OVERRUN:
+            packet = session.sent[error.seq]
+            if error.frame == packet[2] and error.offset >= packets.HEADER_BYTES:
+                op = packet[error.offset : error.offset + 1]
+                name = op_name(op[0]) if op else "its end"
+                self._note(f"it refuses {name} at byte {error.offset} of number {error.seq}")
