@@ -19,6 +19,7 @@ FEATURES: Final = {
     "dots": spec.FEATURE_DOTS,
     "oct": spec.FEATURE_OCT,
     "diff": spec.FEATURE_DIFF,
+    "arc": spec.FEATURE_ARC,
     "palette": spec.FEATURE_PALETTE,
     "read": spec.FEATURE_READ,
     "digest": spec.FEATURE_DIGEST,

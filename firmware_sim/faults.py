@@ -184,7 +184,7 @@ class Line:
         otherwise.
         """
         come = bytearray()
-        while self.due <= now:
+        while self._pieces and self._pieces[0].at <= now:
             what = self._pieces[0].what
             if isinstance(what, bytes):
                 come += what

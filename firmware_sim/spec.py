@@ -82,11 +82,28 @@ OP_DOTS: Final = 0x05
 OP_COLORS: Final = 0x06
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
+OP_ARC: Final = 0x58
 OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
 OP_RUN: Final = 0xA0
 OP_LIT: Final = 0xC0
 OP_DIFF: Final = 0xE0
+
+ARC_MORE: Final = 0
+ARC_JUMP: Final = 1
+ARC_INK: Final = 2
+ARC_COUNT: Final = 3
+ARC_LONE: Final = 18
+ARC_TURN: Final = 26
+ARC_MAIN: Final = 42
+ARC_HISTORY: Final = 74
+ARC_RUNS: Final = 138
+ARC_MODELS: Final = 266
+ARC_HALF: Final = 2048
+ARC_ENOUGH: Final = 6
+ARC_BEHIND: Final = 3
+ARC_MAX_K: Final = 15
+ARC_MAX_RUN: Final = 255
 
 # 8 The digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1

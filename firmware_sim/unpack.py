@@ -10,6 +10,7 @@ from itertools import accumulate
 from typing import Final
 
 from firmware_sim import spec
+from firmware_sim.arc import arc
 from firmware_sim.grid import Grid
 from firmware_sim.memory import Page, PixelFormat
 from firmware_sim.operands import OPERAND, Operands
@@ -139,6 +140,11 @@ class _Decoder:
         self._cursor = self._grid.index(*place)
         self._walk(octant, count, crumbs)
 
+    def arc(self, _: int) -> None:
+        pieces = arc(self._in, self._grid, self._format, self._pen)
+        for pen, voxels in pieces:
+            self._page.plot(array("Q", set(voxels)), pen)
+
     def _walk(self, octant: int, count: int, raw: bytes) -> None:
         self._check_cursor()
         crumbs = int.from_bytes(raw, "little")
@@ -248,6 +254,7 @@ def _ops(features: int) -> list[_Op | None]:
         (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _Decoder.colors),
         (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _Decoder.step),
         (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _Decoder.begin),
+        (spec.FEATURE_ARC, spec.OP_ARC, 0, _Decoder.arc),
         (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _Decoder.brick),
         (None, spec.OP_SKIP, last, _Decoder.skip),
         (None, spec.OP_RUN, last, _Decoder.run),

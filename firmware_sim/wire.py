@@ -14,6 +14,7 @@ from firmware_sim.fault_kinds import Event
 from firmware_sim.faults import Line, Spec
 
 _BACKLOG: Final = 65_536  # with so many bytes on its way, a direction takes no more
+_LONG: Final = 3600.0  # seconds: longer than this nobody should wait without looking
 
 
 class Wire:
@@ -85,15 +86,15 @@ class Wire:
         self._run(self._clock())
 
     def until_tick(self) -> float | None:
-        """Return the seconds until something happens; None if nothing is in sight.
+        """Return in how many seconds to look again; None if nothing is in sight.
 
-        That is a tick that swaps, or the arrival of bytes that the line has held back.
+        Then comes a tick that swaps, or bytes arrive that the line has held back.
         """
         now = self._clock()
         self._run(now)
         up = self._up.due if self._up.due > now else math.inf  # what has come need not be awaited
         at = min(self._tick_at(), self._down.due, up)
-        return at - now if at < math.inf else None
+        return min(at - now, _LONG) if at < math.inf else None
 
     def disconnect(self) -> None:
         """Break the connection: the session ends, and what is on its way is gone."""

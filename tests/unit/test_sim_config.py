@@ -1,8 +1,6 @@
-"""What is a device of the protocol and what is not; and a bad line; and the picture file."""
+"""What is a device of the protocol and what is not; and the picture file."""
 
 import io
-import math
-import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,13 +10,13 @@ from simwire import Rig, data
 
 from firmware_sim.bench import Bench, Snapshot
 from firmware_sim.config import (
+    FEATURES,
     Config,
-    parse_features,
+    parse_names,
     parse_number,
     parse_refresh,
     parse_size,
 )
-from firmware_sim.faults import Line, parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import npy_header, write_npy
 
@@ -28,7 +26,16 @@ def test_defaults() -> None:
     assert str(config.shape) == "128x128x128"
     assert (config.pixel_format, config.max_payload, config.boot) == ("rgb888", 1024, None)
     assert (config.refresh, config.rx_buffer, config.silent) == (30_000, 16_384, 0)
-    assert config.features == {"read", "digest"}
+    assert config.feature_bits == 0b1_1010_1111
+
+
+def test_the_features_are_those_that_the_format_allows() -> None:
+    """MUST NOT announce a reserved feature, nor one that its format does not allow."""
+    assert Config(pixel_format="index8").feature_bits == 0b1_1111_1111
+    assert Config(features=frozenset()).feature_bits == 0
+    for bit, name in enumerate(FEATURES):
+        config = Config(pixel_format="index8", features=frozenset({name}))
+        assert config.feature_bits == 1 << bit
 
 
 @pytest.mark.parametrize(
@@ -38,7 +45,10 @@ def test_defaults() -> None:
         ({"grid": (1, 1, 65_536)}, "from 1 to 65535"),
         ({"grid": (65_535, 32_769, 1)}, "2147483647 voxels or less"),
         ({"pixel_format": "rgb"}, "take one of mono1, index8, rgb565, rgb888"),
-        ({"features": frozenset({"palette"})}, "palette: take of read, digest"),
+        ({"features": frozenset({"palette"})}, "palette: take of line, .* with the format rgb888"),
+        ({"features": frozenset({"diff"}), "pixel_format": "mono1"}, "with the format mono1"),
+        ({"features": frozenset({"ark", "box"}), "pixel_format": "index8"}, "feature ark: take of"),
+        ({"lies": frozenset({"size"})}, "lie size: take of grid, credit, format"),
         ({"refresh": -1}, "refresh is -1"),
         ({"refresh": 1 << 32}, "to 4294967295"),
         ({"max_payload": 63}, "from 64 to 65535"),
@@ -69,8 +79,8 @@ def test_values_are_read() -> None:
     assert parse_refresh("29.97") == 29_970
     assert parse_refresh("0") == 0
     assert parse_number("0x10") == 16
-    assert parse_features("") == frozenset()
-    assert parse_features("READ,digest") == {"read", "digest"}
+    assert parse_names("") == frozenset()
+    assert parse_names("READ,digest") == {"read", "digest"}
 
 
 @pytest.mark.parametrize(
@@ -89,57 +99,6 @@ def test_values_are_read() -> None:
 def test_what_cannot_be_read_is_a_value_error(parse: Callable[[str], object], text: str) -> None:
     with pytest.raises(ValueError, match="write"):
         parse(text)
-
-
-# Faults
-
-
-def test_faults_are_read() -> None:
-    assert parse_faults("flip=1e-5,drop:0.5") == (("flip", 1e-5), ("drop", 0.5))
-    assert parse_faults("") == ()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("flop=1", "'flop' is not known: did you mean flip"),
-        ("zzz=1", "did you mean flip or drop"),
-        ("flip", "write flip=RATE"),
-        ("drop=2", "from 0 to 1"),
-        ("flip=-1", "from 0 to 1"),
-        ("flip=x", "write flip=RATE"),
-        ("flip=nan", "from 0 to 1"),
-    ],
-)
-def test_unknown_faults_are_refused(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        parse_faults(text)
-
-
-@pytest.mark.parametrize("spec", ["flip=1e-3", "drop=1e-2", "drop=0.1,flip=0.01", "flip=1"])
-def test_faults_do_not_depend_on_the_cutting(spec: str) -> None:
-    rng = random.Random(1)
-    stream = rng.randbytes(5000)
-    whole = Line(parse_faults(spec), 7, "in").carry(stream)
-    line = Line(parse_faults(spec), 7, "in")
-    cut = b"".join(line.carry(stream[k : k + 13]) for k in range(0, 5000, 13))
-    assert whole == cut != stream
-    assert Line(parse_faults(spec), 7, "in").carry(stream) == whole
-    if spec != "flip=1":
-        assert Line(parse_faults(spec), 8, "in").carry(stream) != whole
-        assert Line(parse_faults(spec), 7, "out").carry(stream) != whole
-
-
-def test_faults_strike_at_their_rate() -> None:
-    stream = bytes(100_000)
-    flipped = Line((("flip", 1e-2),), 1, "in").carry(stream)
-    assert math.isclose(int.from_bytes(flipped, "big").bit_count(), 8000, rel_tol=0.1)
-    dropped = Line((("drop", 1e-1),), 1, "in").carry(stream)
-    assert math.isclose(len(dropped), 90_000, rel_tol=0.02)
-    assert Line((("flip", 1.0),), 1, "in").carry(b"\x0f") == b"\xf0"
-    assert Line((("drop", 1.0),), 1, "in").carry(stream) == b""
-    assert Line((("flip", 0.0), ("drop", 0.0)), 1, "in").carry(stream) == stream
-    assert Line((("flip", 5e-324),), 1, "in").carry(stream) == stream
 
 
 # The picture file

@@ -53,7 +53,7 @@ def test_info_says_what_the_device_is() -> None:
     assert (info.major, info.minor, info.session, info.boot) == (1, 0, SESSION, BOOT)
     assert (info.nx, info.ny, info.nz, info.format, info.pages) == (3, 300, 7, 3, 2)
     assert (info.max_payload, info.rx_buffer, info.refresh) == (1024, 16_384, 29_970)
-    assert (info.features, info.reserved) == (1 << 7 | 1 << 8, 0)
+    assert (info.features, info.reserved) == (0b1_1010_1111, 0)
     assert info.payload[29:] == b"\x13voxdisplay emulator\x031.0\x03\xc3\x841"
 
 
@@ -655,6 +655,76 @@ def test_the_frame_of_a_page_is_that_of_an_ack() -> None:
     assert rig.ask(read(0, 105, back=1)).frame == 1
     rig.ask(hello())
     assert rig.ask(read(0, 105)).frame == 0
+
+
+# A device that lies
+
+
+@pytest.mark.parametrize(
+    ("lie", "field", "said"),
+    [
+        ("credit", "rx_buffer", 32_768),
+        ("format", "format", 3),
+        ("payload", "max_payload", 2048),
+        ("boot", "boot", BOOT ^ 0xFFFF),
+        ("grid", "nx", 4),
+        ("grid", "ny", 6),
+        ("grid", "nz", 65_534),
+        ("features", "features", 0b1_1111_1111),
+    ],
+)
+def test_info_announces_what_the_device_does_not_do(lie: str, field: str, said: int) -> None:
+    sides = (3, 5, 65_535 if field == "nz" else 7)
+    rig = Rig(*sides, session=False, pixel_format="index8", lies=frozenset({lie}))
+    info = rig.ask(hello())
+    assert getattr(info, field) == said
+
+
+def test_a_lie_is_kept_or_comes_out() -> None:
+    """What lies beyond the device is refused, lost or not done."""
+    assert Rig(lies=frozenset({"grid"})).ask(data(0, 0, b"\2\3\0\0\xa0")).error == (OUTSIDE, 3)
+    rig = Rig(lies=frozenset({"credit"}), rx_buffer=1200)
+    assert rig.ask(status()).credit == 2400
+    block(rig)
+    assert rig.say(filling(2, 600), filling(3, 600))[0].error == (OVERRUN, 0)
+    rig = Rig(lies=frozenset({"features"}))
+    assert rig.ask(read(0, 1)).error == (TYPE, 0)
+    assert rig.show(0, 0, DOT).digest == 0
+    assert rig.ask(data(1, 1, b"\x04\0\0\0")).error == (OP, 3)
+    rig = Rig(lies=frozenset({"payload"}), max_payload=64)
+    assert rig.ask(data(0, 0, bytes(65))).damaged == 1
+    rig = Rig(lies=frozenset({"boot"}))
+    assert rig.ask(status()).boot == BOOT
+    rig = Rig(lies=frozenset({"format"}), pixel_format="mono1")
+    assert rig.ask(data(0, 0, b"\1\2")).error == (11, 3)
+
+
+# The palette
+
+
+def test_a_palette_belongs_to_its_page() -> None:
+    """Each page has a palette of its own, which is shown with it."""
+    rig = Rig(pixel_format="index8")
+    bench = Bench(rig.device)
+    default = bench.snapshot().palette
+    assert default[:6] == b"\0\0\0\0\0\x55"
+    assert len(default) == 768
+    rig.ask(data(0, 0, b"\6\1\0abc", CLEAR | COMMIT))
+    assert bench.snapshot().palette == default
+    (ack,) = rig.tick()
+    assert bench.snapshot().palette == default[:3] + b"abc" + default[6:]
+    assert bench.snapshot().digest == ack.digest != 0
+    rig.show(1, 1, b"\6\2\0def", flags=0)
+    assert bench.snapshot().palette == default[:3] + b"abcdef" + default[9:]
+    assert rig.show(2, 2, b"").digest == 0
+    assert bench.snapshot().palette == default
+    rig.show(3, 3, b"\6\1\0abc")
+    rig.ask(hello())
+    rig.show(0, 0, b"", flags=0)  # the front page stays as it is, with its palette
+    assert bench.snapshot().palette == default[:3] + b"abc" + default[6:]
+    bench.power_cycle()
+    assert bench.snapshot().palette == default
+    assert Bench(Rig().device).snapshot().palette == b""
 
 
 # The device as a whole

@@ -20,6 +20,7 @@ from firmware_sim import __main__ as program
 from firmware_sim import in_process, serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
+from firmware_sim.faults import parse_faults
 from firmware_sim.serve import (
     InProcessPort,
     linked,
@@ -175,7 +176,8 @@ def exchange_badly(port: InProcessPort, wire: bytes) -> None:
         ("sim:?format=rgb", "take one of"),
         ("sim:?fault=flap:1", "did you mean flip"),
         ("sim:?seed=x", "seed in .* whole number"),
-        ("sim:?features=palette", "take of read, digest"),
+        ("sim:?features=palette", "palette: take of line, box"),
+        ("sim:?lie=all", "lie all: take of grid"),
     ],
 )
 def test_a_bad_url_is_refused_with_the_remedy(url: str, message: str) -> None:
@@ -185,6 +187,40 @@ def test_a_bad_url_is_refused_with_the_remedy(url: str, message: str) -> None:
 
 def test_the_entry_point() -> None:
     assert serve.open_in_process is in_process.open_in_process
+
+
+def test_a_line_that_stands_still_and_is_full_takes_nothing() -> None:
+    port = open_in_process("sim:?size=3x5x7&fault=down.stall:1e99@1")
+    for _ in range(7):
+        port.write(bytes(10_000), 0)
+    with pytest.raises(TimeoutError, match="stands still"):
+        port.write(hello(), 0)
+
+
+def test_who_waits_for_a_line_goes_on_when_it_moves() -> None:
+    port = open_in_process("sim:?size=3x5x7&refresh=0&fault=down.delay:0.05@1")
+    port.write(bytes(70_000), 0)
+    port.write(hello(), WAIT)
+    assert answers(port.read(WAIT))[0].kind == INFO
+
+
+def test_who_waits_for_a_line_is_woken_by_close() -> None:
+    port = open_in_process("sim:?size=3x5x7&fault=down.stall:1e99@1")
+    port.write(bytes(70_000), 0)
+    port._changed.wait = lambda _: port.close()
+    with pytest.raises(ConnectionError, match="closed"):
+        port.write(hello(), WAIT)
+
+
+def test_an_unplugged_device_is_gone() -> None:
+    port = open_in_process("sim:?size=3x5x7&fault=unplug@20")
+    port.write(hello(), 0)
+    assert answers(port.read(0))[0].kind == INFO
+    with pytest.raises(ConnectionError, match="unplugged"):
+        port.write(hello(), 0)
+    with pytest.raises(ConnectionError, match="unplugged"):
+        port.read(0)
+    port.close()
 
 
 # Pumps
@@ -277,6 +313,47 @@ def test_a_line_that_breaks_ends_the_pump(
     assert faults == []
     os.close(stop)
     os.close(stopper)
+
+
+def test_a_pump_ends_when_the_device_is_unplugged(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    ours, theirs = pair
+    wire = small()
+    wire = Wire(wire.device, parse_faults("unplug@3"))
+    stop, stopper = os.pipe()
+    ours.sendall(hello())
+    assert serve_wire(wire, theirs.fileno(), stop) is False
+    os.close(stop)
+    os.close(stopper)
+
+
+def test_a_pump_takes_nothing_from_a_line_that_stands_still(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    ours, theirs = pair
+    wire = Wire(small().device, parse_faults("down.stall=1e99@1"))
+    sent = 0
+    with running(serve_wire, wire, theirs.fileno()) as finish:
+        ours.settimeout(0.3)
+        with contextlib.suppress(TimeoutError):
+            while sent < 10_000_000:
+                sent += ours.send(status() * 100)
+        assert finish() is True
+    assert 65_536 <= sent < 2_000_000
+
+
+def test_tcp_serves_again_after_an_unplug() -> None:
+    with listen("127.0.0.1", 0) as listener:
+        wire = Wire(small().device, parse_faults("unplug@20"))
+        with running(serve_tcp, wire, listener):
+            for _ in range(2):
+                with connect(listener) as host:
+                    host.sendall(hello())
+                    assert receive(host, 1)[0].kind == INFO
+                    host.sendall(hello())
+                    if wire.device.taken[3] < 2:
+                        assert host.recv(100) == b""
 
 
 def test_a_host_that_never_reads_is_not_read(pair: tuple[socket.socket, socket.socket]) -> None:
@@ -419,6 +496,8 @@ def test_the_program_on_tcp() -> None:
         (["--refresh", "fast"], "number of hertz"),
         (["--rx-buffer", "9"], "take a number from 1101"),
         (["--fault", "flop=1"], "did you mean flip"),
+        (["--features", "palette"], "palette: take of line, box"),
+        (["--lie", "all"], "lie all: take of grid"),
         (["--seed", "x"], "whole number"),
         (["--tcp", "5000"], "HOST:PORT like 127.0.0.1:5000"),
         (["--tcp", "localhost:99999"], "HOST:PORT like 127.0.0.1:5000"),
