@@ -19,7 +19,7 @@ MAY_IMPORT = {
     "voxelize": {"errors", "curves", "voxelize"},
     "pixel": {"wire.spec"},
     "wire": {"errors", "grid", "pixel", "wire"},
-    "frame": {"color", "curves", "grid", "pixel", "view", "voxelize", "wire"},
+    "frame": {"color", "curves", "errors", "grid", "pixel", "view", "voxelize", "wire"},
     "scene": {"color", "curves", "errors", "grid", "scene"},
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},

@@ -12,6 +12,7 @@ from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, ports, read
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
+from voxdisplay.cli.view import view
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
     CurveError,
@@ -59,7 +60,7 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, preview, voxelize, info, ports, clear, read):
+for command in (push, preview, view, voxelize, info, ports, clear, read):
     cli.add_command(command)
 
 
