@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "pixel": {"wire.spec"},
     "wire": {"errors", "grid", "pixel", "wire"},
     "frame": {"color", "curves", "errors", "grid", "pixel", "view", "voxelize", "wire"},
+    "pattern": {"frame", "grid", "pixel"},
     "scene": {"color", "curves", "errors", "grid", "scene"},
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},

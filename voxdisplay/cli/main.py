@@ -12,6 +12,7 @@ from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, ports, read
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
+from voxdisplay.cli.test_pattern import test_pattern
 from voxdisplay.cli.view import view
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
@@ -60,7 +61,7 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, preview, view, voxelize, info, ports, clear, read):
+for command in (push, preview, view, voxelize, info, ports, clear, read, test_pattern):
     cli.add_command(command)
 
 
