@@ -70,9 +70,8 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     try:
-        cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
-    except click.exceptions.Exit as error:
-        return error.exit_code
+        # A command that ends by click's Exit gives its code; all others give nothing.
+        ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return EXIT_USAGE
@@ -97,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         click.echo("  please report it with what voxdisplay --debug ... prints", err=True)
         return EXIT_INTERNAL
-    return 0
+    return ended if isinstance(ended, int) else 0
 
 
 if __name__ == "__main__":

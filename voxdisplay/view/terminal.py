@@ -134,7 +134,7 @@ def _loop(view: View, keyboard: int) -> None:
         shown = size, view.camera, id(view._lit)  # noqa: SLF001
         if shown != drawn and min(size) > 0:
             lines = view.lines(size.columns, size.lines, full=full)
-            _write(_BEGIN + "\x1b[K\r\n".join(lines) + "\x1b[K\x1b[J" + _END)
+            _write(_BEGIN + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END)
             drawn = shown
         wait_s = _TURN_S if view.spins else _GLANCE_S
         if select.select([keyboard], [], [], wait_s)[0]:
