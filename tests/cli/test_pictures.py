@@ -16,6 +16,8 @@ from voxdisplay.view.camera import Camera
 from voxdisplay.view.picture import Look, picture
 
 TREFOIL = "examples/trefoil.json"
+# A folder that is there, and in which nobody makes files, not even root.
+LINUX = pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux's /proc")
 
 
 def pixels(path):
@@ -68,6 +70,7 @@ def test_a_film(run, tmp_path):
         (["preview", TREFOIL, "-o", "x.bmp"], ["x.bmp", ".png", ".gif", ".mp4", ".html"]),
         (["preview", TREFOIL, "-o", "x."], [".png"]),
         (["preview", TREFOIL, "-o", "/nowhere/x.png"], ["/nowhere"]),
+        (["preview", TREFOIL, "-o", "x." + "x" * 300 + ".png"], ["cannot be written"]),
         (["preview", TREFOIL, "-o", "x.png", "--size", "8x8"], ["800x600"]),
         (["preview", TREFOIL, "-o", "x.png", "--size", "99999x99999"], ["4096"]),
         (["preview", TREFOIL, "-o", "x.png", "--view-angle", "1"], ["-34,24"]),
@@ -90,8 +93,8 @@ def test_bad_usage(tmp_path, capsys, arguments, words):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux's /proc")
-def test_a_folder_in_which_nobody_makes_files_not_even_root(run):
+@LINUX
+def test_a_folder_in_which_nobody_makes_files(run):
     done = run("preview", TREFOIL, "-o", "/proc/x.png")
     assert done.returncode == 2
     assert "/proc/x.png cannot be written" in done.stderr
@@ -121,6 +124,15 @@ def test_push_preview_is_not_of_what_the_host_believes(tmp_path, monkeypatch):
     assert CliRunner().invoke(cli, arguments).exit_code == 0
     meant = picture(other, vd.Grid(3, 5, 7), PixelFormat.RGB888)
     assert np.array_equal(pixels(path), np.asarray(meant))
+
+
+@LINUX
+def test_a_preview_that_cannot_be_written_does_not_hide_what_was_shown(run):
+    port = "sim:?size=24x16x12"
+    done = run("push", TREFOIL, "--port", port, "--preview", "/proc/x.png")
+    assert done.returncode == 2
+    assert "/proc/x.png cannot be written" in done.stderr
+    assert "proved" in done.stdout
 
 
 def without(module, *arguments):
