@@ -364,7 +364,10 @@ class Monitor:
             session.credit_until = max(session.credit_until, end + ack.credit)
         for bit in range(32):
             seq = (ack.next + 1 + bit) % 256
-            if ack.received >> bit & 1 and (seq - ack.next) % 256 > (session.ahead - ack.next) % 256:
+            if (
+                ack.received >> bit & 1
+                and (seq - ack.next) % 256 > (session.ahead - ack.next) % 256
+            ):
                 self._note(f"received has number {seq}, which was never sent", "9")
 
     def _shown(self, session: _Session, ack: packets.Answer) -> None:

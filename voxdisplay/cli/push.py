@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Literal, TextIO
 
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
     capture_option,
     device_json,
+    fit_option,
     json_option,
     note,
     open_display,
     plural,
     port_options,
     print_json,
+    progress_bar,
 )
-from voxdisplay.cli.scenes import voxelize_scene
+from voxdisplay.cli.pictures import PictureFileType, save_page
+from voxdisplay.cli.scenes import draw
 
 
 @click.command(
@@ -28,21 +30,22 @@ from voxdisplay.cli.scenes import voxelize_scene
     Examples:
       voxdisplay push examples/paper-curve.json
       voxdisplay push curve.json --port /dev/ttyUSB0 --verify
+      voxdisplay push curve.json --port tcp://127.0.0.1:5000 --preview shown.png
       cat curve.json | voxdisplay push - --port tcp://127.0.0.1:5000 --json
     """
 )
 @click.argument("scene", type=click.Path())
 @port_options
-@click.option(
-    "--fit",
-    type=click.Choice(["contain", "none"]),
-    default="contain",
-    show_default=True,
-    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
-    "and clip.",
-)
+@fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
 @capture_option
+@click.option(
+    "--preview",
+    type=PictureFileType(),
+    metavar="FILE",
+    help="Read the page back, and draw what the display says it shows: .png, .gif, .mp4 or .html.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="No progress, and no picture on the terminal.")
 @json_option
 def push(
     *,
@@ -53,24 +56,34 @@ def push(
     fit: Literal["contain", "none"],
     verify: bool,
     capture: TextIO | None,
+    preview: Path | None,
+    quiet: bool,
     as_json: bool,
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
 
     Waits until the device has shown it and its digest agrees.
     """
+    if preview:
+        import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
     loaded = vd.load_scene(scene)
     with open_display(port, baud, timeout_s, capture) as display:
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
-        frame = draw(fitted, display)
-        with _progress("sending") as progress:
+        frame = display.frame()
+        draw(fitted, frame)
+        with progress_bar("sending", hidden=quiet) as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
-        if verify:
-            with _progress("reading back") as progress:
-                display.verify(frame, progress=progress)
+        page = None
+        if verify or preview:
+            with progress_bar("reading back", hidden=quiet) as progress:
+                page = (
+                    display.verify(frame, progress=progress)
+                    if verify
+                    else display.read(progress=progress)
+                )
         if as_json:
             print_json(
                 {
@@ -88,41 +101,10 @@ def push(
             )
         else:
             click.echo(_summary(display, receipt, verify=verify))
-
-
-def draw(scene: vd.Scene, display: vd.Display) -> vd.Frame:
-    """Draw a scene, and say on stderr what the display cannot show."""
-    frame = display.frame()
-    drawings = [
-        frame.draw(sequence, item.color)
-        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
-    ]
-    total = sum(drawing.voxels for drawing in drawings)
-    clipped = sum(drawing.clipped for drawing in drawings)
-    if total and clipped == total:
-        note(f"warning: all {total} voxels are outside the display: the picture is empty")
-    elif clipped:
-        note(f"{clipped} of {total} voxels are outside the display, and not shown")
-    if not all(drawing.exact_color for drawing in drawings):
-        note(f"this is a {display.info.format.value} display: colours are the nearest it has")
-    return frame
-
-
-@contextlib.contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a bar on a terminal, once there is more than one step to wait for."""
-    stream = sys.stderr
-    if not stream.isatty():
-        yield None
-        return
-    with click.progressbar(length=1, label=what, file=stream) as bar:
-        bar.hidden = True
-
-        def update(done: int, total: int) -> None:
-            bar.length, bar.hidden = total, total <= 1
-            bar.update(done - bar.pos)
-
-        yield update
+        if preview and page is not None:  # what was shown has been said, if this fails
+            save_page(preview, page, display.info)
+        if not quiet and not as_json:
+            glimpse(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
