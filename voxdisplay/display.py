@@ -23,6 +23,7 @@ from voxdisplay.errors import (
     DesyncError,
     IncompatibleDevice,
     LocalProtocolError,
+    TransportClosed,
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
@@ -140,6 +141,13 @@ class Display:
                 self._turn()
         except TransportTimeout as error:
             raise TransportTimeout(f"{self.port}: {error}", hint=error.hint) from error
+        except TransportClosed as error:
+            if not (noise := self._link.stream.noise):
+                raise
+            raise TransportClosed(
+                f"{error}; what it had said is no packet: {noise[:24]!r}",
+                hint="is this the display's port? Something else answers there",
+            ) from error
         assert self._link.info is not None  # noqa: S101 - ready
         return device_info(self._link.info)
 
