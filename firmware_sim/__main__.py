@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_number, parse_refresh, parse_size
+from firmware_sim.config import Config, parse_baud, parse_number, parse_refresh, parse_size
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
@@ -31,6 +31,8 @@ examples:
       the same, always to be found as /tmp/voxdisplay, and the picture in a file for numpy
   voxdisplay-sim --tcp 127.0.0.1:5000 --size 64x64x64 --format mono1 --refresh 0
       a smaller one on TCP that swaps at once
+  voxdisplay-sim --baud 115200
+      at the pace of a serial line, to see how many frames a second it carries
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
 """
@@ -59,7 +61,7 @@ def main(argv: list[str] | None = None) -> int:
         if options.dump:
             _dump_swaps(device, options.dump)
         with _signals() as stop:
-            _serve(Wire(device, options.fault, options.seed), options, stop)
+            _serve(Wire(device, options.fault, options.seed, baud=options.baud), options, stop)
     except (ValueError, OSError) as error:
         parser.error(str(error))
     return 0
@@ -109,6 +111,14 @@ def _parser() -> argparse.ArgumentParser:
         type=_argument(parse_refresh),
         default=default.refresh,
         help="refresh ticks a second; 0: a swap happens at once (default: 30)",
+    )
+    parser.add_argument(
+        "--baud",
+        metavar="N",
+        type=_argument(parse_baud),
+        default=0,
+        help="take and give bytes at the pace of a line of N bits a second, ten to a byte; 0: as "
+        "fast as they come (default: %(default)s)",
     )
     parser.add_argument(
         "--rx-buffer",

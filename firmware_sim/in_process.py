@@ -11,7 +11,14 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_features, parse_number, parse_refresh, parse_size
+from firmware_sim.config import (
+    Config,
+    parse_baud,
+    parse_features,
+    parse_number,
+    parse_refresh,
+    parse_size,
+)
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.wire import Wire
@@ -31,6 +38,7 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "silent": ("silent", parse_number),
     "fault": ("faults", parse_faults),
     "seed": ("seed", parse_number),
+    "baud": ("baud", parse_baud),
 }
 
 
@@ -82,10 +90,10 @@ class InProcessPort:
                 left = deadline - time.monotonic()
                 if data or left <= 0:
                     return data
-                tick = self._wire.until_tick()
-                self._changed.wait(left if tick is None else min(left, tick))
+                due = self._wire.until_next()
+                self._changed.wait(left if due is None else min(left, due))
 
-    def write(self, data: bytes, timeout_s: float) -> None:  # noqa: ARG002 - it never waits
+    def write(self, data: bytes, timeout_s: float) -> None:
         """Send bytes to the device.
 
         Parameters
@@ -93,15 +101,25 @@ class InProcessPort:
         data
             Any bytes. What the device has no room for is lost, and it says so.
         timeout_s
-            Not needed: the device takes bytes at any time.
+            How many seconds to wait for room on a line that has a pace. Else none is needed: the
+            device takes bytes at any time.
 
         Raises
         ------
         ConnectionError
             If the port is closed.
+        TimeoutError
+            If the line has no room in time.
         """
+        deadline = time.monotonic() + timeout_s
         with self._changed:
             self._check_open()
+            while self._wire.full:
+                left = deadline - time.monotonic()
+                if left <= 0:
+                    raise TimeoutError(f"the line is full for {timeout_s} s")
+                self._changed.wait(min(left, self._wire.until_next() or 0.0))
+                self._check_open()
             self._wire.receive(bytes(data))
             self._changed.notify_all()
 
@@ -125,7 +143,8 @@ def open_in_process(url: str) -> InProcessPort:
         ``sim:``, or ``sim:?KEY=VALUE&KEY=VALUE...`` with the keys ``size`` (64x64x64), ``format``
         (mono1, index8, rgb565, rgb888), ``refresh`` (hertz; 0: at once), ``rx_buffer`` and
         ``max_payload`` (bytes), ``boot``, ``silent``, ``seed`` (numbers), ``features``
-        (read,digest), ``name``, ``firmware``, ``serial`` (text), ``fault`` (flip:1e-6,drop:1e-6).
+        (read,digest), ``name``, ``firmware``, ``serial`` (text), ``fault`` (flip:1e-6,drop:1e-6),
+        ``baud`` (bits per second of the line).
 
     Returns
     -------
@@ -147,7 +166,8 @@ def open_in_process(url: str) -> InProcessPort:
     fields = _parse_url(url)
     faults = fields.pop("faults", ())
     seed = fields.pop("seed", 0)
-    return InProcessPort(Wire(Device(Config(**fields)), faults, seed))
+    baud = fields.pop("baud", 0)
+    return InProcessPort(Wire(Device(Config(**fields)), faults, seed, baud=baud))
 
 
 def _parse_url(url: str) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The pumps: a device behind a pseudo-terminal, a TCP port, or in the host's process (16).
 
 They move bytes and let time pass; they know nothing of packets. A pump sleeps until a byte comes,
-until one can go, or until a tick swaps; and it takes nothing from a host that does not read.
+until one can go or has gone its way, or until a tick swaps; and it takes nothing from a host that
+does not read.
 """
 
 import contextlib
@@ -50,11 +51,15 @@ def serve_wire(wire: Wire, line: int, stop: int) -> bool:
     out = bytearray()
     while True:
         readers = [stop]
-        if len(out) < _CLOGGED:
+        if clogged := len(out) >= _CLOGGED:
+            pause = wire.until_tick()
+        else:
             out += wire.transmit()
+            pause = wire.until_next()
+        if not (clogged or wire.full):
             readers.append(line)
         writers = [line] if out else []
-        readable, writable, _ = select.select(readers, writers, [], wire.until_tick())
+        readable, writable, _ = select.select(readers, writers, [], pause)
         if stop in readable:
             return True
         try:

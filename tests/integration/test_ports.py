@@ -102,9 +102,9 @@ def test_a_busy_port(run, line):
 
 
 def test_a_port_that_this_program_has_open_itself(line):
-    with contextlib.closing(open_transport(line.port)):
-        with pytest.raises(vd.OpenError, match=r"is busy: this program itself \(process"):
-            vd.open(line.port)
+    busy = pytest.raises(vd.OpenError, match=r"is busy: this program itself \(process")
+    with contextlib.closing(open_transport(line.port)), busy:
+        vd.open(line.port)
 
 
 AS_NOBODY = """

@@ -10,6 +10,7 @@ from __future__ import annotations
 import select
 import sys
 import time
+from typing import Any
 
 import serial
 
@@ -25,6 +26,7 @@ _WRITE_BYTES = 1 << 14
 _POLL_S = 0.02
 _POLLED_WRITE_BYTES = 2048
 _POLLED_WRITE_S = 5.0
+_CLOGGED = "is something still reading there?"
 
 # A device that goes away shows itself as any of these, by pyserial's layer and the system's mood.
 _GONE: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
@@ -55,7 +57,7 @@ class SerialTransport:
         self.port = port
         self.baud = baud
         try:
-            self._serial = _open(port, baud)
+            self._serial: Any = _open(port, baud)  # of many kinds, with more than they share
         except _GONE as error:
             raise explain(port, error) from error
         except ValueError as error:  # a URL that pyserial does not know, or an impossible baud
@@ -126,22 +128,19 @@ class SerialTransport:
         try:
             while view:
                 left_s = max(deadline_s - time.monotonic(), 0.0)
-                sent = self._serial.write(view[:step]) if self._takes_more(left_s) else 0
-                if not sent:
-                    raise TransportTimeout(
-                        f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
-                        f"in {timeout_s:.1f} s",
-                        hint="is something still reading there?",
-                    )
-                view = view[sent:]
+                if not self._takes_more(left_s):
+                    break
+                view = view[self._serial.write(view[:step]) :]
         except serial.SerialTimeoutException as error:
-            raise TransportTimeout(
-                f"{self.port} takes no more bytes", hint="is something still reading there?"
-            ) from error
-        except TransportTimeout:  # which is an OSError
-            raise
+            raise TransportTimeout(f"{self.port} takes no more bytes", hint=_CLOGGED) from error
         except _GONE as error:
             raise TransportClosed(f"{self.port} is gone: {reason(error)}") from error
+        if view:
+            raise TransportTimeout(
+                f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
+                f"in {timeout_s:.1f} s",
+                hint=_CLOGGED,
+            )
 
     def _takes_more(self, timeout_s: float) -> bool:
         """Wait until the port takes bytes; tell whether it does."""
@@ -171,11 +170,11 @@ class SerialTransport:
         except _GONE:
             pass
         # pyserial forgets to close a socket whose other end is gone.
-        sockets = [self._serial._socket] if hasattr(self._serial, "_socket") else []  # noqa: SLF001
+        sockets = filter(None, [getattr(self._serial, "_socket", None)])
         for each in (self._serial, *sockets):
             try:
                 each.close()
-            except (*_GONE, AttributeError):  # it is gone: that is what was wanted
+            except _GONE:  # it is gone: that is what was wanted
                 continue
 
 
