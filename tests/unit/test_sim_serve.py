@@ -87,7 +87,7 @@ def test_a_port_in_process() -> None:
     (info,) = exchange(port, b"\0" + hello())
     assert (info.nx, info.format, info.boot, info.refresh) == (3, 1, 7, 1_000_000)
     assert info.payload[29:36] == b"\x06a cube"
-    (ack,) = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
+    *_, ack = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
     if ack.flags == PENDING:
         (ack,) = answers(port.read(WAIT))
     assert ack.flags == SHOWN
