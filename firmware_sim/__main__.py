@@ -20,6 +20,7 @@ from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
+from firmware_sim.pace import PacedWire, paced
 from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
 from firmware_sim.wire import Wire
 
@@ -61,7 +62,8 @@ def main(argv: list[str] | None = None) -> int:
         if options.dump:
             _dump_swaps(device, options.dump)
         with _signals() as stop:
-            _serve(Wire(device, options.fault, options.seed, baud=options.baud), options, stop)
+            wire = Wire(device, options.fault, options.seed)
+            _serve(paced(wire, options.baud), options, stop)
     except (ValueError, OSError) as error:
         parser.error(str(error))
     return 0
@@ -197,7 +199,7 @@ def _signals() -> Iterator[int]:
         os.close(stopper)
 
 
-def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
+def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> None:
     if options.tcp:
         with listen(*options.tcp, remote=options.allow_remote) as listener:
             host, port = listener.getsockname()[:2]
@@ -212,7 +214,7 @@ def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
         serve_wire(wire, line, stop)
 
 
-def _announce(wire: Wire, port: str) -> None:
+def _announce(wire: Wire | PacedWire, port: str) -> None:
     config = wire.device.config
     place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
     sys.stdout.write(json.dumps(place) + "\n")

@@ -21,6 +21,7 @@ from firmware_sim.config import (
 )
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
+from firmware_sim.pace import PacedWire, paced
 from firmware_sim.wire import Wire
 
 # Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
@@ -58,7 +59,7 @@ class InProcessPort:
         The device's bench face.
     """
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire | PacedWire) -> None:
         self.bench = Bench(wire.device)
         self._wire = wire
         self._changed = threading.Condition()
@@ -90,7 +91,7 @@ class InProcessPort:
                 left = deadline - time.monotonic()
                 if data or left <= 0:
                     return data
-                due = self._wire.until_next()
+                due = self._wire.until_tick()
                 self._changed.wait(left if due is None else min(left, due))
 
     def write(self, data: bytes, timeout_s: float) -> None:
@@ -114,11 +115,11 @@ class InProcessPort:
         deadline = time.monotonic() + timeout_s
         with self._changed:
             self._check_open()
-            while self._wire.full:
+            while not self._wire.takes():
                 left = deadline - time.monotonic()
                 if left <= 0:
                     raise TimeoutError(f"the line is full for {timeout_s} s")
-                self._changed.wait(min(left, self._wire.until_next() or 0.0))
+                self._changed.wait(min(left, self._wire.until_tick() or 0.0))
                 self._check_open()
             self._wire.receive(bytes(data))
             self._changed.notify_all()
@@ -167,7 +168,7 @@ def open_in_process(url: str) -> InProcessPort:
     faults = fields.pop("faults", ())
     seed = fields.pop("seed", 0)
     baud = fields.pop("baud", 0)
-    return InProcessPort(Wire(Device(Config(**fields)), faults, seed, baud=baud))
+    return InProcessPort(paced(Wire(Device(Config(**fields)), faults, seed), baud))
 
 
 def _parse_url(url: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from firmware_sim.in_process import InProcessPort, open_in_process
+from firmware_sim.pace import PacedWire
 from firmware_sim.wire import Wire
 
 __all__ = [
@@ -27,11 +28,12 @@ __all__ = [
     "serve_wire",
 ]
 
+_LOOK: Final = 0.02  # seconds between looks at a host that does not read
 _CHUNK: Final = 4096  # bytes to read at a time
 _CLOGGED: Final = 65_536  # with so many bytes that the host has not read, none are taken from it
 
 
-def serve_wire(wire: Wire, line: int, stop: int) -> bool:
+def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
     """Run a device on a line until the line ends or something tells it to stop.
 
     Parameters
@@ -51,13 +53,13 @@ def serve_wire(wire: Wire, line: int, stop: int) -> bool:
     out = bytearray()
     while True:
         readers = [stop]
-        if clogged := len(out) >= _CLOGGED:
-            pause = wire.until_tick()
-        else:
+        if len(out) < _CLOGGED:
             out += wire.transmit()
-            pause = wire.until_next()
-        if not (clogged or wire.full):
-            readers.append(line)
+            if wire.takes():
+                readers.append(line)
+        pause = wire.until_tick()
+        if pause is not None and len(out) >= _CLOGGED:
+            pause = max(pause, _LOOK)  # what is due for a host that does not read stays due
         writers = [line] if out else []
         readable, writable, _ = select.select(readers, writers, [], pause)
         if stop in readable:
@@ -152,7 +154,7 @@ def listen(host: str, port: int, *, remote: bool = False) -> socket.socket:
     return socket.create_server(address[:2], family=family, backlog=1)
 
 
-def serve_tcp(wire: Wire, listener: socket.socket, stop: int) -> None:
+def serve_tcp(wire: Wire | PacedWire, listener: socket.socket, stop: int) -> None:
     """Run a device for one connection after the other until something tells it to stop.
 
     Parameters

@@ -1,4 +1,4 @@
-"""A device on a line: its refresh ticks by a real clock, the pace of the line, and its faults.
+"""A device on a line: its refresh ticks by a real clock, and the faults of the line.
 
 It knows nothing of what the line is made of.
 """
@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 from firmware_sim.device import Device
 from firmware_sim.faults import Line
-from firmware_sim.pace import Pace
 
 
 class Wire:
@@ -24,8 +23,6 @@ class Wire:
         Where their chance begins.
     clock
         Seconds, never going back.
-    baud
-        Bits per second of the line, ten to a byte, each way; 0: bytes take no time.
 
     Attributes
     ----------
@@ -39,50 +36,34 @@ class Wire:
         faults: tuple[tuple[str, float], ...] = (),
         seed: int = 0,
         clock: Callable[[], float] = time.monotonic,
-        *,
-        baud: int = 0,
     ) -> None:
         self.device = device
         self._in = Line(faults, seed, "in")
         self._out = Line(faults, seed, "out")
-        self._down = Pace(baud, clock)
-        self._up = Pace(baud, clock)
         self._clock = clock
         self._epoch = clock()
         self._due: int | None = None  # number of the tick that a swap waits for
 
-    @property
-    def full(self) -> bool:
-        """Whether so much is on its way to the device that the line takes no more for now."""
-        return self._down.full
-
     def receive(self, data: bytes) -> None:
-        """Take bytes from the host; the device has them when the line has carried them."""
-        self._down.put(data)
+        """Carry bytes from the host to the device."""
+        self.advance()
+        self.device.receive(self._in.carry(data))
         self.advance()
 
     def transmit(self) -> bytes:
-        """Return what the line has carried to the host of what the device has to send."""
+        """Carry all that the device has to send to the host."""
         self.advance()
-        self._load()
-        return self._out.carry(self._up.get())
+        return self._out.carry(self.device.transmit())
 
-    def _load(self) -> None:
-        if not self._up.full:
-            self._up.put(self.device.transmit())
+    def takes(self) -> bool:
+        """Tell whether the line takes bytes from the host: this one always does."""
+        return True
 
     def advance(self) -> None:
-        """Let the bytes arrive and the refresh ticks pass that have come due.
+        """Let the refresh ticks pass that have come due.
 
-        Of the ticks only those that swap matter. They are counted from the start, so that none
-        drifts.
+        Only those that swap matter. They are counted from the start, so that none drifts.
         """
-        self._tick()
-        if data := self._down.get():
-            self.device.receive(self._in.carry(data))
-            self._tick()
-
-    def _tick(self) -> None:
         device = self.device
         tick = int((self._clock() - self._epoch) * device.config.refresh / 1000)
         if self._due is None:
@@ -101,15 +82,6 @@ class Wire:
         due = self._epoch + self._due * 1000 / self.device.config.refresh
         return max(0.0, due - self._clock())
 
-    def until_next(self) -> float | None:
-        """Return the seconds until anything happens by itself; None if nothing is in sight."""
-        tick = self.until_tick()
-        self._load()  # what the device has said since it was asked last is on its way, too
-        times = (tick, self._down.until_due(), self._up.until_due())
-        return min((seconds for seconds in times if seconds is not None), default=None)
-
     def disconnect(self) -> None:
         """Break the connection: the session ends."""
-        self._down.clear()
-        self._up.clear()
         self.device.disconnect()

@@ -15,7 +15,7 @@ from firmware_sim import serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.in_process import open_in_process
-from firmware_sim.pace import Pace
+from firmware_sim.pace import Pace, PacedWire, paced
 from firmware_sim.serve import serve_wire
 from firmware_sim.wire import Wire
 
@@ -103,18 +103,15 @@ def test_so_much_waits_and_no_more(clock):
     assert not fast.full
 
 
-def test_without_a_rate_no_time_passes(clock):
-    pace = Pace(0, clock)
-    assert pace.until_due() is None
-    pace.put(bytes(1 << 20))
-    assert not pace.full
-    assert pace.until_due() == 0
-    assert len(pace.get()) == 1 << 20
+def test_without_a_rate_a_wire_stays_as_it_is(clock):
+    wire = Wire(Device(Config((3, 5, 7))), clock=clock)
+    assert paced(wire, 0) is wire
+    assert paced(wire, 50).device is wire.device
 
 
 def wire_on(clock, **settings):
     settings = {"refresh": 0, **settings}
-    return Wire(Device(Config((3, 5, 7), **settings)), clock=clock, baud=1000)
+    return PacedWire(Wire(Device(Config((3, 5, 7), **settings)), clock=clock), 1000, clock)
 
 
 def test_an_answer_takes_the_line_both_ways(clock):
@@ -122,18 +119,18 @@ def test_an_answer_takes_the_line_both_ways(clock):
     wire.receive(hello())
     got = b""
     while not got.endswith(b"\0"):
-        clock.sleep(wire.until_next())
+        clock.sleep(wire.until_tick())
         got += wire.transmit()
     assert answers(got)[0].kind == INFO
     assert clock.now - 1000 == pytest.approx((len(hello()) + len(got)) * 0.01, abs=0.001)
-    assert wire.until_next() is None
+    assert wire.until_tick() is None
 
 
 def test_a_tick_and_the_line_go_on_side_by_side(clock):
     wire = wire_on(clock, refresh=2000)
     wire.receive(hello() + data(0, 0, b"\xa0", CLEAR | COMMIT))
     got = b""
-    while (pause := wire.until_next()) is not None:
+    while (pause := wire.until_tick()) is not None:
         clock.sleep(pause)
         got += wire.transmit()
     assert [(a.kind, a.flags) for a in answers(got)] == [(INFO, 0), (ACK, PENDING), (ACK, SHOWN)]
@@ -141,11 +138,12 @@ def test_a_tick_and_the_line_go_on_side_by_side(clock):
 
 
 def test_a_line_that_is_full_takes_nothing_from_the_device(clock):
-    wire = Wire(Device(Config((3, 5, 7), refresh=0)), clock=clock, baud=50_000)
+    device = Device(Config((3, 5, 7), refresh=0))
+    wire = PacedWire(Wire(device, clock=clock), 50_000, clock)
     asked, got = 2000, b""
     for _ in range(asked):
         wire.receive(status())
-    while (pause := wire.until_next()) is not None:
+    while (pause := wire.until_tick()) is not None:
         clock.sleep(pause)
         got += wire.transmit()
     assert len(answers(got)) == asked
@@ -155,9 +153,9 @@ def test_a_line_that_is_cut_forgets_what_was_on_its_way(clock):
     wire = wire_on(clock)
     wire.receive(hello())
     clock.sleep(1)
-    assert wire.until_next() is not None
+    assert wire.until_tick() is not None
     wire.disconnect()
-    assert wire.until_next() is None
+    assert wire.until_tick() is None
     assert wire.transmit() == b""
 
 
@@ -167,7 +165,7 @@ def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch
     theirs.setblocking(False)
     for end in (ours, theirs):
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    wire = Wire(Device(Config((3, 5, 7), refresh=0)), baud=100_000_000)
+    wire = paced(Wire(Device(Config((3, 5, 7), refresh=0))), 100_000_000)
     looks = []
 
     def look(*arguments):
@@ -186,6 +184,29 @@ def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch
     before = len(looks)
     time.sleep(0.1)
     assert len(looks) - before < 20, "and who waits does not look without end"
+    os.write(stopper, b"\0")
+    pump.join(WAIT)
+    assert not pump.is_alive()
+    assert sent < 50_000_000
+    for descriptor in (stop, stopper):
+        os.close(descriptor)
+    ours.close()
+    theirs.close()
+
+
+def test_a_line_that_is_full_takes_nothing_from_the_host():
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    ours.settimeout(0.2)
+    wire = paced(Wire(Device(Config((3, 5, 7), refresh=0))), 50)
+    stop, stopper = os.pipe()
+    pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
+    pump.start()
+    sent = 0
+    with contextlib.suppress(TimeoutError):
+        while sent < 50_000_000:
+            sent += ours.send(bytes(1000))
+    assert len(wire._down._queue) <= 2 * 4096
     os.write(stopper, b"\0")
     pump.join(WAIT)
     assert not pump.is_alive()
