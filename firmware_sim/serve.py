@@ -57,11 +57,8 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
             out += wire.transmit()
             if wire.takes():
                 readers.append(line)
-        pause = wire.until_tick()
-        if pause is not None and len(out) >= _CLOGGED:
-            pause = max(pause, _LOOK)  # what is due for a host that does not read stays due
         writers = [line] if out else []
-        readable, writable, _ = select.select(readers, writers, [], pause)
+        readable, writable, _ = select.select(readers, writers, [], _pause(wire, out))
         if stop in readable:
             return True
         try:
@@ -76,6 +73,12 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
             continue  # the other side was faster
         except OSError:
             return False
+
+
+def _pause(wire: Wire | PacedWire, out: bytearray) -> float | None:
+    """Return how long to sleep; what is due for a host that does not read stays due."""
+    pause = wire.until_tick()
+    return pause if pause is None or len(out) < _CLOGGED else max(pause, _LOOK)
 
 
 @contextlib.contextmanager

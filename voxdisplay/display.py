@@ -7,7 +7,6 @@ answers. It knows when to wait and what to compare; how bytes are made is the bu
 
 from __future__ import annotations
 
-import secrets
 import time
 from collections import deque
 from collections.abc import Callable
@@ -24,17 +23,21 @@ from voxdisplay.errors import (
     IncompatibleDevice,
     LocalProtocolError,
     TransportClosed,
+    TransportError,
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
 from voxdisplay.link import Event, Link, PageRead, Ready, Refused, Shown
 from voxdisplay.pixel import Pixels
+from voxdisplay.probe import new_session, said_before
+from voxdisplay.reconnect import Reconnect
 from voxdisplay.transport import Transport, open_transport
 from voxdisplay.wire.packet import Info, Page
 from voxdisplay.wire.spans import decode_spans
 
 TIMEOUT_S = 5.0
 _LONGEST_WAIT_S = 0.5
+_LAST_S = 2.0  # for a last dark picture
 Progress = Callable[[int, int], None]
 
 
@@ -69,7 +72,12 @@ class Receipt:
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
-    port: str | Transport, *, baud: int = 115200, timeout_s: float = TIMEOUT_S
+    port: str | Transport,
+    *,
+    baud: int = 115200,
+    timeout_s: float = TIMEOUT_S,
+    reconnect_s: float = 0.0,
+    note: Callable[[str], None] | None = None,
 ) -> Display:
     """Open a display: the port, and a session with the device behind it.
 
@@ -82,6 +90,11 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
         Bits per second of a serial line.
     timeout_s : float
         How long the device may be silent.
+    reconnect_s : float
+        How long a device that is pulled out is waited for. When the same device is back, it gets
+        its picture again, whole, and all goes on. 0: it is not waited for.
+    note : callable, optional
+        Is told, in a line, when a device is lost, and when it is back.
 
     Raises
     ------
@@ -95,7 +108,8 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     """
     transport = open_transport(port, baud=baud) if isinstance(port, str) else port
     try:
-        return Display(transport, timeout_s=timeout_s)
+        reconnect = Reconnect(transport.port, reconnect_s, baud=baud, note=note)
+        return Display(transport, timeout_s=timeout_s, reconnect=reconnect if reconnect_s else None)
     except BaseException:
         transport.close()
         raise
@@ -110,6 +124,8 @@ class Display:
         An open pipe to the device.
     timeout_s : float
         How long the device may be silent.
+    reconnect : Reconnect, optional
+        Who waits for a device that has gone away, and finds it again.
 
     Attributes
     ----------
@@ -120,18 +136,28 @@ class Display:
 
     """
 
-    def __init__(self, transport: Transport, *, timeout_s: float = TIMEOUT_S) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        *,
+        timeout_s: float = TIMEOUT_S,
+        reconnect: Reconnect | None = None,
+    ) -> None:
         self.port = transport.port
         self._transport = transport
+        self._reconnect: Reconnect | None = None  # not before the device is known
+        self._renewals = 0
+        self._on_display: tuple[list[bytes], int] | None = None  # payloads and digest
         self._timeout_s = timeout_s
         self._closed = False
         self._frames = 0
         self._shown: dict[int, int | None] = {}  # ticket -> digest
-        self._unwaited: dict[int, int] = {}  # ticket -> digest that is meant
+        self._unwaited: dict[int, tuple[list[bytes], int]] = {}  # ticket -> payloads and digest
         self._pages: list[Page] = []
         self._events: deque[Event] = deque()
-        self._link = Link(_new_session(), time.monotonic(), patience_s=timeout_s)
+        self._link = Link(new_session(), time.monotonic(), patience_s=timeout_s)
         self.info = self._greet()
+        self._reconnect = reconnect
 
     # -- the session
 
@@ -142,27 +168,42 @@ class Display:
         except TransportTimeout as error:
             raise TransportTimeout(f"{self.port}: {error}", hint=error.hint) from error
         except TransportClosed as error:
-            if not (noise := self._link.stream.noise):
-                raise
-            raise TransportClosed(
-                f"{error}; what it had said is no packet: {noise[:24]!r}",
-                hint="is this the display's port? Something else answers there",
-            ) from error
+            raise said_before(error, self._link.stream.noise) from error
         assert self._link.info is not None  # noqa: S101 - ready
         return device_info(self._link.info)
 
     def _turn(self, *, wait: bool = True) -> None:
         """Write what may be written, wait for an answer or the time to ask, take what comes."""
+        try:
+            self._exchange(wait=wait)
+        except (TransportClosed, TransportTimeout) as error:
+            self._renew(error)
+        while self._events:
+            self._take(self._events.popleft())
+
+    def _exchange(self, *, wait: bool) -> None:
         if out := self._link.transmit(time.monotonic()):
             self._transport.write(out, self._timeout_s)
         wait_s = self._link.next_timeout(time.monotonic()) if wait else 0.0
         wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
         data = self._transport.read(wait_s)
         self._events += self._link.receive(data, time.monotonic())
-        while self._events:
-            self._take(self._events.popleft())
+
+    def _renew(self, error: TransportError) -> None:
+        """Wait for the device to come back, and have it show again what it showed."""
+        if self._reconnect is None:
+            raise error
+        self._transport.close()
+        self._transport = self._reconnect.wait(error, self.info.serial)
+        self.port = self._transport.port
+        self._renewals += 1
+        self._link.renew(time.monotonic())
+        if self._on_display and not self._link.backlog:
+            self._unwaited[self._link.present(self._on_display[0])] = self._on_display
 
     def _take(self, event: Event) -> None:
+        if self._reconnect and isinstance(event, Shown | PageRead):
+            self._reconnect.settled()
         match event:
             case Ready(info) if self._link.counters.sessions > 1:
                 self._check_same(info)
@@ -242,6 +283,7 @@ class Display:
         if digest is not None and digest != meant:
             self._repair(frame, payloads, meant, digest)
             digest = meant
+        self._on_display = payloads, meant
         self._frames += 1
         sent = _Sent.of(self._link)
         return Receipt(
@@ -281,13 +323,14 @@ class Display:
         for ticket in list(self._unwaited):
             if self._link.withdraw(ticket):
                 del self._unwaited[ticket]
-        ticket = self._link.present(frame.payloads(self.info.max_payload_bytes))
-        self._unwaited[ticket] = frame.digest()
+        payloads = frame.payloads(self.info.max_payload_bytes)
+        self._unwaited[self._link.present(payloads)] = payloads, frame.digest()
         self.poll()
 
     def _settle(self, ticket: int, digest: int | None) -> None:
         """Note that a frame which nobody waited for is on display, and all before it are over."""
-        meant = self._unwaited[ticket]
+        self._on_display = self._unwaited[ticket]
+        meant = self._on_display[1]
         self._unwaited = {later: d for later, d in self._unwaited.items() if later > ticket}
         self._frames += 1
         if digest is not None and digest != meant:
@@ -343,11 +386,16 @@ class Display:
         self._pages.clear()
         total = self.info.grid.voxels
         values = np.zeros(total, dtype=np.uint32)
-        at = 0
+        at, renewals = 0, self._renewals
         while at < total:
             self._link.read(at, total - at, back=back)
             while not self._pages:
                 self._turn()
+            if renewals != self._renewals:  # it may have lost its memory: once more, from the start
+                self.flush()
+                self._pages.clear()
+                at, renewals = 0, self._renewals
+                continue
             page = self._pages.pop()
             values[at : at + page.count] = decode_spans(page.ops, page.count, self.info.format)
             at += page.count
@@ -384,11 +432,39 @@ class Display:
         if self._closed:
             raise LocalProtocolError("the display is closed")
 
-    def close(self) -> None:
-        """Close the port. The display keeps its picture. Twice is fine."""
-        if not self._closed:
+    def close(self, *, blank: bool = False) -> None:
+        """Close the port. Twice is fine.
+
+        Parameters
+        ----------
+        blank : bool
+            Make the display dark first; whatever is not on display yet is dropped. Otherwise the
+            display keeps its last whole picture.
+
+        Raises
+        ------
+        TransportError, DeviceError
+            If the display could not be made dark. The port is closed all the same.
+
+        """
+        if self._closed:
+            return
+        try:
+            if blank:
+                self._blank()
+        finally:
             self._closed = True
             self._transport.close()
+
+    def _blank(self) -> None:
+        """Show a dark frame at once: a new session drops all that is on its way."""
+        self._reconnect = None
+        self._timeout_s = min(self._timeout_s, _LAST_S)
+        self._unwaited.clear()
+        self._events.clear()
+        self._link = Link(new_session(), time.monotonic(), patience_s=self._timeout_s)
+        self._greet()
+        self._show([])
 
     def __enter__(self) -> Self:
         return self
@@ -412,10 +488,6 @@ class _Sent:
     def of(cls, link: Link) -> _Sent:
         counters = link.counters
         return cls(counters.packets, counters.wire_bytes, counters.retransmitted)
-
-
-def _new_session() -> int:
-    return 1 + secrets.randbelow(0xFFFF)
 
 
 def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:

@@ -1,5 +1,6 @@
 """What every byte pipe must do, over every kind of it: `Transport`, sentence by sentence."""
 
+import contextlib
 import random
 import threading
 import time
@@ -147,3 +148,16 @@ def test_closed_by_the_peer_while_we_wait(carrier):
     with pytest.raises(vd.TransportClosed, match=r"gone|closed"):
         read_all(transport, 1)
     closer.join()
+
+
+def test_waiting_costs_no_core(carrier):
+    """Neither for what does not come nor for room that there is not."""
+    transport, _ = carrier
+    for wait in (
+        lambda: transport.read(0.5),
+        lambda: transport.write(bytes(1 << 25), 0.5),
+    ):
+        began_s, used_s = time.monotonic(), time.thread_time()
+        with contextlib.suppress(vd.TransportTimeout):
+            wait()
+        assert time.thread_time() - used_s < 0.5 * (time.monotonic() - began_s)

@@ -24,7 +24,19 @@ MAY_IMPORT = {
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
     "device": {"errors", "grid", "pixel", "wire"},
-    "display": {"device", "errors", "frame", "link", "pixel", "transport", "wire"},
+    "probe": {"errors", "link", "transport", "wire"},
+    "reconnect": {"errors", "probe", "transport"},
+    "display": {
+        "device",
+        "errors",
+        "frame",
+        "link",
+        "pixel",
+        "probe",
+        "reconnect",
+        "transport",
+        "wire",
+    },
 }
 
 

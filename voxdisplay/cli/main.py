@@ -10,6 +10,7 @@ import click
 
 from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, ports, read
+from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
 from voxdisplay.cli.push import push
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
@@ -25,7 +26,6 @@ EXIT_USAGE: Final = 2
 EXIT_PIPE: Final = 3
 EXIT_PROTOCOL: Final = 4
 EXIT_INTERNAL: Final = 70
-EXIT_INTERRUPT: Final = 130
 
 _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
     (SceneError, EXIT_USAGE),
@@ -39,7 +39,8 @@ _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
 @click.group(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""Exit codes: 0 done; 1 the device refused, or shows something else; 2 usage or scene;
-    3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted.
+    3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted;
+    143 ended by SIGTERM; 129 the terminal was closed.
 
     Shell completion: eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)", likewise zsh_source
     and fish_source.""",
@@ -65,15 +66,15 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     try:
-        cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
+        with ended_by_signals():
+            cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.exceptions.Exit as error:
         return error.exit_code
     except click.ClickException as error:
         error.show()
         return EXIT_USAGE
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; the display keeps its last whole picture", err=True)
-        return EXIT_INTERRUPT
+    except (click.Abort, KeyboardInterrupt, EndedError) as why:
+        return told_to_end(why)
     except VoxDisplayError as error:
         if debug:
             traceback.print_exc()

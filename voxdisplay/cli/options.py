@@ -54,15 +54,27 @@ def port_options(function: _C) -> _C:
     return function
 
 
+reconnect_option = click.option(
+    "--reconnect",
+    "reconnect_s",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    metavar="SECONDS",
+    help="How long a display that is pulled out is waited for. When it is back, it gets its "
+    "picture again.  [default: not at all]",
+)
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
-def open_display(port: str | None, baud: int, timeout_s: float) -> vd.Display:
+def open_display(
+    port: str | None, baud: int, timeout_s: float, *, reconnect_s: float = 0.0
+) -> vd.Display:
     """Open what ``--port`` names, or the emulator, and say so."""
     if not port:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
-    return vd.open(port, baud=baud, timeout_s=timeout_s)
+    return vd.open(port, baud=baud, timeout_s=timeout_s, reconnect_s=reconnect_s, note=note)
 
 
 def note(text: str) -> None:

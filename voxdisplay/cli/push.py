@@ -10,6 +10,7 @@ from typing import Literal
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
 from voxdisplay.cli.options import (
     device_json,
     json_option,
@@ -18,6 +19,7 @@ from voxdisplay.cli.options import (
     plural,
     port_options,
     print_json,
+    reconnect_option,
 )
 from voxdisplay.cli.scenes import voxelize_scene
 
@@ -41,6 +43,8 @@ from voxdisplay.cli.scenes import voxelize_scene
     "and clip.",
 )
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
+@reconnect_option
+@on_exit_option
 @json_option
 def push(
     *,
@@ -50,6 +54,8 @@ def push(
     timeout_s: float,
     fit: Literal["contain", "none"],
     verify: bool,
+    reconnect_s: float,
+    on_exit: OnExit,
     as_json: bool,
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
@@ -57,7 +63,8 @@ def push(
     Waits until the device has shown it and its digest agrees.
     """
     loaded = vd.load_scene(scene)
-    with open_display(port, baud, timeout_s) as display:
+    display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s)
+    with leaving(display, on_exit):
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
