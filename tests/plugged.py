@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import select
 import threading
 import tty
 from pathlib import Path
@@ -12,7 +11,6 @@ from pathlib import Path
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.pace import paced
 from firmware_sim.serve import serve_wire
 from firmware_sim.wire import Wire
 
@@ -22,11 +20,11 @@ WAIT_S = 20
 class Plug:
     """A cable. ``path`` is where the device is found while it is plugged in."""
 
-    def __init__(self, path, *, baud=0):
+    def __init__(self, path):
         self.path = path
-        self._baud = baud
         self._thread = None
         self.device = None
+        self.held = []  # what was not taken
 
     def plug(self, device=None, **config):
         """Plug a device in: the one from before, another, or a new one."""
@@ -40,14 +38,13 @@ class Plug:
         beside = self.path.with_suffix(".new")
         beside.symlink_to(os.ttyname(self._slave))
         beside.replace(self.path)
-        wire = paced(Wire(self.device), self._baud)
-        self._thread = threading.Thread(target=self._run, args=(wire,))
+        self._thread = threading.Thread(target=self._run)
         self._thread.start()
         return self
 
-    def _run(self, wire):
+    def _run(self):
         """Serve until it is pulled out; the pump itself lets go, so that nobody else's file is."""
-        serve_wire(wire, self._master, self._stop)
+        serve_wire(Wire(self.device), self._master, self._stop)
         for descriptor in (self._master, self._slave):
             os.close(descriptor)
         os.close(self._stop)
@@ -64,6 +61,16 @@ class Plug:
         os.close(self._stopper)
         self._thread = None
 
+    def hold(self):
+        """Once a session is open, have the device take nothing more, and answer nothing."""
+        device = self.device
+        take, held = device.receive, self.held
+        device.receive = lambda data: held.append(data) if device.session else take(data)
+
+    def release(self):
+        """Have it go on; what came meanwhile is lost."""
+        del self.device.receive
+
     def snapshot(self):
         return Bench(self.device).snapshot()
 
@@ -77,7 +84,3 @@ class Plug:
 def open_descriptors():
     """What this process has open: to be the same afterwards."""
     return sorted(path.name for path in Path("/proc/self/fd").iterdir())
-
-
-def readable(descriptor, seconds):
-    return bool(select.select([descriptor], [], [], seconds)[0])

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from carriers import eventually
 from conftest import DEADLINE_S, ROOT
-from plugged import Plug, open_descriptors, readable
+from plugged import Plug, open_descriptors
 
 import voxdisplay as vd
 from firmware_sim.config import Config
@@ -202,21 +202,20 @@ def start(port, *arguments, **pipes):
     return subprocess.Popen(command, text=True, **pipes)
 
 
-def test_the_command_waits_for_the_same_device(tmp_path, emulator):
-    """In mid-push, over a line with a pace: another start of the emulator at the same path."""
-    link, dump = tmp_path / "port", tmp_path / "front.npy"
-    line = ["--link", link, "--size", "64x64x64", "--baud", "2400"]
-    first = emulator(*line)
-    with start(link, "--reconnect", "30", "--json") as push:
-        time.sleep(0.6)
-        first.process.kill()
-        first.process.wait()
-        assert "is gone" in push.stderr.readline()
-        emulator(*line[:-1], "115200", "--dump", dump)
+def test_the_command_waits_for_the_same_device(plug):
+    """In mid-push; it comes back as it is after a start, dark."""
+    plug.plug(serial="A1").hold()
+    with start(plug.path, "--reconnect", "30", "--json") as push:
+        eventually(lambda: plug.held, "a frame on its way")
+        plug.unplug()
+        assert any("is gone" in line for line in iter(push.stderr.readline, ""))
+        plug.release()
+        plug.device.power_cycle()
+        plug.plug()
         out, said = push.communicate(timeout=DEADLINE_S)
     assert push.returncode == 0, said
     assert "is back after" in said
-    lit = np.count_nonzero(np.load(dump).any(axis=-1))
+    lit = np.count_nonzero(np.frombuffer(plug.snapshot().pixels, np.uint8))
     assert json.loads(out)["voxels"] == lit > 0
 
 
@@ -227,55 +226,64 @@ ENDS = {"SIGINT": 130, "SIGTERM": 143, "SIGHUP": 129}
 
 @pytest.mark.parametrize("on_exit", ["keep", "blank"])
 @pytest.mark.parametrize("name", ENDS)
-def test_told_to_end_in_mid_push(tmp_path, emulator, run, name, on_exit):
-    link, dump = tmp_path / "port", tmp_path / "front.npy"
-    device = emulator("--link", link, "--dump", dump, "--size", "48x48x48", "--baud", "4800")
-    assert run("push", "examples/sphere.json", "--port", link).returncode == 0
-    before = np.load(dump)
-    assert before.any()
-    with start(link, "--on-exit", on_exit) as push:
-        time.sleep(0.75)
+def test_told_to_end_in_mid_push(plug, name, on_exit):
+    plug.plug()
+    with vd.open(str(plug.path)) as display:
+        before = noise(display)
+        display.present(before)
+    plug.device.disconnect()
+    plug.hold()
+    with start(plug.path, "--on-exit", on_exit) as push:
+        eventually(lambda: plug.held, "a frame on its way")
+        plug.release()
         push.send_signal(getattr(signal, name))
         out, said = push.communicate(timeout=DEADLINE_S)
-    if push.returncode == 0:
-        pytest.fail("it was done before it was told to end")
     assert push.returncode == ENDS[name], said
     assert "Traceback" not in said
     assert out == ""
     if on_exit == "blank":
         assert "the display is dark" in said
-        assert not np.load(dump).any()
+        assert not any(plug.snapshot().pixels)
     else:
         assert "keeps its last whole picture" in said
-        assert np.array_equal(np.load(dump), before)
-    assert run("info", "--port", link).returncode == 0, "the port is free"
-    assert device.stop() == 0
+        assert shows(plug, before)
+    vd.open(str(plug.path)).close()  # the port is free
 
 
-def test_under_nohup_a_closed_terminal_changes_nothing(tmp_path, emulator):
-    link = tmp_path / "port"
-    emulator("--link", link, "--size", "48x48x48", "--baud", "19200")
+def test_a_display_that_cannot_be_made_dark(plug):
+    plug.plug().hold()
+    with start(plug.path, "--on-exit", "blank") as push:
+        eventually(lambda: plug.held, "a frame on its way")
+        push.send_signal(signal.SIGTERM)
+        _, said = push.communicate(timeout=DEADLINE_S)
+    plug.release()
+    assert push.returncode == 143
+    assert "could not be made dark" in said
+
+
+def test_under_nohup_a_closed_terminal_changes_nothing(plug):
+    plug.plug().hold()
     ignore = lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)  # noqa: E731
-    with start(link, preexec_fn=ignore) as push:
-        time.sleep(0.6)
+    with start(plug.path, preexec_fn=ignore) as push:
+        eventually(lambda: plug.held, "a frame on its way")
         push.send_signal(signal.SIGHUP)
+        plug.release()
         _, said = push.communicate(timeout=DEADLINE_S)
     assert push.returncode == 0, said
 
 
-def test_a_terminal_that_is_closed(tmp_path, emulator, run):
-    """The real thing: the terminal is gone, and with it everything that could be said there."""
-    link = tmp_path / "port"
-    emulator("--link", link, "--size", "48x48x48", "--baud", "2400")
-    arguments = ["-m", "voxdisplay", "push", SCENE, "--port", str(link), "--on-exit", "blank"]
+def test_a_terminal_that_is_closed(plug):
+    """The real thing: with the terminal goes everything that could be said there."""
+    plug.plug().hold()
+    arguments = ["-m", "voxdisplay", "push", SCENE, "--port", str(plug.path), "--on-exit", "blank"]
     pid, terminal = pty.fork()
     if pid == 0:
         os.chdir(ROOT)
-        os.execv(  # noqa: S606
-            sys.executable, [sys.executable, *arguments]
-        )
-    eventually(lambda: not readable(terminal, 0.6), "a quiet moment")
+        os.execv(sys.executable, [sys.executable, *arguments])  # noqa: S606
+    eventually(lambda: plug.held, "a frame on its way")
+    plug.release()
     os.close(terminal)
     _, status = os.waitpid(pid, 0)
     assert os.waitstatus_to_exitcode(status) == 129
-    assert run("info", "--port", link).returncode == 0, "the port is free"
+    assert not any(plug.snapshot().pixels)
+    vd.open(str(plug.path)).close()  # the port is free
