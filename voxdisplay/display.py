@@ -12,11 +12,12 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.baud import DEFAULT_BAUD, open_at_best_rate
 from voxdisplay.device import DeviceInfo, device_error, device_info
 from voxdisplay.errors import (
     DesyncError,
@@ -74,7 +75,7 @@ class Receipt:
 def open(  # noqa: A001 - as the built-in: vd.open(port)
     port: str | Transport,
     *,
-    baud: int = 115200,
+    baud: int | Literal["auto"] = DEFAULT_BAUD,
     timeout_s: float = TIMEOUT_S,
     reconnect_s: float = 0.0,
     note: Callable[[str], None] | None = None,
@@ -86,15 +87,16 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     port : str or Transport
         ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, or an open
         pipe, which is closed with the display.
-    baud : int
-        Bits per second of a serial line.
+    baud : int or "auto"
+        Bits per second of a serial line; ``"auto"`` for the fastest common one at which the device
+        answers: see `voxdisplay.baud`.
     timeout_s : float
         How long the device may be silent.
     reconnect_s : float
         How long a device that is pulled out is waited for. When the same device is back, it gets
         its picture again, whole, and all goes on. 0: it is not waited for.
     note : callable, optional
-        Is told, in a line, when a device is lost, and when it is back.
+        Is told, in a line, when a device is lost and when it is back, and what rate was found.
 
     Raises
     ------
@@ -106,9 +108,17 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
         If it speaks another protocol major, or has a pixel format we do not know.
 
     """
-    transport = open_transport(port, baud=baud) if isinstance(port, str) else port
+    note = note or (lambda _text: None)
+    if not isinstance(port, str):
+        transport = port
+    elif baud == "auto":
+        transport = open_at_best_rate(port, timeout_s)
+        note(f"{port} answers at {getattr(transport, 'baud', 'any')} Bd")
+    else:
+        transport = open_transport(port, baud=baud)
     try:
-        reconnect = Reconnect(transport.port, reconnect_s, baud=baud, note=note)
+        rate = getattr(transport, "baud", DEFAULT_BAUD)
+        reconnect = Reconnect(transport.port, reconnect_s, baud=rate, note=note)
         return Display(transport, timeout_s=timeout_s, reconnect=reconnect if reconnect_s else None)
     except BaseException:
         transport.close()

@@ -24,9 +24,11 @@ MAY_IMPORT = {
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
     "device": {"errors", "grid", "pixel", "wire"},
-    "probe": {"errors", "link", "transport", "wire"},
+    "baud": {"errors", "probe", "transport"},
+    "probe": {"device", "errors", "link", "transport", "wire"},
     "reconnect": {"errors", "probe", "transport"},
     "display": {
+        "baud",
         "device",
         "errors",
         "frame",

@@ -9,8 +9,9 @@ from typing import Final
 import click
 
 from voxdisplay import __version__
-from voxdisplay.cli.device import clear, info, ports, read
+from voxdisplay.cli.device import clear, info, read
 from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
+from voxdisplay.cli.ports import ports
 from voxdisplay.cli.push import push
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (

@@ -12,6 +12,7 @@ import click
 import voxdisplay as vd
 from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
 from voxdisplay.cli.options import (
+    Baud,
     device_json,
     json_option,
     note,
@@ -50,7 +51,7 @@ def push(
     *,
     scene: str,
     port: str | None,
-    baud: int,
+    baud: Baud,
     timeout_s: float,
     fit: Literal["contain", "none"],
     verify: bool,

@@ -12,7 +12,7 @@ from typing import Final
 # only when ports are listed, and left out where what they need is not installed.
 _FINDERS: Final = (
     ("voxdisplay.transport.discovery", "serial_ports"),
-    ("voxdisplay.transport.usb", "usb_ports"),
+    ("voxdisplay.transport.usb", "found"),
 )
 
 
@@ -27,8 +27,6 @@ class FoundPort:
     vid, pid : int or None
         USB vendor and product, where the system knows them.
     serial_number : str or None
-    kind : str
-        ``"emulator"``, ``"serial"`` or ``"usb"``.
     product : str or None
         What the USB device calls itself.
 
@@ -39,8 +37,12 @@ class FoundPort:
     vid: int | None = None
     pid: int | None = None
     serial_number: str | None = None
-    kind: str = "serial"
     product: str | None = None
+
+    @property
+    def kind(self) -> str:
+        """What it is: ``"emulator"``, ``"usb"`` or ``"serial"``."""
+        return {"sim": "emulator", "usb": "usb"}.get(self.port.partition(":")[0], "serial")
 
     def is_same_device(self, other: FoundPort) -> bool:
         """Tell whether both are one USB device, wherever it is plugged in.
@@ -63,7 +65,6 @@ def serial_ports() -> list[FoundPort]:
                 found.vid,
                 found.pid,
                 found.serial_number or None,
-                "serial",
                 found.product,
             )
             for found in comports()
@@ -74,7 +75,7 @@ def serial_ports() -> list[FoundPort]:
 
 def all_ports() -> list[FoundPort]:
     """List everything that can be opened without further knowledge."""
-    return [FoundPort("sim:", "the built-in emulator", kind="emulator"), *_found()]
+    return [FoundPort("sim:", "the built-in emulator"), *_found()]
 
 
 def _found() -> Iterator[FoundPort]:

@@ -64,12 +64,6 @@ class SerialTransport:
             raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
         self._closed = False
         self._descriptor = _descriptor(self._serial)
-        if self._descriptor is not None:
-            self._serial.timeout = self._serial.write_timeout = 0
-        elif not _is_rfc2217(self._serial):  # which knows no such thing
-            self._serial.write_timeout = _POLLED_WRITE_S
-        if isinstance(self._serial, serial.Serial):
-            lower_latency(str(self._serial.portstr))
 
     @property
     def is_rated(self) -> bool:
@@ -169,13 +163,7 @@ class SerialTransport:
                 self._serial.reset_output_buffer()
         except _GONE:
             pass
-        # pyserial forgets to close a socket whose other end is gone.
-        sockets = filter(None, [getattr(self._serial, "_socket", None)])
-        for each in (self._serial, *sockets):
-            try:
-                each.close()
-            except _GONE:  # it is gone: that is what was wanted
-                continue
+        _close(self._serial)
 
 
 def _open(port: str, baud: int) -> serial.SerialBase:
@@ -183,7 +171,30 @@ def _open(port: str, baud: int) -> serial.SerialBase:
     if isinstance(line, serial.Serial):  # the system's own, perhaps behind spy://
         line.exclusive = True
     line.open()
+    try:
+        if _descriptor(line) is not None:
+            line.timeout = line.write_timeout = 0
+        elif not _is_rfc2217(line):  # which knows no such thing
+            line.write_timeout = _POLLED_WRITE_S
+    except BaseException:  # it may be pulled out here, too
+        _close(line)
+        raise
+    if isinstance(line, serial.Serial):
+        lower_latency(str(line.portstr))
     return line
+
+
+def _close(line: Any) -> None:
+    """Close all that a port has open: pyserial forgets some of it."""
+    # A socket whose other end is gone, and the file that spy:// writes.
+    forgotten = [getattr(line, "_socket", None), getattr(line, "formatter", None)]
+    forgotten = [getattr(each, "output", each) for each in forgotten]
+    for each in (line, *forgotten):
+        try:
+            if each not in (None, sys.stdout, sys.stderr):
+                each.close()
+        except _GONE:  # it is gone: that is what was wanted
+            continue
 
 
 def _descriptor(line: serial.SerialBase) -> int | None:
