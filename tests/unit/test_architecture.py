@@ -24,6 +24,7 @@ MAY_IMPORT = {
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
     "device": {"errors", "grid", "pixel", "wire"},
+    "plan": {"frame", "wire"},
     "baud": {"errors", "probe", "transport"},
     "probe": {"device", "errors", "link", "transport", "wire"},
     "reconnect": {"errors", "probe", "transport"},

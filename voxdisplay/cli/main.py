@@ -11,6 +11,7 @@ import click
 from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, read
 from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
+from voxdisplay.cli.plan import plan_command
 from voxdisplay.cli.ports import ports
 from voxdisplay.cli.push import push
 from voxdisplay.cli.voxelize import voxelize
@@ -58,7 +59,7 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, voxelize, info, ports, clear, read):
+for command in (push, voxelize, plan_command, info, ports, clear, read):
     cli.add_command(command)
 
 

@@ -99,6 +99,16 @@ reconnect_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
+fit_option = click.option(
+    "--fit",
+    type=click.Choice(["contain", "none"]),
+    default="contain",
+    show_default=True,
+    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
+    "and clip.",
+)
+
+
 def open_display(
     port: str | None, baud: Baud, timeout_s: float, *, reconnect_s: float = 0.0
 ) -> vd.Display:

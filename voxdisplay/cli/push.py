@@ -14,6 +14,7 @@ from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
 from voxdisplay.cli.options import (
     Baud,
     device_json,
+    fit_option,
     json_option,
     note,
     open_display,
@@ -22,7 +23,7 @@ from voxdisplay.cli.options import (
     print_json,
     reconnect_option,
 )
-from voxdisplay.cli.scenes import voxelize_scene
+from voxdisplay.cli.scenes import draw
 
 
 @click.command(
@@ -35,14 +36,7 @@ from voxdisplay.cli.scenes import voxelize_scene
 )
 @click.argument("scene", type=click.Path())
 @port_options
-@click.option(
-    "--fit",
-    type=click.Choice(["contain", "none"]),
-    default="contain",
-    show_default=True,
-    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
-    "and clip.",
-)
+@fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
 @reconnect_option
 @on_exit_option
@@ -69,7 +63,8 @@ def push(
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
-        frame = draw(fitted, display)
+        frame = display.frame()
+        draw(fitted, frame)
         with _progress("sending") as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
@@ -93,24 +88,6 @@ def push(
             )
         else:
             click.echo(_summary(display, receipt, verify=verify))
-
-
-def draw(scene: vd.Scene, display: vd.Display) -> vd.Frame:
-    """Draw a scene, and say on stderr what the display cannot show."""
-    frame = display.frame()
-    drawings = [
-        frame.draw(sequence, item.color)
-        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
-    ]
-    total = sum(drawing.voxels for drawing in drawings)
-    clipped = sum(drawing.clipped for drawing in drawings)
-    if total and clipped == total:
-        note(f"warning: all {total} voxels are outside the display: the picture is empty")
-    elif clipped:
-        note(f"{clipped} of {total} voxels are outside the display, and not shown")
-    if not all(drawing.exact_color for drawing in drawings):
-        note(f"this is a {display.info.format.value} display: colours are the nearest it has")
-    return frame
 
 
 @contextlib.contextmanager
