@@ -261,6 +261,18 @@ def test_a_display_that_cannot_be_made_dark(plug):
     assert "could not be made dark" in said
 
 
+def test_interrupted_while_it_is_being_imported():
+    """Nothing is open yet; there is a word and the exit code, and no traceback."""
+    command = [sys.executable, "-X", "importtime", "-m", "voxdisplay_command", "push", SCENE]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as push:
+        assert any("numpy" in line for line in iter(push.stderr.readline, ""))
+        push.send_signal(signal.SIGINT)
+        _, said = push.communicate(timeout=DEADLINE_S)
+    assert push.returncode == 130
+    assert "Traceback" not in said
+    assert said.endswith("interrupted\n")
+
+
 def test_under_nohup_a_closed_terminal_changes_nothing(plug):
     plug.plug().hold()
     ignore = lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)  # noqa: E731

@@ -12,3 +12,10 @@ def test_the_table_of_curves_runs():
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "this engine" in run.stdout
     assert "bytes a voxel" in run.stdout
+
+
+def test_the_table_of_ports_runs():
+    command = [sys.executable, str(BENCH), "ports", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    for port in ("bare pty", "/dev/pts/N", "tcp://", "socket://", "rfc2217://", "sim:"):
+        assert f"\n{port} " in run.stdout

@@ -98,7 +98,7 @@ def test_a_dark_frame_costs_a_packet():
     line = Line.serial(1000)
     assert line.bytes_per_s == 100
     assert cost.seconds_on(line) == cost.answer_bytes / 100, "its answers are longer"
-    assert cost.rate_on(line) == 100 / cost.answer_bytes
+    assert cost.rate_on(line) == pytest.approx(100 / cost.answer_bytes)
     assert cost.rate_on(line, 1.5) == 1.5
 
 

@@ -1,0 +1,29 @@
+"""The command ``voxdisplay``, from its first moment on: what must be there before it is imported.
+
+Importing takes longer than a person needs for Ctrl-C, and nothing is open yet that would have to be
+closed: so until the command itself can be interrupted, it ends at once, without a traceback.
+"""
+
+import os
+import signal
+import sys
+
+_EXIT_INTERRUPT = 130
+
+
+def _leave(*_signal: object) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(_EXIT_INTERRUPT)
+
+
+def main() -> int:
+    """Run the command line; give its exit code."""
+    before = signal.signal(signal.SIGINT, _leave)
+    from voxdisplay.cli import main as command  # noqa: PLC0415 - that is the point
+
+    signal.signal(signal.SIGINT, before)
+    return command()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
