@@ -18,10 +18,13 @@ def _leave(*_signal: object) -> None:
 
 def main() -> int:
     """Run the command line; give its exit code."""
-    before = signal.signal(signal.SIGINT, _leave)
+    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if usual:  # and not ignored, as it is for a job in the background of a script
+        signal.signal(signal.SIGINT, _leave)
     from voxdisplay.cli import main as command  # noqa: PLC0415 - that is the point
 
-    signal.signal(signal.SIGINT, before)
+    if usual:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     return command()
 
 
