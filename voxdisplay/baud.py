@@ -8,6 +8,7 @@ wrong rate is a damaged segment, which changes nothing. Knows ports and HELLO; k
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from voxdisplay.errors import TransportTimeout
@@ -25,7 +26,7 @@ RATES: Final = (
 _EACH_S = 0.35  # long enough for two HELLOs, should the first one's answer begin with noise
 
 
-def open_at_best_rate(port: str, timeout_s: float) -> Transport:
+def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) -> Transport:
     """Open a port at the fastest common rate at which the device behind it answers.
 
     The port is opened once, so that a board that restarts then does so once. A device that is
@@ -38,6 +39,8 @@ def open_at_best_rate(port: str, timeout_s: float) -> Transport:
         A serial device or a URL of pyserial; any other port is opened as it is.
     timeout_s : float
         How long the device may take to answer, besides the time to try all rates.
+    note : callable
+        Is told, in a line, what was found.
 
     Raises
     ------
@@ -53,12 +56,14 @@ def open_at_best_rate(port: str, timeout_s: float) -> Transport:
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415 - loads pyserial
 
     if not isinstance(transport, SerialTransport) or not transport.is_rated:
+        note(f"{port} is no line that has a rate")
         return transport
     try:
         _find_rate(transport, timeout_s)
     except BaseException:
         transport.close()
         raise
+    note(f"{port} answers at {transport.baud} Bd")
     return transport
 
 

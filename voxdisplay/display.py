@@ -112,14 +112,15 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     if not isinstance(port, str):
         transport = port
     elif baud == "auto":
-        transport = open_at_best_rate(port, timeout_s)
-        note(f"{port} answers at {getattr(transport, 'baud', 'any')} Bd")
+        transport = open_at_best_rate(port, timeout_s, note)
     else:
         transport = open_transport(port, baud=baud)
     try:
-        rate = getattr(transport, "baud", DEFAULT_BAUD)
-        reconnect = Reconnect(transport.port, reconnect_s, baud=rate, note=note)
-        return Display(transport, timeout_s=timeout_s, reconnect=reconnect if reconnect_s else None)
+        reconnect = None
+        if reconnect_s:
+            rate = getattr(transport, "baud", DEFAULT_BAUD)
+            reconnect = Reconnect(transport.port, reconnect_s, baud=rate, note=note)
+        return Display(transport, timeout_s=timeout_s, reconnect=reconnect)
     except BaseException:
         transport.close()
         raise
@@ -339,10 +340,11 @@ class Display:
 
     def _settle(self, ticket: int, digest: int | None) -> None:
         """Note that a frame which nobody waited for is on display, and all before it are over."""
+        again = self._unwaited[ticket] is self._on_display  # after a renewal
         self._on_display = self._unwaited[ticket]
         meant = self._on_display[1]
         self._unwaited = {later: d for later, d in self._unwaited.items() if later > ticket}
-        self._frames += 1
+        self._frames += not again
         if digest is not None and digest != meant:
             raise DesyncError(f"the display's digest is {digest:08x}, the frame's {meant:08x}")
 

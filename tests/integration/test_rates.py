@@ -95,9 +95,11 @@ def test_none_of_the_rates(uart, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["pty", "socket", "tcp"])
 def test_a_port_without_a_rate_is_opened_as_it_is(kind, monkeypatch):
+    notes = []
     with CARRIERS[kind]() as (transport, peer):
         monkeypatch.setattr(baud, "open_transport", lambda _port, **_baud: transport)
-        assert baud.open_at_best_rate("a port", 1.0) is transport
+        assert baud.open_at_best_rate("a port", 1.0, notes.append) is transport
+        assert notes == ["a port is no line that has a rate"]
         transport.write(b"x", 1.0)
         assert peer.read(1) == b"x", "and nothing was said before"
 
@@ -119,7 +121,7 @@ def test_a_rate_that_a_port_refuses_is_left_out(monkeypatch):
     monkeypatch.setattr("voxdisplay.transport.serial.SerialTransport", Picky)
     monkeypatch.setattr(baud, "open_transport", lambda _port, **_baud: Picky())
     with pytest.raises(vd.TransportTimeout, match="the port refuses all"):
-        baud.open_at_best_rate("picky", 0.0)
+        baud.open_at_best_rate("picky", 0.0, print)
     assert asked == [*baud.RATES, "closed"]
 
 

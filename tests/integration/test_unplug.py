@@ -125,6 +125,7 @@ def test_a_device_that_lost_its_memory_gets_its_picture_before_it_is_read(plug):
         plug.plug()
         display.verify(frame)
         assert shows(plug, frame)
+        assert display.present(frame).frame == 2, "what was shown again is no other frame"
 
 
 def test_frames_that_nobody_waits_for_go_on_as_well(plug):
