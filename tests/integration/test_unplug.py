@@ -21,6 +21,7 @@ import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from voxdisplay.cli import main
+from voxdisplay.transport import serial
 
 SCENE = "examples/trefoil.json"
 
@@ -85,6 +86,23 @@ def unplugs(plug, capsys, count):
 def test_pulled_out_at_random_moments(plug, capsys):
     seen = unplugs(plug, capsys, 60)
     assert seen["gone"] + seen["not there"] > 0
+
+
+def test_pulled_out_while_it_is_opened(plug, monkeypatch):
+    """Between the system's open and what is set afterwards: that is an error of opening, too."""
+    plug.plug().unplug()
+    before = open_descriptors()
+    plug.plug()
+    found = serial._descriptor
+
+    def pull_and_find(line):
+        plug.unplug()
+        return found(line)
+
+    monkeypatch.setattr(serial, "_descriptor", pull_and_find)
+    with pytest.raises(vd.OpenError):
+        vd.open(str(plug.path))
+    assert open_descriptors() == before
 
 
 @pytest.mark.slow
