@@ -19,6 +19,7 @@ from firmware_sim.config import (
     FEATURES,
     LIES,
     Config,
+    parse_baud,
     parse_names,
     parse_number,
     parse_refresh,
@@ -28,6 +29,7 @@ from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
+from firmware_sim.pace import PacedWire, paced
 from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
 from firmware_sim.wire import Wire
 
@@ -39,6 +41,8 @@ examples:
       the same, always to be found as /tmp/voxdisplay, and the picture in a file for numpy
   voxdisplay-sim --tcp 127.0.0.1:5000 --size 64x64x64 --format mono1 --refresh 0
       a smaller one on TCP that swaps at once
+  voxdisplay-sim --baud 115200
+      at the pace of a serial line, to see how many frames a second it carries
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
   voxdisplay-sim --fault down.stall=0.2@0.001,up.delay=0.05@0.02,reboot@100000
@@ -86,7 +90,8 @@ def main(argv: list[str] | None = None) -> int:
         if options.dump:
             _dump_swaps(device, options.dump)
         with _signals() as stop:
-            _serve(Wire(device, options.fault, options.seed), options, stop)
+            wire = Wire(device, options.fault, options.seed)
+            _serve(paced(wire, options.baud), options, stop)
     except (ValueError, OSError) as error:
         parser.error(str(error))
     return 0
@@ -136,6 +141,14 @@ def _parser() -> argparse.ArgumentParser:
         type=_argument(parse_refresh),
         default=default.refresh,
         help="refresh ticks a second; 0: a swap happens at once (default: 30)",
+    )
+    parser.add_argument(
+        "--baud",
+        metavar="N",
+        type=_argument(parse_baud),
+        default=0,
+        help="take and give bytes at the pace of a line of N bits a second, ten to a byte; 0: as "
+        "fast as they come (default: %(default)s)",
     )
     parser.add_argument(
         "--rx-buffer",
@@ -227,7 +240,7 @@ def _signals() -> Iterator[int]:
         os.close(stopper)
 
 
-def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
+def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> None:
     if options.tcp:
         with listen(*options.tcp, remote=options.allow_remote) as listener:
             host, port = listener.getsockname()[:2]
@@ -242,7 +255,7 @@ def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
         serve_wire(wire, line, stop)
 
 
-def _announce(wire: Wire, port: str) -> None:
+def _announce(wire: Wire | PacedWire, port: str) -> None:
     config = wire.device.config
     place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
     sys.stdout.write(json.dumps(place) + "\n")

@@ -156,6 +156,20 @@ def parse_number(text: str) -> int:
         raise ValueError(f"{text!r} is no whole number: write one like 16384") from None
 
 
+def parse_baud(text: str) -> int:
+    """Read the rate of a line in bits per second; 0: bytes take no time.
+
+    Raises
+    ------
+    ValueError
+        If it is no whole number, or one below 50.
+    """
+    baud = parse_number(text)
+    if baud and not 50 <= baud <= _U32:
+        raise ValueError(f"baud is {baud}: take a number from 50 to {_U32}")
+    return baud
+
+
 def parse_size(text: str) -> tuple[int, int, int]:
     """Read a grid such as ``128x128x128``.
 

@@ -11,9 +11,17 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from firmware_sim.bench import Bench
-from firmware_sim.config import Config, parse_names, parse_number, parse_refresh, parse_size
+from firmware_sim.config import (
+    Config,
+    parse_baud,
+    parse_names,
+    parse_number,
+    parse_refresh,
+    parse_size,
+)
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
+from firmware_sim.pace import PacedWire, paced
 from firmware_sim.wire import Wire
 
 # Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
@@ -32,6 +40,7 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "lie": ("lies", parse_names),
     "fault": ("faults", parse_faults),
     "seed": ("seed", parse_number),
+    "baud": ("baud", parse_baud),
 }
 
 
@@ -51,7 +60,7 @@ class InProcessPort:
         The device's bench face.
     """
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire | PacedWire) -> None:
         self.bench = Bench(wire.device)
         self._wire = wire
         self._changed = threading.Condition()
@@ -165,7 +174,8 @@ def open_in_process(url: str) -> InProcessPort:
     fields = _parse_url(url)
     faults = fields.pop("faults", ())
     seed = fields.pop("seed", 0)
-    return InProcessPort(Wire(Device(Config(**fields)), faults, seed))
+    baud = fields.pop("baud", 0)
+    return InProcessPort(paced(Wire(Device(Config(**fields)), faults, seed), baud))
 
 
 def _parse_url(url: str) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The pumps: a device behind a pseudo-terminal, a TCP port, or in the host's process (16).
 
 They move bytes and let time pass; they know nothing of packets. A pump sleeps until a byte comes,
-until one can go, or until a tick swaps; and it takes nothing from a host that does not read.
+until one can go or has gone its way, or until a tick swaps; and it takes nothing from a host that
+does not read.
 """
 
 import contextlib
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from firmware_sim.in_process import InProcessPort, open_in_process
+from firmware_sim.pace import PacedWire
 from firmware_sim.wire import Wire
 
 __all__ = [
@@ -26,11 +28,12 @@ __all__ = [
     "serve_wire",
 ]
 
+_LOOK: Final = 0.02  # seconds between looks at a host that does not read
 _CHUNK: Final = 4096  # bytes to read at a time
 _CLOGGED: Final = 65_536  # with so many bytes that the host has not read, none are taken from it
 
 
-def serve_wire(wire: Wire, line: int, stop: int) -> bool:
+def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
     """Run a device on a line until the line ends or something tells it to stop.
 
     Parameters
@@ -70,6 +73,12 @@ def serve_wire(wire: Wire, line: int, stop: int) -> bool:
             continue  # the other side was faster
         except OSError:
             return False
+
+
+def _pause(wire: Wire | PacedWire, out: bytearray) -> float | None:
+    """Return how long to sleep; what is due for a host that does not read stays due."""
+    pause = wire.until_tick()
+    return pause if pause is None or len(out) < _CLOGGED else max(pause, _LOOK)
 
 
 @contextlib.contextmanager
@@ -148,7 +157,7 @@ def listen(host: str, port: int, *, remote: bool = False) -> socket.socket:
     return socket.create_server(address[:2], family=family, backlog=1)
 
 
-def serve_tcp(wire: Wire, listener: socket.socket, stop: int) -> None:
+def serve_tcp(wire: Wire | PacedWire, listener: socket.socket, stop: int) -> None:
     """Run a device for one connection after the other until something tells it to stop.
 
     Parameters

@@ -1,9 +1,8 @@
 """Explains a capture, packet by packet and op by op, and says where it breaks protocol.md.
 
-``voxdisplay push SCENE --capture FILE`` writes a capture. `annotate` reads it as somebody who sits at
-the host's end of the line: what was sent may have been lost, and what was heard may be damaged. It
-reads ops with the plain decoder of the conformance kit, and computes of each frame what must be
-shown.
+``voxdisplay push SCENE --capture FILE`` writes a capture. It is read as by somebody who sits at the
+host's end of the line: what was sent may have been lost, and what was heard may be damaged. Ops are
+read with the plain decoder of the conformance kit, which tells what each frame must show.
 
     python tools/annotate.py capture.jsonl            all packets, with their ops
     python tools/annotate.py capture.jsonl --brief    a line a packet
@@ -62,13 +61,12 @@ def read_capture(path: Path) -> Iterator[Portion]:
         for number, line in enumerate(file, 1):
             try:
                 entry = json.loads(line)
-                if number == 1:
+                if number == 1 or "voxdisplay_capture" in entry:
                     if entry["voxdisplay_capture"] != VERSION:
                         raise NoCapture(f"{path}: a capture of another version")
                     continue
-                if entry["to"] not in {HOST, DEVICE}:
-                    raise ValueError(entry["to"])
-                yield Portion(float(entry["s"]), entry["to"], bytes.fromhex(entry["hex"]))
+                to = {HOST: HOST, DEVICE: DEVICE}[entry["to"]]
+                yield Portion(float(entry["s"]), to, bytes.fromhex(entry["hex"]))
             except (ValueError, KeyError, TypeError) as error:
                 raise NoCapture(
                     f"{path}, line {number}: not a line of a capture: {error}"

@@ -1,9 +1,9 @@
 """What protocol.md demands of both ends of a line, checked on a capture of the host's end.
 
-A `Monitor` sees packets in the order in which the host wrote and read them, and says of each what it
-does and which rules it breaks. What the host sent may have been lost: only what the device has said
-since is certain. It keeps a model of the device's pages, so that a digest or a PAGE that is wrong is
-found. Knows no file.
+A `Monitor` sees packets in the order in which the host wrote and read them, and says of each what
+it does and which rules it breaks. What the host sent may have been lost: only what the device has
+said since is certain. It keeps a model of the device's pages, so that a digest or a PAGE that is
+wrong is found. Knows no file.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
 ``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`).
+beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`); ``ports``
+how fast each kind of port is beside the bare pipe below it (`bench_ports`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_ports import bench_ports
 from bench_view import bench_view
 
 import voxdisplay as vd
@@ -213,17 +215,18 @@ def bench_cold(repeats: int) -> None:
         print(f"cold start, {name:<18} median of {repeats}: {statistics.median(seconds):.3f} s")
 
 
+TABLES = {"curves": bench_curves, "view": bench_view, "ports": bench_ports}
+
+
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["push", "cold", "curves", "view"])
+    parser.add_argument("what", choices=[*TABLES, "push", "cold"])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--quick", action="store_true", help="curves, view: only a few")
+    parser.add_argument("--quick", action="store_true", help="curves, view, ports: only a little")
     options = parser.parse_args()
-    if options.what == "curves":
-        bench_curves(options.repeats, quick=options.quick)
-    elif options.what == "view":
-        bench_view(options.repeats, quick=options.quick)
+    if table := TABLES.get(options.what):
+        table(options.repeats, quick=options.quick)
     else:
         {"push": bench_push, "cold": bench_cold}[options.what](options.repeats)
 

@@ -7,33 +7,39 @@ answers. It knows when to wait and what to compare; how bytes are made is the bu
 
 from __future__ import annotations
 
-import secrets
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.baud import DEFAULT_BAUD, open_at_best_rate
 from voxdisplay.device import DeviceInfo, device_error, device_info
 from voxdisplay.errors import (
     DesyncError,
     IncompatibleDevice,
     LocalProtocolError,
+    TransportClosed,
+    TransportError,
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
 from voxdisplay.link import Event, Link, PageRead, Ready, Refused, Shown
 from voxdisplay.pixel import Pixels
+from voxdisplay.probe import new_session, said_before
+from voxdisplay.reconnect import Reconnect
 from voxdisplay.transport import Transport, open_transport
+from voxdisplay.transport.capture import Capture
 from voxdisplay.wire.packet import Info, Page
 from voxdisplay.wire.spans import decode_spans
 
 TIMEOUT_S = 5.0
 _LONGEST_WAIT_S = 0.5
+_LAST_S = 2.0  # for a last dark picture
 Progress = Callable[[int, int], None]
 
 
@@ -68,7 +74,13 @@ class Receipt:
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
-    port: str | Transport, *, baud: int = 115200, timeout_s: float = TIMEOUT_S
+    port: str | Transport,
+    *,
+    baud: int | Literal["auto"] = DEFAULT_BAUD,
+    timeout_s: float = TIMEOUT_S,
+    reconnect_s: float = 0.0,
+    note: Callable[[str], None] | None = None,
+    capture: TextIO | None = None,
 ) -> Display:
     """Open a display: the port, and a session with the device behind it.
 
@@ -77,10 +89,18 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     port : str or Transport
         ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, or an open
         pipe, which is closed with the display.
-    baud : int
-        Bits per second of a serial line.
+    baud : int or "auto"
+        Bits per second of a serial line; ``"auto"`` for the fastest common one at which the device
+        answers: see `voxdisplay.baud`.
     timeout_s : float
         How long the device may be silent.
+    reconnect_s : float
+        How long a device that is pulled out is waited for. When the same device is back, it gets
+        its picture again, whole, and all goes on. 0: it is not waited for.
+    note : callable, optional
+        Is told, in a line, when a device is lost and when it is back, and what rate was found.
+    capture : text file, optional
+        Gets all bytes to and from the device, with times: see `voxdisplay.transport.capture`.
 
     Raises
     ------
@@ -92,9 +112,19 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
         If it speaks another protocol major, or has a pixel format we do not know.
 
     """
-    transport = open_transport(port, baud=baud) if isinstance(port, str) else port
+    note = note or (lambda _text: None)
+    if not isinstance(port, str):
+        transport = port
+    elif baud == "auto":
+        transport = open_at_best_rate(port, timeout_s, note)
+    else:
+        transport = open_transport(port, baud=baud)
     try:
-        return Display(transport, timeout_s=timeout_s)
+        reconnect = None
+        if reconnect_s:
+            rate = getattr(transport, "baud", DEFAULT_BAUD)
+            reconnect = Reconnect(transport.port, reconnect_s, baud=rate, note=note)
+        return Display(transport, timeout_s=timeout_s, reconnect=reconnect, capture=capture)
     except BaseException:
         transport.close()
         raise
@@ -109,6 +139,10 @@ class Display:
         An open pipe to the device.
     timeout_s : float
         How long the device may be silent.
+    reconnect : Reconnect, optional
+        Who waits for a device that has gone away, and finds it again.
+    capture : text file, optional
+        Gets all bytes to and from the device.
 
     Attributes
     ----------
@@ -119,18 +153,30 @@ class Display:
 
     """
 
-    def __init__(self, transport: Transport, *, timeout_s: float = TIMEOUT_S) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        *,
+        timeout_s: float = TIMEOUT_S,
+        reconnect: Reconnect | None = None,
+        capture: TextIO | None = None,
+    ) -> None:
         self.port = transport.port
-        self._transport = transport
+        self._capture = capture
+        self._transport = self._captured(transport)
+        self._reconnect: Reconnect | None = None  # not before the device is known
+        self._renewals = 0
+        self._on_display: tuple[list[bytes], int] | None = None  # payloads and digest
         self._timeout_s = timeout_s
         self._closed = False
         self._frames = 0
         self._shown: dict[int, int | None] = {}  # ticket -> digest
-        self._unwaited: dict[int, int] = {}  # ticket -> digest that is meant
+        self._unwaited: dict[int, tuple[list[bytes], int]] = {}  # ticket -> payloads and digest
         self._pages: list[Page] = []
         self._events: deque[Event] = deque()
-        self._link = Link(_new_session(), time.monotonic(), patience_s=timeout_s)
+        self._link = Link(new_session(), time.monotonic(), patience_s=timeout_s)
         self.info = self._greet()
+        self._reconnect = reconnect
 
     # -- the session
 
@@ -140,21 +186,46 @@ class Display:
                 self._turn()
         except TransportTimeout as error:
             raise TransportTimeout(f"{self.port}: {error}", hint=error.hint) from error
+        except TransportClosed as error:
+            raise said_before(error, self._link.stream.noise) from error
         assert self._link.info is not None  # noqa: S101 - ready
         return device_info(self._link.info)
 
     def _turn(self, *, wait: bool = True) -> None:
         """Write what may be written, wait for an answer or the time to ask, take what comes."""
+        try:
+            self._exchange(wait=wait)
+        except (TransportClosed, TransportTimeout) as error:
+            self._renew(error)
+        while self._events:
+            self._take(self._events.popleft())
+
+    def _exchange(self, *, wait: bool) -> None:
         if out := self._link.transmit(time.monotonic()):
             self._transport.write(out, self._timeout_s)
         wait_s = self._link.next_timeout(time.monotonic()) if wait else 0.0
         wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
         data = self._transport.read(wait_s)
         self._events += self._link.receive(data, time.monotonic())
-        while self._events:
-            self._take(self._events.popleft())
+
+    def _renew(self, error: TransportError) -> None:
+        """Wait for the device to come back, and have it show again what it showed."""
+        if self._reconnect is None:
+            raise error
+        self._transport.close()
+        self._transport = self._captured(self._reconnect.wait(error, self.info.serial))
+        self.port = self._transport.port
+        self._renewals += 1
+        self._link.renew(time.monotonic())
+        if self._on_display and not self._link.backlog:
+            self._unwaited[self._link.present(self._on_display[0])] = self._on_display
+
+    def _captured(self, transport: Transport) -> Transport:
+        return Capture(transport, self._capture) if self._capture else transport
 
     def _take(self, event: Event) -> None:
+        if self._reconnect and isinstance(event, Shown | PageRead):
+            self._reconnect.settled()
         match event:
             case Ready(info) if self._link.counters.sessions > 1:
                 self._check_same(info)
@@ -234,6 +305,7 @@ class Display:
         if digest is not None and digest != meant:
             self._repair(frame, payloads, meant, digest)
             digest = meant
+        self._on_display = payloads, meant
         self._frames += 1
         sent = _Sent.of(self._link)
         return Receipt(
@@ -273,15 +345,17 @@ class Display:
         for ticket in list(self._unwaited):
             if self._link.withdraw(ticket):
                 del self._unwaited[ticket]
-        ticket = self._link.present(frame.payloads(self._link.payload_bytes))
-        self._unwaited[ticket] = frame.digest()
+        payloads = frame.payloads(self._link.payload_bytes)
+        self._unwaited[self._link.present(payloads)] = payloads, frame.digest()
         self.poll()
 
     def _settle(self, ticket: int, digest: int | None) -> None:
         """Note that a frame which nobody waited for is on display, and all before it are over."""
-        meant = self._unwaited[ticket]
+        again = self._unwaited[ticket] is self._on_display  # after a renewal
+        self._on_display = self._unwaited[ticket]
+        meant = self._on_display[1]
         self._unwaited = {later: d for later, d in self._unwaited.items() if later > ticket}
-        self._frames += 1
+        self._frames += not again
         if digest is not None and digest != meant:
             raise DesyncError(f"the display's digest is {digest:08x}, the frame's {meant:08x}")
 
@@ -335,11 +409,16 @@ class Display:
         self._pages.clear()
         total = self.info.grid.voxels
         values = np.zeros(total, dtype=np.uint32)
-        at = 0
+        at, renewals = 0, self._renewals
         while at < total:
             self._link.read(at, total - at, back=back)
             while not self._pages:
                 self._turn()
+            if renewals != self._renewals:  # it may have lost its memory: once more, from the start
+                self.flush()
+                self._pages.clear()
+                at, renewals = 0, self._renewals
+                continue
             page = self._pages.pop()
             values[at : at + page.count] = decode_spans(page.ops, page.count, self.info.format)
             at += page.count
@@ -383,11 +462,39 @@ class Display:
         if self._closed:
             raise LocalProtocolError("the display is closed")
 
-    def close(self) -> None:
-        """Close the port. The display keeps its picture. Twice is fine."""
-        if not self._closed:
+    def close(self, *, blank: bool = False) -> None:
+        """Close the port. Twice is fine.
+
+        Parameters
+        ----------
+        blank : bool
+            Make the display dark first; whatever is not on display yet is dropped. Otherwise the
+            display keeps its last whole picture.
+
+        Raises
+        ------
+        TransportError, DeviceError
+            If the display could not be made dark. The port is closed all the same.
+
+        """
+        if self._closed:
+            return
+        try:
+            if blank:
+                self._blank()
+        finally:
             self._closed = True
             self._transport.close()
+
+    def _blank(self) -> None:
+        """Show a dark frame at once: a new session drops all that is on its way."""
+        self._reconnect = None
+        self._timeout_s = min(self._timeout_s, _LAST_S)
+        self._unwaited.clear()
+        self._events.clear()
+        self._link = Link(new_session(), time.monotonic(), patience_s=self._timeout_s)
+        self._greet()
+        self._show([])
 
     def __enter__(self) -> Self:
         return self
@@ -411,10 +518,6 @@ class _Sent:
     def of(cls, link: Link) -> _Sent:
         counters = link.counters
         return cls(counters.packets, counters.wire_bytes, counters.retransmitted)
-
-
-def _new_session() -> int:
-    return 1 + secrets.randbelow(0xFFFF)
 
 
 def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:

@@ -1,9 +1,11 @@
 """Ports as they are in the world: missing, busy, forbidden, silent, foreign, gone."""
 
 import contextlib
-import importlib
+import http.server
 import os
+import shutil
 import signal
+import socketserver
 import subprocess
 import sys
 import threading
@@ -12,9 +14,9 @@ from pathlib import Path
 
 import document
 import pytest
-import serial
 
 import voxdisplay as vd
+from voxdisplay.transport import open_transport
 
 PAPER = "examples/paper-curve.json"
 
@@ -88,29 +90,66 @@ def test_emulators_that_there_are_not(run, port, word):
 
 
 def test_a_busy_port(run, line):
-    with serial.Serial(line.port, exclusive=True):
-        assert "busy" in pushed(run, line.port, code=3)
+    script = "import serial, sys; s = serial.Serial(sys.argv[1], exclusive=True); print(); input()"
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", script, line.port], **pipes) as holder:
+        holder.stdout.readline()
+        said = pushed(run, line.port, code=3)
+        assert f"{line.port} is busy: python" in said
+        assert f"(process {holder.pid}) has it open" in said
+        assert str(os.getpid()) not in said, "this test has it open, too, but does not keep it"
+        holder.stdin.close()
 
 
-def test_a_forbidden_port(line):
-    for module in ("grp", "voxdisplay.transport.serial"):
-        importlib.import_module(module)  # where the tests lie, others may not even look
-    Path(line.port).chmod(0o060)  # the group may, and we are not in it
-    before = os.geteuid(), os.getgroups()
-    if before[0] == 0:
-        os.setgroups([])
-        os.setegid(65534)
-        os.seteuid(65534)
+def test_a_port_that_this_program_has_open_itself(line):
+    busy = pytest.raises(vd.OpenError, match=r"is busy: this program itself \(process")
+    with contextlib.closing(open_transport(line.port)), busy:
+        vd.open(line.port)
+
+
+AS_NOBODY = """
+import grp, os, pwd, sys
+from voxdisplay.cli import main
+from voxdisplay.transport import diagnosis, serial
+from serial.tools import list_ports
+os.setgroups([]); os.setgid(65534); os.setuid(65534)
+sys.exit(main(["info", "--port", sys.argv[1]]))
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.parametrize(
+    ("group", "mode", "words"),
+    [
+        ("dialout", 0o060, ["crw-rw----", "sudo usermod -aG dialout $USER"]),
+        ("dialout", 0o000, ["sudo chmod a+rw"]),
+        ("root", 0o060, ["sudo chmod a+rw"]),
+        (54321, 0o060, ["sudo usermod -aG 54321 $USER"]),
+    ],
+)
+def test_a_forbidden_port(line, group, mode, words):
     try:
-        with pytest.raises(vd.OpenError) as error:
-            vd.open(line.port)
-    finally:
-        if before[0] == 0:
-            os.seteuid(0)
-            os.setegid(0)
-            os.setgroups(before[1])
-    assert "may not be opened" in str(error.value)
-    assert "usermod -aG" in error.value.hint
+        shutil.chown(line.port, "root", group)
+    except LookupError:
+        pytest.skip(f"there is no group {group} here")
+    Path(line.port).chmod(0o600 | mode)
+    command = [sys.executable, "-c", AS_NOBODY, line.port]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 3, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in [f"{line.port} may not be opened by", *words]:
+        assert word in done.stderr
+
+
+def test_a_pty_whose_other_end_is_dead(run, line):
+    os.close(line.master)
+    said = pushed(run, line.port, code=3)
+    assert "no device behind it" in said or "does not exist" in said
+
+
+@pytest.mark.parametrize("name", ["README.md", "tests", "/dev/null"])
+def test_what_is_no_serial_port(run, name):
+    assert f"{name} is no serial port" in pushed(run, name, code=3)
 
 
 def test_nobody_answers(run, line):
@@ -124,6 +163,50 @@ def test_something_else_answers(run, line):
 
     threading.Thread(target=web_server, daemon=True).start()
     assert "HTTP/1.1" in pushed(run, line.port, "--timeout", "0.6", code=3)
+
+
+@contextlib.contextmanager
+def server(handler):
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
+        server.daemon_threads = True
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        yield f"tcp://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        thread.join()
+
+
+class Refuses(socketserver.BaseRequestHandler):
+    """A web server that does not wait for the end of a line."""
+
+    def handle(self):
+        self.request.recv(4096)
+        self.request.sendall(b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n<html>")
+
+
+class Greets(socketserver.BaseRequestHandler):
+    def handle(self):
+        self.request.sendall(b"SSH-2.0-OpenSSH_9.2p1 Debian-2\r\n")
+        while self.request.recv(4096):
+            pass
+
+
+def test_a_web_server_that_hangs_up(run):
+    with server(Refuses) as port:
+        for kind in ("tcp", "socket"):
+            said = pushed(run, port.replace("tcp", kind), code=3)
+            assert "HTTP/1.1 400 Bad Request" in said
+            assert "Something else answers there" in said
+
+
+def test_a_server_that_greets(run):
+    with server(Greets) as port:
+        assert "SSH-2.0-OpenSSH_9.2p1" in pushed(run, port, "--timeout", "0.6", code=3)
+
+
+def test_a_web_server_that_waits_for_a_line(run):
+    with server(http.server.SimpleHTTPRequestHandler) as port:
+        assert "nothing came at all" in pushed(run, port, "--timeout", "0.6", code=3)
 
 
 def test_a_device_of_another_major(run, line):

@@ -25,8 +25,22 @@ MAY_IMPORT = {
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
     "device": {"errors", "grid", "pixel", "wire"},
-    "view": {"errors", "grid", "pixel", "view"},
-    "display": {"device", "errors", "frame", "link", "pixel", "transport", "wire"},
+    "plan": {"frame", "wire"},
+    "baud": {"errors", "probe", "transport"},
+    "probe": {"device", "errors", "link", "transport", "wire"},
+    "reconnect": {"errors", "probe", "transport"},
+    "display": {
+        "baud",
+        "device",
+        "errors",
+        "frame",
+        "link",
+        "pixel",
+        "probe",
+        "reconnect",
+        "transport",
+        "wire",
+    },
 }
 
 

@@ -18,3 +18,10 @@ def test_the_table_of_pictures_runs():
     command = [sys.executable, str(BENCH), "view", "--quick", "--repeats", "1"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "paper curve" in run.stdout
+
+
+def test_the_table_of_ports_runs():
+    command = [sys.executable, str(BENCH), "ports", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    for port in ("bare pty", "/dev/pts/N", "tcp://", "socket://", "rfc2217://", "sim:"):
+        assert f"\n{port} " in run.stdout

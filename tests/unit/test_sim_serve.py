@@ -88,7 +88,7 @@ def test_a_port_in_process() -> None:
     (info,) = exchange(port, b"\0" + hello())
     assert (info.nx, info.format, info.boot, info.refresh) == (3, 1, 7, 1_000_000)
     assert info.payload[29:36] == b"\x06a cube"
-    (ack,) = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
+    *_, ack = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
     if ack.flags == PENDING:
         (ack,) = answers(port.read(WAIT))
     assert ack.flags == SHOWN
@@ -175,6 +175,7 @@ def exchange_badly(port: InProcessPort, wire: bytes) -> None:
         ("sim:?rx_buffer=9", "rx_buffer is 9"),
         ("sim:?format=rgb", "take one of"),
         ("sim:?fault=flap:1", "did you mean flip"),
+        ("sim:?baud=9", "baud in .* 50 to"),
         ("sim:?seed=x", "seed in .* whole number"),
         ("sim:?features=palette", "palette: take of line, box"),
         ("sim:?lie=all", "lie all: take of grid"),
@@ -494,6 +495,8 @@ def test_the_program_on_tcp() -> None:
         (["--size", "0x5x5"], "take sides from 1 to 65535"),
         (["--format", "rgb"], "choose from"),
         (["--refresh", "fast"], "number of hertz"),
+        (["--baud", "fast"], "whole number"),
+        (["--baud", "49"], "take a number from 50"),
         (["--rx-buffer", "9"], "take a number from 1101"),
         (["--fault", "flop=1"], "did you mean flip"),
         (["--features", "palette"], "palette: take of line, box"),

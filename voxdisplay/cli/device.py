@@ -1,14 +1,14 @@
-"""``voxdisplay info``, ``ports``, ``clear`` and ``read``: the display itself."""
+"""``voxdisplay info``, ``clear`` and ``read``: the display itself."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import click
 import numpy as np
 
 from voxdisplay.cli.options import (
+    Baud,
     device_json,
     json_option,
     note,
@@ -17,13 +17,12 @@ from voxdisplay.cli.options import (
     port_options,
     print_json,
 )
-from voxdisplay.transport.discovery import all_ports
 
 
 @click.command()
 @port_options
 @json_option
-def info(*, port: str | None, baud: int, timeout_s: float, as_json: bool) -> None:
+def info(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
     """Say what a display says of itself."""
     with open_display(port, baud, timeout_s) as display:
         said = display.info
@@ -47,24 +46,9 @@ def info(*, port: str | None, baud: int, timeout_s: float, as_json: bool) -> Non
 
 
 @click.command()
-@json_option
-def ports(*, as_json: bool) -> None:
-    """List what can be opened."""
-    found = all_ports()
-    if as_json:
-        print_json({"ports": [asdict(port) for port in found]})
-        return
-    width = max(len(port.port) for port in found)
-    for port in found:
-        ids = f"  {port.vid:04x}:{port.pid:04x}" if port.vid is not None else ""
-        number = f"  serial {port.serial_number}" if port.serial_number else ""
-        click.echo(f"{port.port:<{width}}  {port.description}{ids}{number}")
-
-
-@click.command()
 @port_options
 @json_option
-def clear(*, port: str | None, baud: int, timeout_s: float, as_json: bool) -> None:
+def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
     """Make a display dark."""
     with open_display(port, baud, timeout_s) as display:
         receipt = display.clear()
@@ -93,7 +77,7 @@ def clear(*, port: str | None, baud: int, timeout_s: float, as_json: bool) -> No
     help="Where to: a numpy array, indexed [z, y, x].",
 )
 @json_option
-def read(*, port: str | None, baud: int, timeout_s: float, output: Path, as_json: bool) -> None:
+def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_json: bool) -> None:
     """Read back what a display shows."""
     if output.suffix != ".npy":
         raise click.BadParameter(f"{output} should end in .npy", param_hint="--output")

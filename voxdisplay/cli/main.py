@@ -9,7 +9,10 @@ from typing import Final
 import click
 
 from voxdisplay import __version__
-from voxdisplay.cli.device import clear, info, ports, read
+from voxdisplay.cli.device import clear, info, read
+from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
+from voxdisplay.cli.plan import plan_command
+from voxdisplay.cli.ports import ports
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
 from voxdisplay.cli.test_pattern import test_pattern
@@ -29,7 +32,6 @@ EXIT_USAGE: Final = 2
 EXIT_PIPE: Final = 3
 EXIT_PROTOCOL: Final = 4
 EXIT_INTERNAL: Final = 70
-EXIT_INTERRUPT: Final = 130
 
 _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
     (SceneError, EXIT_USAGE),
@@ -44,7 +46,8 @@ _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
 @click.group(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""Exit codes: 0 done; 1 the device refused, or shows something else; 2 usage or scene;
-    3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted.
+    3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted;
+    143 ended by SIGTERM; 129 the terminal was closed.
 
     Shell completion: eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)", likewise zsh_source
     and fish_source.""",
@@ -61,7 +64,9 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, preview, view, voxelize, info, ports, clear, read, test_pattern):
+_SHOW = (push, preview, view, test_pattern, clear)
+_ASK = (voxelize, plan_command, info, ports, read)
+for command in (*_SHOW, *_ASK):
     cli.add_command(command)
 
 
@@ -70,14 +75,14 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     try:
-        # A command that ends by click's Exit gives its code; all others give nothing.
-        ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
+        with ended_by_signals():
+            # A command that ends by click's Exit gives its code; all others give nothing.
+            ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return EXIT_USAGE
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; the display keeps its last whole picture", err=True)
-        return EXIT_INTERRUPT
+    except (click.Abort, KeyboardInterrupt, EndedError) as why:
+        return told_to_end(why)
     except VoxDisplayError as error:
         if debug:
             traceback.print_exc()

@@ -6,17 +6,46 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any, TextIO, TypeVar
+from typing import Any, Literal, TextIO, TypeAlias, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 import voxdisplay as vd
-from voxdisplay.transport import open_transport
-from voxdisplay.transport.capture import Capture
+from voxdisplay.baud import RATES
 from voxdisplay.transport.discovery import all_ports
 
 _C = TypeVar("_C", bound=Callable[..., Any])
 DEFAULT_PORT = "sim:"
+
+
+Baud: TypeAlias = int | Literal["auto"]
+
+
+class BaudType(click.ParamType[Baud]):
+    """A rate in bits per second, or ``auto``."""
+
+    name = "rate"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Baud:
+        """Read it, or fail with a message."""
+        if str(value).lower() == "auto":
+            return "auto"
+        try:
+            baud = int(value)
+        except ValueError:
+            self.fail(f"{value!r} is no rate: write one like 115200, or auto", param, ctx)
+        if not 50 <= baud < 1 << 32:
+            self.fail(f"{baud} is no rate of a serial line: write one like 115200", param, ctx)
+        return baud
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer what is common."""
+        del ctx, param
+        rates = ["auto", *map(str, RATES)]
+        return [CompletionItem(rate) for rate in rates if rate.startswith(incomplete)]
 
 
 def _complete_port(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
@@ -38,11 +67,12 @@ def port_options(function: _C) -> _C:
         ),
         click.option(
             "--baud",
-            type=click.IntRange(min=50),
-            default=115200,
+            type=BaudType(),
+            default="115200",
             metavar="RATE",
             show_default=True,
-            help="Bits per second of a serial line.",
+            help="Bits per second of a serial line; auto: the fastest at which the display "
+            "answers, which takes some seconds to find.",
         ),
         click.option(
             "--port",
@@ -57,6 +87,16 @@ def port_options(function: _C) -> _C:
         function = option(function)
     return function
 
+
+reconnect_option = click.option(
+    "--reconnect",
+    "reconnect_s",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    metavar="SECONDS",
+    help="How long a display that is pulled out is waited for. When it is back, it gets its "
+    "picture again.  [default: not at all]",
+)
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
@@ -80,16 +120,20 @@ capture_option = click.option(
 
 
 def open_display(
-    port: str | None, baud: int, timeout_s: float, capture: TextIO | None = None
+    port: str | None,
+    baud: Baud,
+    timeout_s: float,
+    *,
+    reconnect_s: float = 0.0,
+    capture: TextIO | None = None,
 ) -> vd.Display:
     """Open what ``--port`` names, or the emulator, and say so."""
     if not port:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
-    if capture is None:
-        return vd.open(port, baud=baud, timeout_s=timeout_s)
-    pipe = Capture(open_transport(port, baud=baud), capture)
-    return vd.open(pipe, timeout_s=timeout_s)
+    return vd.open(
+        port, baud=baud, timeout_s=timeout_s, reconnect_s=reconnect_s, note=note, capture=capture
+    )
 
 
 def note(text: str) -> None:

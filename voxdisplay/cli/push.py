@@ -8,8 +8,11 @@ from typing import Literal, TextIO
 import click
 
 import voxdisplay as vd
+from voxdisplay.baud import DEFAULT_BAUD
+from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
 from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
+    Baud,
     capture_option,
     device_json,
     fit_option,
@@ -20,6 +23,7 @@ from voxdisplay.cli.options import (
     port_options,
     print_json,
     progress_bar,
+    reconnect_option,
 )
 from voxdisplay.cli.pictures import PictureFileType, save_page
 from voxdisplay.cli.scenes import draw
@@ -38,7 +42,6 @@ from voxdisplay.cli.scenes import draw
 @port_options
 @fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
-@capture_option
 @click.option(
     "--preview",
     type=PictureFileType(),
@@ -46,18 +49,23 @@ from voxdisplay.cli.scenes import draw
     help="Read the page back, and draw what the display says it shows: .png, .gif, .mp4 or .html.",
 )
 @click.option("--quiet", "-q", is_flag=True, help="No progress, and no picture on the terminal.")
+@reconnect_option
+@on_exit_option
+@capture_option
 @json_option
 def push(
     *,
     scene: str,
     port: str | None,
-    baud: int,
+    baud: Baud,
     timeout_s: float,
     fit: Literal["contain", "none"],
     verify: bool,
-    capture: TextIO | None,
     preview: Path | None,
     quiet: bool,
+    reconnect_s: float,
+    on_exit: OnExit,
+    capture: TextIO | None,
     as_json: bool,
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
@@ -67,7 +75,8 @@ def push(
     if preview:
         import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
     loaded = vd.load_scene(scene)
-    with open_display(port, baud, timeout_s, capture) as display:
+    display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
+    with leaving(display, on_exit):
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
@@ -104,7 +113,7 @@ def push(
         if preview and page is not None:  # what was shown has been said, if this fails
             save_page(preview, page, display.info)
         if not quiet and not as_json:
-            glimpse(display, frame, page, baud)
+            glimpse(display, frame, page, DEFAULT_BAUD if baud == "auto" else baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

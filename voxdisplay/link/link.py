@@ -192,6 +192,12 @@ class Link:
         self._hello_due_s = now
         self._hellos = 0
 
+    def renew(self, now: float) -> None:
+        """Begin a new session over a new pipe; frames that are not shown yet are sent again."""
+        self.stream = PacketStream()
+        self._reopen(now)
+        self._silence.rest(now)
+
     # -- what goes out
 
     def transmit(self, now: float) -> bytes:

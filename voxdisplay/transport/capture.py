@@ -1,8 +1,9 @@
 """A pipe that writes down all that goes through it, with times. Knows no packet.
 
 A capture is text, a JSON object a line. The first says what it is: ``{"voxdisplay_capture": 1,
-"port": ...}``. Each other one is a portion of bytes as it was written or read:
-``{"s": seconds since the first line, "to": "device" or "host", "hex": ...}``.
+"port": ...}``; another such line follows if a device that had gone away is back. Each other one is
+a portion of bytes as it was written or read: ``{"s": seconds since the line that names the port,
+"to": "device" or "host", "hex": ...}``.
 """
 
 from __future__ import annotations
@@ -25,8 +26,7 @@ class Capture:
     inner : Transport
         The pipe; it is closed with this one.
     file : text file
-        Open for writing; closed with the pipe. Each portion is flushed, so that what led to a
-        crash can be read.
+        Open for writing. Each portion is flushed, so that what led to a crash can be read.
     clock : callable
         Seconds, never going back.
 
@@ -57,7 +57,6 @@ class Capture:
     def close(self) -> None:
         """See `Transport.close`."""
         self._inner.close()
-        self._file.close()
 
     def _note(self, to: str, data: bytes) -> None:
         seconds = round(self._clock() - self._began_s, 6)

@@ -1,25 +1,32 @@
-"""Serial ports through pyserial: real ttys, ptys, and its URLs."""
+"""Serial ports through pyserial: real ttys, ptys, and its URLs.
+
+Where the system lets us wait on a port itself, we do: reads come in large blocks and at once, and
+every write has a deadline. Where it does not (Windows, rfc2217://), pyserial's own timeouts are
+polled. Why a port does not open is the business of `diagnosis`. Knows no packet.
+"""
 
 from __future__ import annotations
 
-import errno
-import os
-import stat
+import select
 import sys
 import time
+from typing import Any
 
 import serial
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
-from voxdisplay.transport.discovery import serial_ports
+from voxdisplay.transport.diagnosis import explain, reason
+from voxdisplay.transport.latency import lower_latency
 
 _READ_BYTES = 1 << 16
-# Small enough for a slow line to take within the time that pyserial is told once.
-_WRITE_BYTES = 2048
-_WRITE_TIMEOUT_S = 5.0
-# pyserial's own timeout is set once, as setting it reconfigures the port: reads come back this
-# often to look at ours.
+_WRITE_BYTES = 1 << 14
+# Where the port cannot be waited on. Setting pyserial's timeouts reconfigures a port, so they are
+# set once: reads come back this often to look at ours, and writes are small enough for a slow line
+# to take within the time that is told.
 _POLL_S = 0.02
+_POLLED_WRITE_BYTES = 2048
+_POLLED_WRITE_S = 5.0
+_CLOGGED = "is something still reading there?"
 
 # A device that goes away shows itself as any of these, by pyserial's layer and the system's mood.
 _GONE: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
@@ -30,98 +37,173 @@ if sys.platform != "win32":
 
 
 class SerialTransport:
-    """A pipe over a serial port, opened exclusively."""
+    """A pipe over a serial port, opened exclusively.
+
+    Parameters
+    ----------
+    port : str
+        A device such as ``/dev/ttyUSB0`` or ``COM3``, or a URL of pyserial.
+    baud : int
+        Bits per second.
+
+    Attributes
+    ----------
+    baud : int
+        Bits per second, as last set.
+
+    """
 
     def __init__(self, port: str, *, baud: int = 115200) -> None:
         self.port = port
+        self.baud = baud
         try:
-            self._serial = serial.serial_for_url(
-                port,
-                baudrate=baud,
-                timeout=_POLL_S,
-                write_timeout=_WRITE_TIMEOUT_S,
-                exclusive=None if "://" in port else True,
-            )
+            self._serial: Any = _open(port, baud)  # of many kinds, with more than they share
         except _GONE as error:
-            raise _explain(port, error) from error
+            raise explain(port, error) from error
         except ValueError as error:  # a URL that pyserial does not know, or an impossible baud
             raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
+        self._closed = False
+        self._descriptor = _descriptor(self._serial)
+
+    @property
+    def is_rated(self) -> bool:
+        """Whether there is a line behind the port that has a rate: ptys and sockets have none."""
+        if not isinstance(self._serial, serial.Serial):
+            return _is_rfc2217(self._serial)
+        try:
+            _ = self._serial.cts  # a pty has no such wire to ask
+        except _GONE:
+            return False
+        return True
+
+    def set_baud(self, baud: int) -> None:
+        """Change the rate of the line, without closing it.
+
+        Raises
+        ------
+        ValueError
+            If the port has no such rate.
+
+        """
+        try:
+            self._serial.baudrate = baud
+        except _GONE as error:
+            raise ValueError(f"{self.port} has no rate of {baud} Bd: {reason(error)}") from error
+        self.baud = baud
 
     def read(self, timeout_s: float) -> bytes:
         """See `Transport.read`."""
-        deadline_s = time.monotonic() + timeout_s
+        self._check_open()
         try:
-            while True:
-                waiting = self._serial.in_waiting
-                data: bytes = self._serial.read(max(1, min(waiting, _READ_BYTES)))
-                if data or time.monotonic() >= deadline_s:
-                    return data
+            if self._descriptor is None:
+                return self._read_polled(timeout_s)
+            readable, _, _ = select.select([self._descriptor], [], [], max(timeout_s, 0.0))
+            return bytes(self._serial.read(_READ_BYTES)) if readable else b""
         except _GONE as error:
-            raise TransportClosed(f"{self.port} is gone: {_reason(error)}") from error
+            raise TransportClosed(f"{self.port} is gone: {reason(error)}") from error
+
+    def _read_polled(self, timeout_s: float) -> bytes:
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            if waiting := self._serial.in_waiting:
+                return bytes(self._serial.read(min(waiting, _READ_BYTES)))
+            if first := self._serial.read(1):  # waits for it, and has no sense of more
+                waiting = self._serial.in_waiting
+                return bytes(first + self._serial.read(waiting)) if waiting else bytes(first)
+            if time.monotonic() >= deadline_s:
+                return b""
 
     def write(self, data: bytes, timeout_s: float) -> None:
         """See `Transport.write`."""
+        self._check_open()
         deadline_s = time.monotonic() + timeout_s
         view = memoryview(data)
-        while view:
-            try:
-                sent = self._serial.write(view[:_WRITE_BYTES])
-            except serial.SerialTimeoutException as error:
-                raise TransportTimeout(
-                    f"{self.port} takes no more bytes", hint="is something still reading there?"
-                ) from error
-            except _GONE as error:
-                raise TransportClosed(f"{self.port} is gone: {_reason(error)}") from error
-            view = view[_WRITE_BYTES if sent is None else sent :]
-            if view and time.monotonic() > deadline_s:
-                raise TransportTimeout(f"{self.port} takes its bytes too slowly")
+        step = _POLLED_WRITE_BYTES if self._descriptor is None else _WRITE_BYTES
+        try:
+            while view:
+                left_s = max(deadline_s - time.monotonic(), 0.0)
+                if not self._takes_more(left_s):
+                    break
+                view = view[self._serial.write(view[:step]) :]
+        except serial.SerialTimeoutException as error:
+            raise TransportTimeout(f"{self.port} takes no more bytes", hint=_CLOGGED) from error
+        except _GONE as error:
+            raise TransportClosed(f"{self.port} is gone: {reason(error)}") from error
+        if view:
+            raise TransportTimeout(
+                f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
+                f"in {timeout_s:.1f} s",
+                hint=_CLOGGED,
+            )
+
+    def _takes_more(self, timeout_s: float) -> bool:
+        """Wait until the port takes bytes; tell whether it does."""
+        wire = self._descriptor
+        if _is_rfc2217(self._serial):
+            wire = self._serial._socket.fileno()  # noqa: SLF001 - it writes to it, without deadline
+        if wire is None:
+            return True
+        return bool(select.select([], [wire], [], timeout_s)[1])
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise TransportClosed(f"{self.port} is closed")
 
     def close(self) -> None:
-        """See `Transport.close`."""
-        try:
-            self._serial.close()
-        except _GONE:  # it is gone: that is what was wanted
+        """See `Transport.close`.
+
+        What the port has not sent yet is dropped: who wants it sent has waited for the answer.
+        """
+        if self._closed:
             return
-
-
-def _reason(error: Exception) -> str:
-    return str(error) or type(error).__name__
-
-
-def _explain(port: str, error: Exception) -> OpenError:
-    """Turn what pyserial says on opening into what a person can do."""
-    number = getattr(error, "errno", None)
-    text = str(error)
-    if number == errno.EACCES:
-        return OpenError(f"{port} may not be opened", port=port, hint=_permission_hint(port))
-    if number in {errno.EBUSY, errno.EAGAIN} or "exclusively lock" in text:
-        return OpenError(
-            f"{port} is busy",
-            port=port,
-            hint=f"another program has it open (try: fuser -v {port})",
-        )
-    if number == errno.ENOENT or "FileNotFoundError" in text:
-        found = [found.port for found in serial_ports()]
-        known = "there is " + ", ".join(found) if found else "no serial port was found"
-        return OpenError(
-            f"{port} does not exist",
-            port=port,
-            hint=f"{known}; sim: is the built-in emulator",
-        )
-    return OpenError(f"{port} cannot be opened: {_reason(error)}", port=port)
-
-
-def _permission_hint(port: str) -> str:
-    try:
-        status = os.stat(port)  # noqa: PTH116 - a port's name need not be a path
-    except OSError:
-        return "look at its permissions"
-    if status.st_mode & stat.S_IRGRP and status.st_mode & stat.S_IWGRP:
-        import grp  # noqa: PLC0415 - not on every system
-
+        self._closed = True
         try:
-            group = grp.getgrgid(status.st_gid).gr_name
-        except KeyError:
-            group = str(status.st_gid)
-        return f"add yourself to its group: sudo usermod -aG {group} $USER, then log in again"
-    return f"give yourself access: sudo chmod a+rw {port}"
+            if isinstance(self._serial, serial.Serial):
+                # A tty would wait half a minute for a device that takes nothing.
+                self._serial.reset_output_buffer()
+        except _GONE:
+            pass
+        _close(self._serial)
+
+
+def _open(port: str, baud: int) -> serial.SerialBase:
+    line = serial.serial_for_url(port, baudrate=baud, timeout=_POLL_S, do_not_open=True)
+    if isinstance(line, serial.Serial):  # the system's own, perhaps behind spy://
+        line.exclusive = True
+    line.open()
+    try:
+        if _descriptor(line) is not None:
+            line.timeout = line.write_timeout = 0
+        elif not _is_rfc2217(line):  # which knows no such thing
+            line.write_timeout = _POLLED_WRITE_S
+    except BaseException:  # it may be pulled out here, too
+        _close(line)
+        raise
+    if isinstance(line, serial.Serial):
+        lower_latency(str(line.portstr))
+    return line
+
+
+def _close(line: Any) -> None:
+    """Close all that a port has open: pyserial forgets some of it."""
+    # A socket whose other end is gone, and the file that spy:// writes.
+    forgotten = [getattr(line, "_socket", None), getattr(line, "formatter", None)]
+    forgotten = [getattr(each, "output", each) for each in forgotten]
+    for each in (line, *forgotten):
+        try:
+            if each not in (None, sys.stdout, sys.stderr):
+                each.close()
+        except _GONE:  # it is gone: that is what was wanted
+            continue
+
+
+def _descriptor(line: serial.SerialBase) -> int | None:
+    """Give what the system can wait on, if there is such a thing."""
+    try:
+        return int(line.fileno())
+    except (AttributeError, OSError):
+        return None
+
+
+def _is_rfc2217(line: serial.SerialBase) -> bool:
+    return type(line).__module__ == "serial.rfc2217"

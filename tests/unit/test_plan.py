@@ -1,0 +1,138 @@
+"""What a frame costs is what it then costs, and its ops are all that is in it."""
+
+import json
+
+import numpy as np
+import pytest
+
+import voxdisplay as vd
+from voxdisplay.cli import main
+from voxdisplay.plan import COMMON_LINES, Line, plan
+from voxdisplay.wire import spec
+from voxdisplay.wire.listing import list_ops
+from voxdisplay.wire.ops import Coding
+
+FORMATS = ["mono1", "index8", "rgb565", "rgb888"]
+
+
+def curves(grid, format_):
+    frame = vd.Frame(grid, format_)
+    frame.draw(vd.Circle(center=(20, 9, 9), radius=8), "orange")
+    frame.draw(vd.Segment((0, 0, 0), (30, 18, 18)), ["red", "lime"])
+    frame.draw([(1, 2, 3), (9, 9, 9)], "white")
+    return frame
+
+
+def memory(grid, format_, density):
+    frame = vd.Frame(grid, format_)
+    array = frame.array()
+    chance = np.random.default_rng(7)
+    top = 2 if format_ == "mono1" else np.iinfo(array.dtype).max
+    lit = chance.random(array.shape) < density
+    lit[5:12] = True
+    frame.set((lit * chance.integers(1, top, array.shape)).astype(array.dtype))
+    return frame
+
+
+@pytest.mark.parametrize("grid", [(31, 20, 19), (300, 20, 19)])
+@pytest.mark.parametrize("format_", FORMATS)
+@pytest.mark.parametrize("density", [None, 0.0, 0.02, 0.9])
+def test_the_ops_are_all_that_is_in_a_payload(grid, format_, density):
+    frame = curves(grid, format_) if density is None else memory(grid, format_, density)
+    for longest in (64, 1024):
+        coding = Coding(frame.grid, frame.format, longest)
+        for payload in frame.payloads(longest):
+            ops = list(list_ops(payload, coding))
+            assert sum(size for _, size in ops) == len(payload)
+            assert {name for name, _ in ops} <= set(plan_names())
+
+
+def plan_names():
+    return [name.removeprefix("OP_") for name in vars(spec) if name.startswith("OP_")]
+
+
+@pytest.mark.parametrize(
+    ("payload", "ops"),
+    [
+        ("", []),
+        ("01 34 12 02 01 02 03 A3 81 C2 78 56 BC 9A F0 DE A0",
+         [("PEN", 3), ("MOVE", 4), ("RUN", 1), ("SKIP", 1), ("LIT", 7), ("RUN", 1)]),
+        ("9F 01 BF 80 01 DF 00", [("SKIP", 2), ("RUN", 3), ("?", 2)]),
+        ("4A 03 3C 07 04 E4 01 31 01 0B", [("FROM", 7), ("STEP", 3)]),
+        ("A0 00 00 00", [("RUN", 1), ("END", 3)]),
+        ("A0 60 01 02", [("RUN", 1), ("?", 3)]),
+        ("02 01", [("?", 2)]),
+        ("20", [("?", 1)]),
+        ("9F 80", [("?", 2)]),
+    ],
+)  # fmt: skip
+def test_ops_by_hand(payload, ops):
+    coding = Coding(vd.Grid(17, 64, 40), vd.PixelFormat.RGB565, 64)
+    assert list(list_ops(bytes.fromhex(payload), coding)) == ops
+
+
+def test_pixels_of_one_bit():
+    coding = Coding(vd.Grid(5, 3, 7), vd.PixelFormat.MONO1, 64)
+    assert list(list_ops(bytes.fromhex("C9 A5 02 A0"), coding)) == [("LIT", 3), ("RUN", 1)]
+
+
+@pytest.mark.parametrize("density", [None, 0.0, 0.3])
+def test_it_is_what_it_then_costs(density):
+    port = "sim:?size=31x20x19&format=index8&refresh=0&max_payload=200"
+    with vd.open(port) as display:
+        frame = display.frame()
+        frame = curves(frame.grid, "index8") if density is None else memory(
+            frame.grid, "index8", density)  # fmt: skip
+        cost = plan(frame, display.info.max_payload_bytes)
+        receipt = display.present(frame)
+    assert receipt.retransmitted == 0
+    assert (cost.packets, cost.wire_bytes) == (receipt.packets, receipt.wire_bytes)
+    assert cost.voxels == receipt.voxels
+    assert sum(op.bytes for op in cost.ops.values()) == cost.op_bytes
+
+
+def test_a_dark_frame_costs_a_packet():
+    cost = plan(vd.Frame((3, 5, 7)))
+    assert (cost.packets, cost.op_bytes, cost.ops) == (1, 0, {})
+    assert cost.wire_bytes == 9
+    line = Line.serial(1000)
+    assert line.bytes_per_s == 100
+    assert cost.seconds_on(line) == cost.answer_bytes / 100, "its answers are longer"
+    assert cost.rate_on(line) == pytest.approx(100 / cost.answer_bytes)
+    assert cost.rate_on(line, 1.5) == 1.5
+
+
+def test_the_command_for_a_script(capsys):
+    assert main(["plan", "examples/paper-curve.json", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert set(said) == {
+        "size", "format", "max_payload_bytes", "refresh_hz", "voxels", "packets", "op_bytes",
+        "wire_bytes", "answer_bytes", "ops", "lines",
+    }  # fmt: skip
+    assert said["size"] == [128, 128, 128]
+    assert said["wire_bytes"] == said["op_bytes"] + 9
+    assert [line["line"] for line in said["lines"]] == [line.name for line in COMMON_LINES]
+    slow = said["lines"][0]
+    assert slow["frame_s"] == said["wire_bytes"] / 11_520
+    assert slow["frames_per_s"] == pytest.approx(1 / slow["frame_s"])
+
+
+def test_the_command_asks_a_port(capsys):
+    port = "sim:?size=40x40x40&format=mono1&refresh=25&max_payload=100"
+    scene = ["plan", "examples/trefoil.json", "--port", port]
+    assert main([*scene, "--baud", "9600", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["size"], said["format"]) == ([40, 40, 40], "mono1")
+    assert (said["max_payload_bytes"], said["refresh_hz"]) == (100, 25)
+    assert [line["line"] for line in said["lines"]] == ["9600 Bd"]
+    assert main(scene) == 0
+    assert "as fast as it is refreshed" in capsys.readouterr().out
+
+
+def test_the_command_for_people(capsys):
+    assert main(["plan", "examples/sphere.json", "--size", "64x64x64", "--format", "rgb565"]) == 0
+    said = capsys.readouterr()
+    assert "on a display of 64x64x64 rgb565" in said.out
+    assert "scaled" in said.err
+    for word in ("FROM", "MOVE", "packing", "115200 Bd", "USB high speed", " ms"):
+        assert word in said.out

@@ -1,0 +1,91 @@
+"""``voxdisplay ports``: what can be opened, and what answers there."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+import voxdisplay as vd
+from voxdisplay.cli.options import device_json, json_option, note, plural, print_json
+from voxdisplay.probe import Answer, probe_all
+from voxdisplay.transport.discovery import FoundPort, all_ports
+
+_SLACK_S = 2.0
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay ports
+      voxdisplay ports --probe
+      voxdisplay ports --probe --json
+    """
+)
+@click.option(
+    "--probe",
+    is_flag=True,
+    help="Open each port, say HELLO, and tell which answer. It changes no picture, but many boards "
+    "restart when their port is opened, and what is no display hears a few bytes that it does "
+    "not know.",
+)
+@click.option(
+    "--timeout",
+    "timeout_s",
+    type=click.FloatRange(min=0.1),
+    default=3.0,
+    metavar="SECONDS",
+    show_default=True,
+    help="With --probe: how long to ask. All ports are asked at the same time.",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(min=50),
+    default=115200,
+    metavar="RATE",
+    show_default=True,
+    help="With --probe: bits per second of serial lines.",
+)
+@json_option
+def ports(*, probe: bool, timeout_s: float, baud: int, as_json: bool) -> None:
+    """List what can be opened: serial ports and displays on USB."""
+    found = all_ports()
+    answers: dict[str, Answer] = {}
+    if probe:
+        if sys.stderr.isatty():
+            note(f"asking {plural(len(found), 'port')}, for up to {timeout_s:g} s ...")
+        names = [port.port for port in found]
+        answers = probe_all(names, baud=baud, timeout_s=timeout_s, slack_s=_SLACK_S)
+    if as_json:
+        print_json({"ports": [_facts(port, answers.get(port.port)) for port in found]})
+        return
+    width = max(len(port.port) for port in found)
+    for port in found:
+        ids = f"  {port.vid:04x}:{port.pid:04x}" if port.vid is not None else ""
+        number = f"  serial {port.serial_number}" if port.serial_number else ""
+        product = port.product if port.product and port.product not in port.description else ""
+        click.echo(
+            f"{port.port:<{width}}  {port.description}{'  ' * bool(product)}{product}{ids}{number}"
+        )
+        if probe:
+            click.echo(f"{'':<{width}}  {_said(answers[port.port])}")
+
+
+def _said(answer: Answer) -> str:
+    if isinstance(answer, str):
+        return f"no display: {answer}"
+    name = f"{answer.name or 'a display'} {answer.firmware}".strip()
+    number = f", serial {answer.serial}" if answer.serial else ""
+    return f"DISPLAY: {name}, {answer.grid} {answer.format.value}{number}"
+
+
+def _facts(port: FoundPort, answer: Answer | None) -> dict[str, Any]:
+    facts = {**asdict(port), "kind": port.kind}
+    if isinstance(answer, vd.DeviceInfo):
+        device = {"name": answer.name, **device_json(answer), "serial": answer.serial}
+        facts |= {"answers": True, "device": device, "trouble": None}
+    elif answer is not None:
+        facts |= {"answers": False, "device": None, "trouble": answer}
+    return facts

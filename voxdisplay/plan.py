@@ -1,0 +1,155 @@
+"""What a frame costs on the wire, before it is sent, and how many a second a line carries.
+
+Everything is counted on the packets themselves, as the link would send them. Knows no link, no port
+and no device but by what it announces.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final
+
+from voxdisplay.frame import Frame
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+from voxdisplay.wire.listing import list_ops
+from voxdisplay.wire.ops import Coding
+
+TYPICAL_MAX_PAYLOAD: Final = 1024
+COMMON_BAUDS: Final = (
+    115_200, 230_400, 460_800, 921_600, 1_000_000, 2_000_000, 3_000_000, 6_000_000, 12_000_000,
+)  # fmt: skip
+_BITS_PER_BYTE: Final = 10  # a start bit, eight, a stop bit
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line, and what it carries each way at most.
+
+    Attributes
+    ----------
+    name : str
+    bytes_per_s : float
+
+    """
+
+    name: str
+    bytes_per_s: float
+
+    @classmethod
+    def serial(cls, baud: int) -> Line:
+        """Give a serial line: 8 data bits, no parity, 1 stop bit."""
+        return cls(f"{baud} Bd", baud / _BITS_PER_BYTE)
+
+
+# Bulk transfers at best, USB 2.0 specification, tables 5-9 and 5-10: 19 packets of 64 bytes in each
+# frame of 1 ms, and 13 of 512 bytes in each microframe of 125 us.
+USB_LINES: Final = (
+    Line("USB full speed", 19 * 64 * 1000.0),
+    Line("USB high speed", 13 * 512 * 8000.0),
+)
+COMMON_LINES: Final = (*map(Line.serial, COMMON_BAUDS), *USB_LINES)
+
+
+@dataclass(frozen=True, slots=True)
+class OpCost:
+    """How often an op occurs, and how many bytes all of these have together."""
+
+    count: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What it takes to show a frame.
+
+    Attributes
+    ----------
+    voxels : int
+        Lit voxels.
+    packets : int
+        DATA packets.
+    op_bytes : int
+        Bytes of ops, all packets together.
+    wire_bytes : int
+        Bytes on the wire from host to device: headers, check values and delimiting included.
+    answer_bytes : int
+        Bytes on the wire from device to host: an ACK for each packet, and one for the swap.
+    ops : dict of str to OpCost
+        By the ops' names, in the order of protocol.md, section 7.
+
+    """
+
+    voxels: int
+    packets: int
+    op_bytes: int
+    wire_bytes: int
+    answer_bytes: int
+    ops: dict[str, OpCost]
+
+    def seconds_on(self, line: Line) -> float:
+        """Give how long a line is busy with the frame; both ways go at the same time."""
+        return max(self.wire_bytes, self.answer_bytes) / line.bytes_per_s
+
+    def rate_on(self, line: Line, refresh_hz: float = 0.0) -> float:
+        """Give how many such frames a second a line carries, one behind the other.
+
+        That is as many as there could be: a device may take longer to draw them than to get them.
+
+        Parameters
+        ----------
+        line : Line
+        refresh_hz : float
+            What the device shows at most; 0: any number.
+
+        """
+        carried = 1 / self.seconds_on(line)
+        return min(carried, refresh_hz) if refresh_hz else carried
+
+
+def plan(frame: Frame, max_payload: int = TYPICAL_MAX_PAYLOAD) -> Plan:
+    """Find what it takes to show a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        Of the display's grid and format.
+    max_payload : int
+        The longest payload that the device takes.
+
+    """
+    payloads = frame.payloads(max_payload) or [b""]
+    coding = Coding(frame.grid, frame.format, max_payload)
+    count: Counter[str] = Counter()
+    size: Counter[str] = Counter()
+    wire_bytes = 0
+    for number, payload in enumerate(payloads):
+        commit = number == len(payloads) - 1
+        flags = spec.DATA_FLAG_CLEAR | commit * spec.DATA_FLAG_COMMIT
+        data = packets.Data(seq=number % 256, frame=0, flags=flags, ops=payload)
+        wire_bytes += len(packets.encode(data))
+        for name, op_bytes in list_ops(payload, coding):
+            count[name] += 1
+            size[name] += op_bytes
+    return Plan(
+        voxels=len(frame.lit()[0]),
+        packets=len(payloads),
+        op_bytes=sum(map(len, payloads)),
+        wire_bytes=wire_bytes,
+        answer_bytes=(len(payloads) + 1) * _ack_bytes(),
+        ops={name: OpCost(count[name], size[name]) for name in sorted(count, key=_place)},
+    )
+
+
+def _ack_bytes() -> int:
+    ack = packets.Ack(
+        flags=0, last=1, session=0x0101, boot=0x0101, received=0x01010101, credit=0x01010101,
+        digest=0x01010101, damaged=0x0101,
+    )  # fmt: skip
+    return len(packets.encode(ack))
+
+
+def _place(name: str) -> int:
+    """Give the place of an op in the table of section 7: that of its value; unknown ones last."""
+    return int(getattr(spec, f"OP_{name}", 256))

@@ -1,0 +1,179 @@
+"""Why a port does not open, and what a person can do about it.
+
+Asks the system: which ports there are, who holds this one, whose it is. Knows nothing of pyserial
+but the shape of its errors, and no packet.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from voxdisplay.errors import OpenError
+from voxdisplay.transport.discovery import serial_ports
+
+_PROC = Path("/proc")
+_MOST_NAMED = 8
+
+
+def reason(error: BaseException) -> str:
+    """Give what an error says, or at least its kind."""
+    return str(error) or type(error).__name__
+
+
+def explain(port: str, error: BaseException) -> OpenError:
+    """Turn what was said when a serial port was opened into what a person can do.
+
+    Parameters
+    ----------
+    port : str
+        As it was named.
+    error : BaseException
+        What was raised.
+
+    """
+    number = _errno(error)
+    path = _path(port)
+    if number in {errno.EACCES, errno.EPERM}:
+        return _forbidden(port, path)
+    if number in {errno.EBUSY, errno.EAGAIN} or "PermissionError" in str(error):
+        # Windows says of a port that is open elsewhere that access is denied.
+        return _busy(port, path)
+    if number == errno.ENOENT or "FileNotFoundError" in str(error):
+        return OpenError(f"{port} does not exist", port=port, hint=_what_there_is())
+    if number in {errno.EIO, errno.ENXIO, errno.ENODEV}:
+        return OpenError(
+            f"{port} has no device behind it: {os.strerror(number)}",
+            port=port,
+            hint=f"it was pulled out, or never there; {_what_there_is()}",
+        )
+    if number in {errno.ENOTTY, errno.EISDIR}:
+        return OpenError(f"{port} is no serial port", port=port, hint=_what_there_is())
+    hint = "is the device, or the server for it, running there?" if "://" in port else None
+    return OpenError(f"{port} cannot be opened: {reason(error)}", port=port, hint=hint)
+
+
+def _errno(error: BaseException) -> int | None:
+    """Find the system's number in an error, or in one that it was made of."""
+    cause: BaseException | None = error
+    while cause is not None:
+        numbers = (getattr(cause, "errno", None), *cause.args[:1])
+        for number in numbers:
+            if isinstance(number, int):
+                return number
+        cause = cause.__cause__ or cause.__context__
+    return None
+
+
+def _path(port: str) -> str:
+    """Give the device behind a port's name: spy:///dev/ttyUSB0?file=x is one, too."""
+    return port.partition("://")[2].partition("?")[0] if "://" in port else port
+
+
+def _what_there_is() -> str:
+    found = [found.port for found in serial_ports()]
+    more = f" and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+    known = "there is " + ", ".join(found[:_MOST_NAMED]) if found else "no serial port was found"
+    return f"{known}{more}; sim: is the built-in emulator"
+
+
+# -- somebody else has it
+
+
+def _busy(port: str, path: str) -> OpenError:
+    names = [f"{_program(pid)} (process {pid})" for pid in _holders(path)]
+    if not names:
+        return OpenError(
+            f"{port} is busy",
+            port=port,
+            hint=f"another program has it open; this shows which: sudo fuser -v {path}",
+        )
+    return OpenError(
+        f"{port} is busy: {', '.join(names)} has it open",
+        port=port,
+        hint="end that program, or let go of the port there",
+    )
+
+
+def _holders(path: str) -> list[int]:
+    """Find the processes that have a device open; of these, those that have locked it, if any."""
+    try:
+        device = os.stat(path)  # noqa: PTH116 - a port's name need not be a path
+    except OSError:
+        return []
+    openers = sorted(set(_openers(device.st_rdev)))
+    locked = set(_lockers(device.st_ino))
+    return [pid for pid in openers if pid in locked] or openers
+
+
+def _openers(device: int) -> Iterator[int]:
+    for descriptor in _PROC.glob("[0-9]*/fd/*"):
+        try:
+            status = descriptor.stat()
+        except OSError:  # closed meanwhile, or not for us to see
+            continue
+        if stat.S_ISCHR(status.st_mode) and status.st_rdev == device:
+            yield int(descriptor.parts[-3])
+
+
+def _lockers(inode: int) -> Iterator[int]:
+    """Read /proc/locks: `1: FLOCK  ADVISORY  WRITE 8280 00:1a:3 0 EOF`."""
+    try:
+        lines = (_PROC / "locks").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return
+    for line in lines:
+        match line.split():
+            case [_, "FLOCK", _, _, pid, place, *_] if place.endswith(f":{inode}"):
+                yield int(pid)
+
+
+def _program(pid: int) -> str:
+    if pid == os.getpid():
+        return "this program itself"
+    try:
+        name = (_PROC / str(pid) / "comm").read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return "a program"
+    return "".join(c if c.isprintable() else "?" for c in name) or "a program"
+
+
+# -- it is not for us
+
+
+def _forbidden(port: str, path: str) -> OpenError:
+    try:
+        status = os.stat(path)  # noqa: PTH116 - a port's name need not be a path
+    except OSError:
+        return OpenError(f"{port} may not be opened", port=port, hint="look at its permissions")
+    import grp  # noqa: PLC0415 - not on every system
+    import pwd  # noqa: PLC0415
+
+    def name(of: object, number: int) -> str:
+        try:
+            entry = pwd.getpwuid(number) if of is pwd else grp.getgrgid(number)
+        except KeyError:
+            return str(number)
+        return entry[0]
+
+    user, owner, group = name(pwd, os.geteuid()), name(pwd, status.st_uid), name(grp, status.st_gid)
+    message = (
+        f"{port} may not be opened by {user}: it is {owner}'s and the group {group}'s, "
+        f"{stat.filemode(status.st_mode)}"
+    )
+    both = stat.S_IRGRP | stat.S_IWGRP
+    if status.st_mode & both != both or status.st_gid == 0:
+        # Nobody should join root's group for a port, nor would it help where the group may not.
+        return OpenError(message, port=port, hint=f"let yourself: sudo chmod a+rw {path}")
+    try:
+        joined = user in grp.getgrgid(status.st_gid).gr_mem
+    except KeyError:
+        joined = False
+    if joined and status.st_gid not in os.getgroups():
+        hint = f"{user} is in {group} since the last login: log in again, or: newgrp {group}"
+    else:
+        hint = f"join its group: sudo usermod -aG {group} $USER  (then log in again)"
+    return OpenError(message, port=port, hint=hint)
