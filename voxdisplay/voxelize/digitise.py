@@ -52,7 +52,7 @@ def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
         samples = settle(batch, see(batch, samples, boxes))
     samples = cut_at_jumps(batch, samples)
     traced = trace(batch, samples)
-    events = reduce(traced, tips=certified)
+    events = reduce(traced, samples, tips=certified)
     closed = _closed(batch, samples)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
@@ -102,7 +102,7 @@ def _proven(
             points = batch.evaluate(of, t)
             samples = Samples(np.zeros_like(of), t, points, np.array([index]))
             full = trace_everything(batch, samples)
-            thin = reduce(full, tips=True)
+            thin = reduce(full, samples, tips=True)
         else:
             full = traced.take(traced.piece == thin.piece[0])
         mended = mend(thin, full, ends, box, closed=closed)

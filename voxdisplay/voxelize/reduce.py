@@ -1,7 +1,8 @@
 """Thinning: from a connected list of voxels to one without short cuts.
 
 A *chord* is a pair of neighbouring voxels that are not consecutive in the sequence; each one
-gives some voxel a third neighbour. Integer work on events only: nothing here knows a curve.
+gives some voxel a third neighbour. Integer work on events, but for one look at where the curve
+is, as points: what turns back within two voxels, as a hairpin does, may not lose its far end.
 """
 
 from __future__ import annotations
@@ -9,20 +10,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.voxelize.batch import Samples
 from voxdisplay.voxelize.events import OTHER, Events, near
+from voxdisplay.voxelize.ranges import spread
 
 # How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
 WINDOW = 12
+# How far from the voxels at both ends of a short cut the curve may be between them, in voxels.
+REACH = 2.25
 
 
 def without_repeats(events: Events) -> Events:
     """Drop events whose voxel is that of the event before them in the piece."""
+    return events.take(_fresh(events))
+
+
+def _fresh(events: Events) -> NDArray[np.bool_]:
+    """Tell which events, (M,), have another voxel, or another piece, than the one before."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    keep = np.concatenate(([True], ~same))
-    return events.take(keep)
+    return np.concatenate(([True], ~same))
 
 
-def reduce(events: Events, *, tips: bool = False) -> Events:
+def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 
     J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
@@ -34,6 +43,9 @@ def reduce(events: Events, *, tips: bool = False) -> Events:
     ----------
     events : Events
         Consecutive ones 26-adjacent or equal within a piece.
+    way : Samples, optional
+        Points along the same pieces. Short cuts that leave one of them further than ``REACH``
+        from both ends are not taken: what chords remain are the curve's own.
     tips : bool
         Take no short cut over a tip: a voxel that sticks out of the box around both ends, where
         the sequence comes back so near to itself that it would still be touching without the tip.
@@ -46,8 +58,10 @@ def reduce(events: Events, *, tips: bool = False) -> Events:
     """
     if not events.t.size:
         return events
-    full, events = events, without_repeats(events)
-    start, stop = _short_cuts(events, tips=tips)
+    full, fresh = events, _fresh(events)
+    events = full.take(fresh)
+    until = full.t[np.append(np.flatnonzero(fresh)[1:], full.t.size) - 1]
+    start, stop = _short_cuts(events, until, way, tips=tips)
     change = np.zeros(events.t.size, dtype=np.int8)
     change[start + 1] += 1
     change[stop] -= 1
@@ -72,8 +86,13 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     return on
 
 
-def _short_cuts(events: Events, *, tips: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
+def _short_cuts(
+    events: Events, until: NDArray[np.float64], way: Samples | None, *, tips: bool
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece.
+
+    Event i stands for all the curve's events from ``events.t[i]`` to ``until[i]``.
+    """
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
     turn = np.flatnonzero(~runs_on(events))
@@ -89,6 +108,9 @@ def _short_cuts(events: Events, *, tips: bool) -> tuple[NDArray[np.intp], NDArra
     starts, stops = look[short], look[short] + leap[short]
     if tips:
         keep = ~_over_tips(events, starts, stops)
+        starts, stops = starts[keep], stops[keep]
+    if way:
+        keep = ~_leave_behind(events, until, way, starts, stops)
         starts, stops = starts[keep], stops[keep]
     taken = []
     end = -1
@@ -114,6 +136,35 @@ def _over_tips(
         voxel = voxels[:, np.minimum(starts + skipped, stops)]
         out |= ((voxel < low) | (voxel > high)).any(axis=0)
     return np.asarray(touches & out)
+
+
+def _leave_behind(
+    events: Events,
+    until: NDArray[np.float64],
+    way: Samples,
+    starts: NDArray[np.intp],
+    stops: NDArray[np.intp],
+) -> NDArray[np.bool_]:
+    """Tell which short cuts leave a point of the curve out of ``REACH``; see `_short_cuts`."""
+    behind = np.zeros(starts.size, dtype=bool)
+    # From one event to the next a curve stays in a dual cell that has both their voxels as corners:
+    # only after the first and before the last that is skipped can it be further off than sqrt(3).
+    long = np.flatnonzero(events.t[starts + 1] < until[stops - 1])
+    if not long.size:
+        return behind
+    starts, stops = starts[long], stops[long]
+    # Complex numbers are ordered by their real parts, then by their imaginary ones.
+    order, piece = way.piece + 1j * way.t, events.piece[starts]
+    low = np.searchsorted(order, piece + 1j * events.t[starts + 1])
+    count = np.searchsorted(order, piece + 1j * until[stops - 1]) - low
+    of = np.repeat(np.arange(long.size), count)
+    points = way.points[:, spread(low, count)]
+    far = np.ones(of.size, dtype=bool)
+    for end in (starts[of], stops[of]):
+        apart = points - (events.voxels[:, end] + 0.5)
+        far &= (apart * apart).sum(axis=0) > REACH * REACH
+    behind[long[of[far]]] = True
+    return behind
 
 
 def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
