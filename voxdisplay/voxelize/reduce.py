@@ -22,13 +22,9 @@ REACH = 2.25
 
 def without_repeats(events: Events) -> Events:
     """Drop events whose voxel is that of the event before them in the piece."""
-    return events.take(_fresh(events))
-
-
-def _fresh(events: Events) -> NDArray[np.bool_]:
-    """Tell which events, (M,), have another voxel, or another piece, than the one before."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    return np.concatenate(([True], ~same))
+    keep = np.concatenate(([True], ~same))
+    return events.take(keep)
 
 
 def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
@@ -58,10 +54,8 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
     """
     if not events.t.size:
         return events
-    full, fresh = events, _fresh(events)
-    events = full.take(fresh)
-    until = full.t[np.append(np.flatnonzero(fresh)[1:], full.t.size) - 1]
-    start, stop = _short_cuts(events, until, way, tips=tips)
+    full, events = events, without_repeats(events)
+    start, stop = _short_cuts(events, way, tips=tips)
     change = np.zeros(events.t.size, dtype=np.int8)
     change[start + 1] += 1
     change[stop] -= 1
@@ -87,12 +81,9 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
 
 
 def _short_cuts(
-    events: Events, until: NDArray[np.float64], way: Samples | None, *, tips: bool
+    events: Events, way: Samples | None, *, tips: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece.
-
-    Event i stands for all the curve's events from ``events.t[i]`` to ``until[i]``.
-    """
+    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
     turn = np.flatnonzero(~runs_on(events))
@@ -110,7 +101,7 @@ def _short_cuts(
         keep = ~_over_tips(events, starts, stops)
         starts, stops = starts[keep], stops[keep]
     if way:
-        keep = ~_leave_behind(events, until, way, starts, stops)
+        keep = ~_leave_behind(events, way, starts, stops)
         starts, stops = starts[keep], stops[keep]
     taken = []
     end = -1
@@ -139,31 +130,21 @@ def _over_tips(
 
 
 def _leave_behind(
-    events: Events,
-    until: NDArray[np.float64],
-    way: Samples,
-    starts: NDArray[np.intp],
-    stops: NDArray[np.intp],
+    events: Events, way: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Tell which short cuts leave a point of the curve out of ``REACH``; see `_short_cuts`."""
-    behind = np.zeros(starts.size, dtype=bool)
-    # From one event to the next a curve stays in a dual cell that has both their voxels as corners:
-    # only after the first and before the last that is skipped can it be further off than sqrt(3).
-    long = np.flatnonzero(events.t[starts + 1] < until[stops - 1])
-    if not long.size:
-        return behind
-    starts, stops = starts[long], stops[long]
+    """Tell which short cuts leave a point of the curve out of ``REACH``."""
     # Complex numbers are ordered by their real parts, then by their imaginary ones.
     order, piece = way.piece + 1j * way.t, events.piece[starts]
-    low = np.searchsorted(order, piece + 1j * events.t[starts + 1])
-    count = np.searchsorted(order, piece + 1j * until[stops - 1]) - low
-    of = np.repeat(np.arange(long.size), count)
+    low = np.searchsorted(order, piece + 1j * events.t[starts])
+    count = np.searchsorted(order, piece + 1j * events.t[stops]) - low
+    of = np.repeat(np.arange(starts.size), count)
     points = way.points[:, spread(low, count)]
     far = np.ones(of.size, dtype=bool)
     for end in (starts[of], stops[of]):
         apart = points - (events.voxels[:, end] + 0.5)
         far &= (apart * apart).sum(axis=0) > REACH * REACH
-    behind[long[of[far]]] = True
+    behind = np.zeros(starts.size, dtype=bool)
+    behind[of[far]] = True
     return behind
 
 
