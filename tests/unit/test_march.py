@@ -66,8 +66,8 @@ def test_the_step_sizes_are_lengths_where_the_parameter_is_no_angle() -> None:
     fine, same = (follow(arc(slow), 1, pitch=0.01, reach=1) for slow in (1, 1000))
     assert np.array_equal(fine.voxels, same.voxels)
     assert np.allclose(fine.distances, same.distances, atol=1e-9)
-    coarse = follow(arc(1), 1, pitch=1, reach=1)
-    assert fine.distances.mean() < 0.95 * coarse.distances.mean()
+    coarse = follow(arc(1), 1, pitch=2, reach=2)
+    assert fine.distances.max() < 0.7 < coarse.distances.max()
 
 
 def test_step_sizes_are_the_marchs_alone() -> None:

@@ -72,12 +72,14 @@ def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
             loop = close_loop(thin, curve.position, batch.last[index])
             own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
             own_voxels.flags.writeable = own_t.flags.writeable = False
-        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve)
+        spent = seconds * len(own_voxels) + perf_counter() - begin
+        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
         if boxes:
             thin = events.take(np.arange(own.start, own.stop))
             sequence = _proven(batch, sequence, boxes, index, thin, traced)
-        spent = seconds * len(own_voxels) + perf_counter() - begin
-        yield replace(sequence, seconds=spent)
+            spent = seconds * len(sequence) + perf_counter() - begin
+            sequence = replace(sequence, seconds=spent)
+        yield sequence
 
 
 def _proven(
