@@ -173,9 +173,12 @@ def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError
 
 def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
     """Make pieces of what settled, ending where a curve jumps."""
-    chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
     finest = np.diff(samples.t) < 2 * batch.resolution[samples.piece[:-1]]
-    torn = samples.joined & finest & (chord > JUMP)
+    finest &= samples.joined
+    if not finest.any():
+        return samples
+    chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
+    torn = finest & (chord > JUMP)
     if not torn.any():
         return samples
     # A jump tears one step, or two if a knot sits right on it. Where whole stretches are torn
