@@ -11,12 +11,13 @@ from time import perf_counter
 
 import numpy as np
 
+from voxdisplay import compiled
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import Batch, Ints, Samples
 from voxdisplay.voxelize.certify import Certificate, certify
 from voxdisplay.voxelize.enclose import Boxes, enclose, see
-from voxdisplay.voxelize.events import Events, near
+from voxdisplay.voxelize.events import Events
 from voxdisplay.voxelize.grid_plane import trace, trace_everything
 from voxdisplay.voxelize.knots import cut_at_jumps, first_look, settle
 from voxdisplay.voxelize.mend import mend
@@ -25,7 +26,7 @@ from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
 
 # Curves handled at once: enough to forget what a batch costs, but not many if they are long.
-CURVES = 1024
+CURVES = 2048
 VOXELS = 2_000_000
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
 TOUCH = 1e-3
@@ -41,15 +42,18 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     size = 16
     while rest := curves[len(sequences) : len(sequences) + size]:
         batch = Batch(rest, len(sequences) if len(curves) > 1 else None)
-        fresh = list(_digitise(batch, certified=certified))
+        ahead = (len(curves) - len(sequences)) / len(rest)
+        fresh = list(_digitise(batch, ahead, certified=certified))
         sequences += fresh
-        size = min(CURVES, VOXELS * len(fresh) // sum(map(len, fresh)) + 1)
+        voxels = sum([len(sequence.voxels) for sequence in fresh])
+        size = min(CURVES, VOXELS * len(fresh) // voxels + 1)
     return sequences
 
 
-def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
+def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequence]:
     begin = perf_counter()
     samples = settle(batch, first_look(batch))
+    compiled.prepare(samples.t.size, ahead)
     boxes = enclose(batch, samples) if certified else None
     if boxes:
         samples = settle(batch, see(batch, samples, boxes))
@@ -67,10 +71,8 @@ def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
     seconds = (perf_counter() - begin) / len(voxels)
     for index, (curve, low, high) in enumerate(zip(batch.curves, bounds, bounds[1:], strict=False)):
         if single[index] and not closed[index] and not boxes:  # as most are
-            own_t = t[low:high]
-            yield Sequence(
-                voxels[low:high], False, ONE_PIECE, own_t, curve, seconds * (high - low)
-            )
+            spent = seconds * (high - low)
+            yield Sequence(voxels[low:high], False, ONE_PIECE, t[low:high], curve, spent)
             continue
         begin = perf_counter()
         own_voxels, own_t = voxels[low:high], t[low:high]
@@ -127,8 +129,10 @@ def _proven(
 
 def _starts(events: Events) -> Ints:
     """Find where pieces begin. A gap that could not be bridged is a jump like any other."""
-    here, there = events.voxels[:, :-1], events.voxels[:, 1:]
-    return np.concatenate(([0], np.flatnonzero(~(events.joined & near(here, there))) + 1))
+    ends = np.flatnonzero(events.piece[1:] != events.piece[:-1])
+    gaps = events.gaps()
+    ends = np.sort(np.concatenate((ends, gaps))) if gaps.size else ends
+    return np.concatenate(([0], ends + 1))
 
 
 def _closed(batch: Batch, samples: Samples) -> list[bool]:

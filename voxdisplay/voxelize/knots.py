@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from voxdisplay.compiled import twin
+from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import AXES, Batch, Floats, Ints, Samples
 
@@ -60,7 +62,7 @@ def knots(batch: Batch) -> Samples:
 def settle(batch: Batch, samples: Samples) -> Samples:
     """Split steps of samples, one piece for each curve, as far as `knots` says."""
     while True:
-        parts, chord = _needed_parts(samples, batch.resolution)
+        parts, chord = needed_parts(samples, batch.resolution)
         if not (parts > 1).any():
             return samples
         _check_size(batch, samples, parts, chord)
@@ -88,7 +90,8 @@ def first_look(batch: Batch) -> Samples:
     t = batch.first[:, None] + (batch.last - batch.first)[:, None] * _LOOK
     t[:, -1] = batch.last
     index = np.arange(len(batch.curves))
-    if not any(len(curve.breaks) for curve in batch.curves):
+    breaks = [curve.breaks for curve in batch.curves]
+    if not any(each.size for each in breaks if each is not Curve.breaks):
         piece = np.repeat(index, _LOOK.size)
         return Samples(piece, t.ravel(), batch.evaluate(piece, t.ravel()), index)
     looks = []
@@ -100,7 +103,8 @@ def first_look(batch: Batch) -> Samples:
     return Samples(piece, flat, batch.evaluate(piece, flat), index)
 
 
-def _needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+@twin
+def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
     h = np.where(joined, np.diff(samples.t), 1.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import twin
 from voxdisplay.voxelize.batch import Samples
 from voxdisplay.voxelize.events import OTHER, Events, near
 from voxdisplay.voxelize.ranges import spread
@@ -27,6 +28,7 @@ def without_repeats(events: Events) -> Events:
     return events.take(keep)
 
 
+@twin
 def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 
