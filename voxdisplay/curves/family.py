@@ -56,8 +56,8 @@ class Curves:
         points = np.empty((3, t.size))
         if self._alike:
             for low in range(0, t.size, FAMILY_CALL):
-                some = slice(low, low + FAMILY_CALL)
-                points[:, some] = self._evaluate[0](curve[some], t[some])
+                high = low + FAMILY_CALL
+                points[:, low:high] = self._evaluate[0](curve[low:high], t[low:high])
             return points
         family = self._family[curve]
         for number, evaluate in enumerate(self._evaluate):

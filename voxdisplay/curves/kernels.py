@@ -5,12 +5,10 @@ What is computed, and in what order, is what numpy does in their place, so that 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from voxdisplay.compiled import jit
 from voxdisplay.curves.curve import Floats, Ints
-
-jit = numba.njit(cache=True, error_model="numpy")
 
 # Points worked on at once: they stay in the innermost cache.
 BLOCK = 128

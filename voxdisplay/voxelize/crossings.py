@@ -84,7 +84,9 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
         )
         better = np.concatenate([part.better for part in found], axis=1)
         gain = np.concatenate([part.gain for part in found])
-    if ((events.t[1:] < events.t[:-1]) & events.joined).any():  # several crossings of one plane, found in any order
+    if (
+        (events.t[1:] < events.t[:-1]) & events.joined
+    ).any():  # several crossings of one plane, found in any order
         order = np.lexsort((events.t, events.piece))
         return Crossings(events.take(order), better[:, order], gain[order])
     return Crossings(events, better, gain)

@@ -44,11 +44,9 @@ class Events:
         """Give the events at an index array or under a mask."""
         return Events(self.piece[index], self.t[index], self.voxels[:, index], self.heading[index])
 
-    def insert(self, at: NDArray[np.integer], other: Events) -> Events:
+    def insert(self, at: NDArray[np.intp], other: Events) -> Events:
         """Put other events before those at the indices ``at``, which ascend."""
-        mine, others = (
-            (each.piece, each.t, each.voxels, each.heading) for each in (self, other)
-        )
+        mine, others = ((each.piece, each.t, each.voxels, each.heading) for each in (self, other))
         return Events(*insert(at, mine, others))
 
     def with_voxels(self, voxels: Voxels) -> Events:

@@ -7,28 +7,26 @@ looks at nothing twice.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import jit
 from voxdisplay.voxelize.batch import Bools, Floats, Ints, Samples
 from voxdisplay.voxelize.crossings import MARGIN, NUDGE, Aims, Corners, Crossings
-from voxdisplay.voxelize.events import OTHER, Events, Voxels
+from voxdisplay.voxelize.events import Events, Voxels
 from voxdisplay.voxelize.knots import BEND, CHORD, PARTS
 from voxdisplay.voxelize.ranges import Arrays
 from voxdisplay.voxelize.reduce import REACH, WINDOW
 
-jit = numba.njit(cache=True, error_model="numpy")
-
 Bytes = NDArray[np.int8]
 Pieces = NDArray[np.int32]
 
+Rows = TypeVar("Rows", bound=NDArray[Any])
+
 TINY = float(np.finfo(float).tiny)
-# Well below these nothing is split, whatever the last bits say.
-SHORT, STRAIGHT = 0.99 * CHORD, 0.99 * BEND
-PLAIN = int(OTHER)
+PLAIN = -1  # `events.OTHER`
 NO_POINTS = np.empty((3, 0))
 NO_NUMBERS = np.empty(0)
 NO_PIECES = np.empty(0, dtype=np.int64)
@@ -39,10 +37,8 @@ NO_PIECES = np.empty(0, dtype=np.int64)
 
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """See `knots.needed_parts`."""
-    found: tuple[Ints, Floats] = _needed_parts(
-        samples.piece, samples.t, _packed(samples.points), samples.curve, resolution
-    )
-    return found
+    points, limits = _packed(samples.points), (CHORD, BEND, float(PARTS))
+    return _needed_parts(samples.piece, samples.t, points, resolution[samples.curve], limits)
 
 
 @jit
@@ -53,9 +49,10 @@ def _most(a: float, b: float) -> float:
 
 @jit
 def _needed_parts(
-    piece: Ints, t: Floats, points: Floats, curve: Ints, resolution: Floats
+    piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: tuple[float, float, float]
 ) -> tuple[Ints, Floats]:
-    size = t.size
+    size, (most_chord, most_bend, most_parts) = t.size, limits
+    short, straight = 0.99 * most_chord, 0.99 * most_bend  # below these nothing is split
     parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
     room = 64
     velocity, turn = np.empty(room), np.empty(room + 1)
@@ -82,20 +79,19 @@ def _needed_parts(
         for k in range(steps):
             h = times[k + 1] - times[k]
             bend = h * h * _most(turn[k], turn[k + 1]) / 4
-            if (longest[k] <= SHORT) & (bend <= STRAIGHT):
+            if (longest[k] <= short) & (bend <= straight):
                 continue
-            wanted = np.ceil(_most(longest[k] / CHORD, np.sqrt(bend / BEND)))
+            wanted = np.ceil(_most(longest[k] / most_chord, np.sqrt(bend / most_bend)))
             if wanted > 1:
-                possible = np.floor(h / resolution[curve[piece[first]]])
-                parts[first + k] = max(int(min(wanted, possible, float(PARTS))), 1)
+                possible = np.floor(h / resolution[piece[first]])
+                parts[first + k] = max(int(min(wanted, possible, most_parts)), 1)
         first = last + 1
     return parts, chord
 
 
 def slopes_at(knots: Samples) -> Floats:
     """See `crossings.slopes_at`."""
-    slopes: Floats = _slopes_at(knots.piece, knots.t, _packed(knots.points))
-    return slopes
+    return _slopes_at(knots.piece, knots.t, _packed(knots.points))
 
 
 @jit
@@ -128,7 +124,8 @@ def _slopes_at(piece: Ints, t: Floats, points: Floats) -> Floats:
 
 def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     """See `crossings.aim`."""
-    return Aims(*_aim(knots.piece, knots.t, _packed(knots.points), slopes, low, high))
+    points = _packed(knots.points)
+    return Aims(*_aim(knots.piece, knots.t, points, _packed(slopes), low, high, NUDGE))
 
 
 @jit
@@ -138,7 +135,7 @@ def _monotone(slope: float) -> float:
 
 @jit
 def _aim(
-    piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int
+    piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int, nudge: float
 ) -> tuple[Ints, Bytes, Bools, Floats, Floats, Floats]:
     stop = min(high, t.size - 1)
     # The steps that pass planes, of which axis, how many.
@@ -149,7 +146,7 @@ def _aim(
     of = piece[low : stop + 1]
     for k in range(stop - low):
         x, y, z = px[k + 1] - px[k], py[k + 1] - py[k], pz[k + 1] - pz[k]
-        x, y, z = abs(x) * (1 + NUDGE), abs(y), abs(z) * (1 - NUDGE)
+        x, y, z = abs(x) * (1 + nudge), abs(y), abs(z) * (1 - nudge)
         if (x >= y) & (x >= z):
             axis, begin, end = 0, px[k], px[k + 1]
         elif y >= z:
@@ -190,14 +187,21 @@ def _aim(
 
 def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
     """See `crossings.corners`."""
-    return Corners(
-        *_corners(knots.t, slopes, aims.knot, aims.axis, aims.level, aims.tau, _packed(points))
-    )
+    aimed = aims.knot, aims.axis, aims.level, aims.tau
+    return Corners(*_corners(knots.t, _packed(slopes), *aimed, _packed(points), NUDGE, MARGIN))
 
 
 @jit
 def _corners(
-    t: Floats, slopes: Floats, knot: Ints, axes: Bytes, level: Floats, tau: Floats, points: Floats
+    t: Floats,
+    slopes: Floats,
+    knot: Ints,
+    axes: Bytes,
+    level: Floats,
+    tau: Floats,
+    points: Floats,
+    nudge: float,
+    margin: float,
 ) -> tuple[Voxels, Voxels, Floats, Floats]:
     size = knot.size
     nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
@@ -208,7 +212,7 @@ def _corners(
         left, axis = knot[k], axes[k]
         h = t[left + 1] - t[left]
         for row in range(3):
-            corner[row] = np.floor(points[row, k] + NUDGE)
+            corner[row] = np.floor(points[row, k] + nudge)
             begin = slopes[row, left] * h
             tangent[row] = begin + tau[k] * (slopes[row, left + 1] * h - begin)
         corner[axis] = level[k] - 0.5
@@ -223,17 +227,15 @@ def _corners(
         for row in range(3):
             towards[row] = -1.0 if apart[row] > 0 else 1.0
             shift[row] = towards[row] * along[row]
-            change[row] = (
-                1.0 - 2.0 * abs(apart[row]) - (2.0 * project + shift[row]) * shift[row]
-            )
+            change[row] = 1.0 - 2.0 * abs(apart[row]) - (2.0 * project + shift[row]) * shift[row]
         best, one, other = 0.0, -1, -1
         for row in range(3):
-            if row != axis and change[row] < best - MARGIN:
+            if row != axis and change[row] < best - margin:
                 best, one = change[row], row
         # Of the three pairs of axes, in the order of `crossings.corners`, the one on the face.
         first, second = (1, 2) if axis == 0 else ((0, 2) if axis == 1 else (0, 1))
         total = change[first] + change[second] - 2.0 * shift[first] * shift[second]
-        if total < best - MARGIN:
+        if total < best - margin:
             best, one, other = total, first, second
         for row in range(3):
             nearest[row, k] = better[row, k] = int(corner[row])
@@ -255,7 +257,7 @@ def _corners(
 
 @jit
 def _near(voxels: Voxels, i: int, j: int) -> bool:
-    return (  # without a branch between
+    return bool(  # without a branch between
         (abs(voxels[0, i] - voxels[0, j]) <= 1)
         & (abs(voxels[1, i] - voxels[1, j]) <= 1)
         & (abs(voxels[2, i] - voxels[2, j]) <= 1)
@@ -362,11 +364,10 @@ def _choose_corners(
 
 def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
     """See `ranges.insert`."""
-    size = arrays[0].shape[-1]
     merged = []
     for array, other in zip(arrays, fresh, strict=True):
-        both = _insert(at, _packed(array.reshape(-1, size)), _packed(other.reshape(-1, at.size)))
-        merged.append(both.reshape(*array.shape[:-1], -1))
+        both = _insert(at, *(_packed(np.atleast_2d(each)) for each in (array, other)))
+        merged.append(both if array.ndim > 1 else both[0])
     return tuple(merged)
 
 
@@ -390,13 +391,12 @@ def _insert(at: Ints, array: NDArray[Any], fresh: NDArray[Any]) -> NDArray[Any]:
 def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
     """See `reduce.reduce`."""
     known = (way.piece, way.t, _packed(way.points)) if way else (NO_PIECES, NO_NUMBERS, NO_POINTS)
-    return Events(
-        *_reduce(events.piece, events.t, _packed(events.voxels), events.heading, *known, tips)
-    )
+    full = events.piece, events.t, _packed(events.voxels), events.heading
+    return Events(*_reduce(*full, *known, tips, WINDOW, REACH * REACH))
 
 
 @jit
-def _look(piece: Pieces, voxels: Voxels, heading: Bytes) -> Bools:
+def _look(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> Bools:
     """Tell where a turn is within reach: see `reduce.runs_on`."""
     size = piece.size
     reach = np.zeros(size + 1, dtype=np.int32)
@@ -406,8 +406,8 @@ def _look(piece: Pieces, voxels: Voxels, heading: Bytes) -> Bools:
             axis = heading[k] >> 1
             on = voxels[axis, k] - voxels[axis, k - 1] == 1 - 2 * (heading[k] & 1)
         if not on:
-            reach[max(k - WINDOW, 0)] += 1
-            reach[min(k + WINDOW, size)] -= 1
+            reach[max(k - window, 0)] += 1
+            reach[min(k + window, size)] -= 1
     look = np.empty(size, dtype=np.bool_)
     total = 0
     for k in range(size):
@@ -417,12 +417,12 @@ def _look(piece: Pieces, voxels: Voxels, heading: Bytes) -> Bools:
 
 
 @jit
-def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool) -> int:
+def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool, window: int) -> int:
     """Give J(i) - i within a stretch."""
     ahead = 0
-    while ahead < WINDOW and i + ahead + 1 < end and _near(voxels, i, i + ahead + 1):
+    while ahead < window and i + ahead + 1 < end and _near(voxels, i, i + ahead + 1):
         ahead += 1
-    w = min(WINDOW, end - 1 - i) + 1
+    w = min(window, end - 1 - i) + 1
     while w > 2:
         w -= 1
         j = i + w
@@ -462,11 +462,12 @@ def _over_tip(voxels: Voxels, i: int, j: int) -> bool:
 
 
 @jit
-def _out_of_reach(voxels: Voxels, i: int, points: Floats, p: int) -> bool:
+def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
+    """Give the square of the distance between a voxel and a point."""
     x = points[0, p] - (voxels[0, i] + 0.5)
     y = points[1, p] - (voxels[1, i] + 0.5)
     z = points[2, p] - (voxels[2, i] + 0.5)
-    return x * x + y * y + z * z > REACH * REACH
+    return float(x * x + y * y + z * z)
 
 
 @jit
@@ -479,6 +480,8 @@ def _reduce(
     way_t: Floats,
     points: Floats,
     tips: bool,
+    window: int,
+    farthest: float,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
     whole = full_t.size
     number = np.empty(whole, dtype=np.int64)
@@ -499,7 +502,7 @@ def _reduce(
     for row in range(3):
         for k in range(size):
             voxels[row, k] = full_voxels[row, number[k]]
-    look = _look(piece, voxels, heading)
+    look = _look(piece, voxels, heading, window)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
     count = p = i = 0
@@ -524,7 +527,7 @@ def _reduce(
                 while end < size and look[end] and piece[end] == piece[i]:
                     end += 1
                     connected &= end == i + 1 or _near(voxels, end - 2, end - 1)
-            leap = _leap(voxels, i, begin, end, connected)
+            leap = _leap(voxels, i, begin, end, connected, window)
         if leap > 1 and tips and _over_tip(voxels, i, i + leap):
             leap = 1
         if leap > 1 and way_t.size:
@@ -535,7 +538,8 @@ def _reduce(
                 p += 1
             q = p
             while q < way_t.size and way_piece[q] == piece[i] and way_t[q] < t[j]:
-                if _out_of_reach(voxels, i, points, q) and _out_of_reach(voxels, j, points, q):
+                nearest = min(_square(voxels, i, points, q), _square(voxels, j, points, q))
+                if nearest > farthest:
                     leap = 1
                     break
                 q += 1
@@ -557,6 +561,7 @@ def _reduce(
     return full_piece[kept], kept_t[:count], thin, full_heading[kept]
 
 
-def _packed(rows: NDArray[np.generic]) -> NDArray[np.generic]:
+def _packed(rows: Rows) -> Rows:
     """Give rows that lie one after the other, so that there is one kernel to compile."""
-    return np.ascontiguousarray(rows)
+    packed: Rows = np.ascontiguousarray(rows)  # type: ignore[assignment]
+    return packed

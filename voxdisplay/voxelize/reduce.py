@@ -17,8 +17,10 @@ from voxdisplay.voxelize.ranges import spread
 
 # How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
 WINDOW = 12
-# How far from the voxels at both ends of a short cut the curve may be between them, in voxels.
-REACH = 2.25
+# How far from the voxels at both ends of a short cut samples of the curve may be between them, in
+# voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
+# which is much more than `knots.BEND` at cusps.
+REACH = 2.0
 
 
 def without_repeats(events: Events) -> Events:
