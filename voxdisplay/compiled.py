@@ -1,7 +1,7 @@
 """The choice between array code in numpy and the same code compiled, which takes the extra `fast`.
 
 A function marked as a `twin` has another of its name, with the same parameters and results to the
-last bit, in the module ``kernels`` beside it. Those need numba, which takes longer to import than
+last bit, in ``kernels`` beside its module. Those need numba, which takes longer to import than
 most scenes to draw, and some seconds to compile them the first time after an installation: they
 are taken only if numba is installed, and from when the work is worth it on. What the functions do
 is not known here.
