@@ -1,4 +1,4 @@
-"""Measures this engine and what else there is on the same curves; prints one table.
+"""Measures this engine, with and without its extra `fast`, and others; prints one table.
 
 The others give lists of voxels too, with nothing promised about them: points close together on
 the curve, rounded down, without repeats, in numpy; the same through trimesh; lines between points
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from paper_tables import paper_curve
 
 import voxdisplay as vd
+from voxdisplay import compiled
 from voxdisplay.curves import Bezier, Curve, Lissajous, TorusKnot
 from voxdisplay.curves.family import Curves
 from voxdisplay.voxelize import measure
@@ -82,7 +83,14 @@ def jobs(*, quick: bool) -> Iterator[Job]:
 
 
 def grid_plane(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
-    """Voxelise with this engine."""
+    """Voxelise with this engine, in numpy."""
+    compiled.use(False)
+    return [sequence.voxels for sequence in vd.voxelize_many(curves)]
+
+
+def fast(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
+    """Voxelise with this engine, compiled: the extra `fast`."""
+    compiled.use(True)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
@@ -113,8 +121,18 @@ def line_nd(curves: Sequence[Curve], lengths: list[int]) -> list[Voxels]:
     return found
 
 
-TOOLS = {"this engine": grid_plane, "numpy": dense, "line_nd": line_nd, "trimesh": trimesh}
-NEEDS = {"line_nd": ("skimage", "scikit-image"), "trimesh": ("trimesh", "trimesh")}
+TOOLS = {
+    "this engine": grid_plane,
+    "extra fast": fast,
+    "numpy": dense,
+    "line_nd": line_nd,
+    "trimesh": trimesh,
+}
+NEEDS = {
+    "extra fast": ("numba", "numba"),
+    "line_nd": ("skimage", "scikit-image"),
+    "trimesh": ("trimesh", "trimesh"),
+}
 
 
 def sampled(
@@ -235,6 +253,7 @@ def bench_job(job: Job, tools: Sequence[str], repeats: int) -> None:
 
 def memory(curve: Curve) -> None:
     """Print how much memory this engine takes."""
+    compiled.use(False)
     tracemalloc.start()
     sequence = vd.voxelize(curve)
     kept, peak = (size / len(sequence) for size in tracemalloc.get_traced_memory())
@@ -246,7 +265,8 @@ def bench_curves(repeats: int, *, quick: bool = False) -> None:
     """Print the table."""
     tools = [name for name in TOOLS if name not in NEEDS or find_spec(NEEDS[name][0])]
     for name in [name for name in NEEDS if name not in tools]:
-        print(f"{name} is left out: pip install {NEEDS[name][1]}, or the extra `bench`")
+        extra = "fast" if name == "extra fast" else "bench"
+        print(f"{name} is left out: pip install {NEEDS[name][1]}, or the extra `{extra}`")
     print(
         f"{'curves':<29}{'tool':<12}{'N':>9}{'gaps':>6}{'judged':>8}{'e_max':>7}{'e_av':>7}"
         f"{'not2':>7}{'cover':>6}{'ms':>10}{'runs':>5}{'ratio':>8}{'Mvox/s':>8}"

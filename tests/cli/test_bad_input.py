@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+PAPER = "examples/paper-curve.json"
+
 
 def refused(done, *words, code=2):
     assert done.returncode == code, done.stderr
@@ -82,9 +84,13 @@ def test_files_that_cannot_be_read(run, tmp_path):
         (["push", "x", "--fitt", "none"], ["--fit"]),
         (["push", "x", "--fit", "cover"], ["contain"]),
         (["push", "x", "--timeout", "0"], ["--timeout"]),
-        (["voxelize", "examples/paper-curve.json", "-o", "x.obj"], [".npy"]),
-        (["voxelize", "examples/paper-curve.json", "--clip", "0x5x7"], ["128x128x128"]),
-        (["voxelize", "examples/paper-curve.json", "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),
+        (["voxelize", PAPER, "-o", "x.obj"], [".npy"]),
+        (["voxelize", PAPER, "--clip", "0x5x7"], ["128x128x128"]),
+        (["voxelize", PAPER, "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),
+        (["voxelize", PAPER, "--pitch", "0.5"], ["--pitch", "--method march"]),
+        (["voxelize", PAPER, "--reach", "0.5"], ["--reach", "--method march"]),
+        (["voxelize", PAPER, "--method", "march", "--pitch", "0"], ["--pitch", "positive"]),
+        (["voxelize", PAPER, "--method", "march", "--reach", "0.1"], ["--reach", "0.25"]),
         (["read", "--port", "sim:?size=3x5x7", "-o", "/nowhere/x.npy"], ["/nowhere/x.npy"]),
         (["read", "--port", "sim:", "-o", "x.csv"], [".npy"]),
     ],

@@ -112,6 +112,8 @@ def test_voxelize_by_the_papers_march(run, scene):
     for variant, count in ((1, 660), (2, 644), (3, 651)):
         done = run("voxelize", scene(paper), "--method", "march", "--variant", variant, "--json")
         assert json.loads(done.stdout)["voxels"] == count
+    fine = run("voxelize", scene(paper), "--method=march", "--pitch=0.02", "--reach=1", "--json")
+    assert json.loads(fine.stdout)["voxels"] == 655
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npy", ".json"])

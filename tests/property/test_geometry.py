@@ -1,13 +1,13 @@
 """What holds for sequences along all curves: connectivity, ends, distance, symmetries, batches."""
 
 import numpy as np
-import pytest
+from guarantees import check
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from space_curves import Function, chain, fourier_curve, moved, turned
 
 from voxdisplay.curves.curve import Curve
-from voxdisplay.voxelize import Sequence, measure, voxelize, voxelize_many
+from voxdisplay.voxelize import measure, voxelize, voxelize_many
 
 seeds = st.integers(0, 2**32 - 1)
 fouriers = st.builds(
@@ -36,26 +36,6 @@ cusps = st.builds(
     coordinates,
 )
 curves = fouriers | polylines | cusps
-
-
-def check(sequence: Sequence, curve: Curve) -> None:
-    voxels = sequence.voxels
-    ends = np.floor(curve.position(np.array(curve.t_range))).T
-    assert np.array_equal(voxels[0], ends[0])
-    ends_there = np.array_equal(voxels[-1], ends[1])
-    assert ends_there or sequence.closed
-    assert sequence.starts.tolist() == [0]
-    assert measure.gaps(voxels, closed=sequence.closed).size == 0
-    assert not (np.diff(voxels, axis=0) == 0).all(axis=1).any()
-    distance = measure.distances(voxels, curve)
-    assert distance.max() <= 0.8661
-    inner = distance[1:-1] if ends_there else distance[1:]
-    assert inner.max(initial=0.0) <= 0.7072
-    violations = measure.neighbour_violations(voxels, closed=sequence.closed)
-    assert set(violations) <= set(sequence.contact_pairs.reshape(-1))
-    assert np.all(np.diff(sequence.t) >= 0)
-    # Nearest in the maximum norm, two voxels; the curve may be as far in all three axes.
-    assert measure.coverage(voxels, curve) <= 2.5 * np.sqrt(3)
 
 
 @given(curves)
@@ -118,12 +98,3 @@ def test_a_jump_is_found_anywhere(seed: int, where: float) -> None:
     before, after = sequence.starts[1] - 1, sequence.starts[1]
     assert sequence.t[before] <= at <= sequence.t[after]
     assert sequence.t[after] - sequence.t[before] < 1e-12
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["smooth", "rough", "tiny"])
-@pytest.mark.parametrize("closed", [False, True])
-def test_guarantees_of_a_thousand(kind: str, closed: bool) -> None:
-    many = [fourier_curve(seed, kind, closed=closed) for seed in range(1000)]
-    for curve, sequence in zip(many, voxelize_many(many), strict=True):
-        check(sequence, curve)

@@ -47,6 +47,34 @@ def test_the_tables_of_the_paper(
         assert trail.distances.mean() == pytest.approx(e_av, abs=0.0015)
 
 
+def test_the_step_sizes_are_the_tables_unless_said_otherwise() -> None:
+    curve = paper_curve(40, 4, 50)
+    said = voxelize(curve, method="march", variant=2, pitch=0.25, reach=2)
+    assert np.array_equal(said.voxels, voxelize(curve, method="march", variant=2).voxels)
+    # With distances found as finely as can be, the march is as good as the paper's best.
+    fine = follow(curve, 1, pitch=0.02, reach=1)
+    assert (len(fine.voxels), len(follow(curve, 1).voxels)) == (655, 660)
+    assert fine.distances.max() == pytest.approx(0.645, abs=0.002)
+
+
+def test_the_step_sizes_are_lengths_where_the_parameter_is_no_angle() -> None:
+    def arc(slow: float) -> Function:
+        return Function(
+            lambda t: (40 * np.cos(t / slow), 5 * t / slow, 40 * np.sin(t / slow)), 0, slow
+        )
+
+    fine, same = (follow(arc(slow), 1, pitch=0.01, reach=1) for slow in (1, 1000))
+    assert np.array_equal(fine.voxels, same.voxels)
+    assert np.allclose(fine.distances, same.distances, atol=1e-9)
+    coarse = follow(arc(1), 1, pitch=2, reach=2)
+    assert fine.distances.max() < 0.7 < coarse.distances.max()
+
+
+def test_step_sizes_are_the_marchs_alone() -> None:
+    with pytest.raises(ValueError, match="method='march'"):
+        voxelize(paper_curve(40, 4, 50), pitch=0.5)
+
+
 def test_how_the_tangent_is_found_makes_no_difference() -> None:
     curve = paper_curve(40, 4, 50)
     exact = WithDerivative(curve.function, *curve.t_range)
@@ -100,6 +128,11 @@ def test_a_march_that_loses_its_way() -> None:
         ({"variant": 4}, "no variant 4"),
         ({"tangent": "guessed"}, "no tangent 'guessed'"),
         ({"tangent": "analytic"}, "no derivative"),
+        ({"pitch": 0}, "pitch must be positive and finite, not 0"),
+        ({"pitch": float("nan")}, "pitch must be positive and finite, not nan"),
+        ({"reach": float("inf")}, "reach must be positive and finite, not inf"),
+        ({"reach": 0.2}, "one pitch, 0.25, at least, not 0.2"),
+        ({"pitch": 1e-9}, "1000 pitches of 1e-09 at most, not 2: take a larger pitch"),
     ],
 )
 def test_wrong_options(options: dict, message: str) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import voxdisplay as vd
 from voxdisplay.cli.options import SizeType, json_option, note, plural, print_json
 from voxdisplay.cli.scenes import voxelize_scene
+from voxdisplay.voxelize import march
 
 _COLUMNS = ("object", "x", "y", "z")
 
@@ -29,6 +30,7 @@ _COLUMNS = ("object", "x", "y", "z")
       voxdisplay voxelize curve.json > voxels.csv
       voxdisplay voxelize curve.json -o voxels.npy --clip 128,128,128
       voxdisplay voxelize curve.json --certified --json
+      voxdisplay voxelize curve.json --method march --variant 2 --pitch 0.1 --json
     """,
 )
 @click.argument("scene", type=click.Path())
@@ -59,6 +61,19 @@ _COLUMNS = ("object", "x", "y", "z")
     help="Where the march takes tangents from.  [default: analytic, if there is a derivative]",
 )
 @click.option(
+    "--pitch",
+    type=float,
+    metavar="STEP",
+    help="Step of the march's search for the nearest point: in degrees where t is an angle around "
+    "z, as in the paper, else in voxels.  [default: 0.5 for variant 1, else 0.25]",
+)
+@click.option(
+    "--reach",
+    type=float,
+    metavar="SPAN",
+    help="How far the march searches to either side, in the same unit.  [default: 2]",
+)
+@click.option(
     "--certified",
     is_flag=True,
     help="Prove that no feature is missed, however narrow, and say where there is no proof.",
@@ -77,6 +92,8 @@ def voxelize(
     method: str,
     variant: int,
     tangent: str | None,
+    pitch: float | None,
+    reach: float | None,
     certified: bool,
     clip: vd.Grid | None,
     as_json: bool,
@@ -89,16 +106,11 @@ def voxelize(
         raise click.BadParameter(
             f"{output} should end in {', '.join(_WRITERS)}", param_hint="--output"
         )
-    if certified and method != "grid-plane":
-        raise click.BadParameter(
-            f"nothing is proven of the method {method}", param_hint="--certified"
-        )
+    how = _how(method, variant, tangent, pitch, reach, certified)
     loaded = vd.load_scene(scene)
     items = loaded.items
     began_s = time.perf_counter()
-    sequences = voxelize_scene(
-        loaded, method=method, variant=variant, tangent=tangent, certified=certified
-    )
+    sequences = voxelize_scene(loaded, **how)
     seconds = time.perf_counter() - began_s
     for number, (item, sequence) in enumerate(zip(items, sequences, strict=True)):
         if isinstance(sequence.proof, str):
@@ -126,6 +138,37 @@ def voxelize(
             sys.stdout.flush()
         except BrokenPipeError:  # whoever reads has enough; so has the flush at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _how(
+    method: str,
+    variant: int,
+    tangent: str | None,
+    pitch: float | None,
+    reach: float | None,
+    certified: bool,
+) -> dict[str, Any]:
+    """Give the options of `voxdisplay.voxelize`, if they go together."""
+    if method == "march":
+        if certified:
+            raise click.BadParameter("nothing is proven of the march", param_hint="--certified")
+        try:
+            pitch, reach = march.search_steps(variant, pitch, reach)
+        except ValueError as error:
+            raise click.BadParameter(str(error), param_hint="--pitch, --reach") from error
+    elif pitch is not None or reach is not None:
+        raise click.BadParameter(
+            "only the march searches by steps: add --method march",
+            param_hint="--reach" if pitch is None else "--pitch",
+        )
+    return {
+        "method": method,
+        "variant": variant,
+        "tangent": tangent,
+        "pitch": pitch,
+        "reach": reach,
+        "certified": certified,
+    }
 
 
 def _kept(sequence: vd.Sequence, clip: vd.Grid | None) -> NDArray[np.int32]:

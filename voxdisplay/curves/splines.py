@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from voxdisplay.compiled import twin
 from voxdisplay.curves import checks
 from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
 from voxdisplay.curves.interval import Interval, interval
@@ -60,8 +61,15 @@ class Bezier(Curve):
     @staticmethod
     def together(curves: Sequence[Bezier]) -> Evaluate:
         """Prepare to evaluate curves of one degree at once, see `Curve.together`."""
-        points = np.stack([curve._points for curve in curves], axis=2)
-        return lambda which, t: _de_casteljau(points.take(which, axis=2), t)
+        rows = np.concatenate([curve._points for curve in curves])
+        points = np.ascontiguousarray(rows.reshape(len(curves), -1, 3).transpose(1, 2, 0))
+        return lambda which, t: beziers(points, which, t)
+
+
+@twin
+def beziers(control: Floats, which: Ints, t: Floats) -> Floats:
+    """Evaluate Bezier curves of one degree, with control points (degree + 1, 3, curves)."""
+    return _de_casteljau(control.take(which, axis=2), t)
 
 
 def _de_casteljau(layer: Floats, t: Floats) -> Floats:

@@ -27,6 +27,8 @@ def voxelize(
     method: str = "grid-plane",
     variant: int = 3,
     tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
     certified: bool = False,
 ) -> Sequence:
     """Find the voxels along a curve.
@@ -38,8 +40,13 @@ def voxelize(
     method : {"grid-plane", "march"}
         The method of `grid_plane`, for which what is said below holds, or the paper's own, which
         is there for comparison: `march`.
-    variant, tangent
-        Options of the march.
+    variant : {1, 2, 3}
+    tangent : {"analytic", "difference"}, optional
+        How the march finds distances, and tangents: see `march.follow`.
+    pitch, reach : float, optional
+        Step sizes of the march's search for the nearest point: in degrees where the parameter is
+        an angle around z, as for the paper's curves, else in voxels. By default those of the
+        paper's tables: see `march.follow`.
     certified : bool
         Prove what the report says, and that no feature is missed, however narrow, by bounds of
         the curve's formula (`certify`); it takes about twice the time. Without it, features much
@@ -59,10 +66,18 @@ def voxelize(
     ------
     CurveError
         If the curve cannot be evaluated, runs off, or has no end.
+    ValueError
+        If there is no such method or option, or the method has none such.
 
     """
     return voxelize_many(
-        [curve], method=method, variant=variant, tangent=tangent, certified=certified
+        [curve],
+        method=method,
+        variant=variant,
+        tangent=tangent,
+        pitch=pitch,
+        reach=reach,
+        certified=certified,
     )[0]
 
 
@@ -72,15 +87,22 @@ def voxelize_many(
     method: str = "grid-plane",
     variant: int = 3,
     tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
     certified: bool = False,
 ) -> list[Sequence]:
     """Find the voxels along many curves: as `voxelize`, but much faster than one by one."""
     if method == "grid-plane":
+        if pitch is not None or reach is not None:
+            raise ValueError("pitch and reach are the march's: they go with method='march'")
         return digitise(curves, certified=certified)
     if method == "march":
         if certified:
             raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
-        return [march.march(curve, variant, tangent=tangent) for curve in curves]
+        return [
+            march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
+            for curve in curves
+        ]
     raise ValueError(f"there is no method {method!r}: take 'grid-plane' or 'march'")
 
 

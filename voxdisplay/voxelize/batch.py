@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.family import Curves
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelize.ranges import spread
+from voxdisplay.voxelize.ranges import insert, spread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -110,9 +110,10 @@ class Batch:
         """
         with np.errstate(all="ignore"):
             points = self._positions(curve, t)
-            good = np.abs(points) < FARTHEST  # and so not where P is not a number
-        if not good.all():
-            at = int(np.argmin(good.all(axis=0)))
+            # And so not where P is not a number: it would be least and greatest.
+            near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
+        if not near:
+            at = int(np.argmin((np.abs(points) < FARTHEST).all(axis=0)))
             raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])
         return points
 
@@ -144,13 +145,7 @@ class Batch:
         t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])
         piece_fresh = samples.piece[left]
 
-        kept = np.concatenate(([0], np.cumsum(parts)))
-        fresh = np.ones(kept[-1] + 1, dtype=bool)
-        fresh[kept] = False
-        piece = np.empty(fresh.size, dtype=np.int64)
-        t = np.empty(fresh.size)
-        points = np.empty((3, fresh.size))
-        piece[kept], t[kept], points[:, kept] = samples.piece, samples.t, samples.points
-        piece[fresh], t[fresh] = piece_fresh, t_fresh
-        points[:, fresh] = self.evaluate(samples.curve[piece_fresh], t_fresh)
+        points = self.evaluate(samples.curve[piece_fresh], t_fresh)
+        mine = (samples.piece, samples.t, samples.points)
+        piece, t, points = insert(left + 1, mine, (piece_fresh, t_fresh, points))
         return Samples(piece, t, points, samples.curve)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import twin
 from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
 from voxdisplay.voxelize.events import Events, Voxels
 from voxdisplay.voxelize.ranges import blocks, spread
@@ -41,14 +42,24 @@ class Crossings:
     gain: Floats
 
 
-class _Steps(NamedTuple):
-    """Steps between knots which cross mid-planes of their dominant axis, one entry per step."""
+class Aims(NamedTuple):
+    """Where curves should cross the planes of the axis that changes most, one entry per plane."""
 
-    knot: Ints  # the knot where it begins
+    knot: Ints  # the last before it
     axis: NDArray[np.int8]
-    planes: Ints  # how many it passes
-    level: Floats  # of the first of them: i + 1/2
-    sense: Floats  # +1 or -1
+    descends: NDArray[np.bool_]
+    level: Floats  # of the plane: i + 1/2
+    tau: Floats  # where it is crossed, in steps between knots
+    t: Floats  # the parameter there
+
+
+class Corners(NamedTuple):
+    """Corners of the faces crossed, as the voxels they are the centres of: see `corners`."""
+
+    nearest: Voxels
+    better: Voxels
+    gain: Floats
+    foot: Floats
 
 
 def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
@@ -56,28 +67,33 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
 
     Their events are connected only where one axis goes on to dominate.
     """
-    slopes = _slopes(knots)
+    slopes = slopes_at(knots)
     starts = np.searchsorted(knots.curve[knots.piece], np.arange(len(batch.curves)))
     found = [
-        _crossings_of(batch, knots, slopes, _crossing_steps(knots, low, high))
+        _crossings_of(batch, knots, slopes, aim(knots, slopes, low, high))
         for low, high in blocks(starts, knots.t.size, BLOCK)
     ]
-    events = Events(
-        np.concatenate([part.events.piece for part in found]),
-        np.concatenate([part.events.t for part in found]),
-        np.concatenate([part.events.voxels for part in found], axis=1),
-        np.concatenate([part.events.heading for part in found]),
-    )
-    better = np.concatenate([part.better for part in found], axis=1)
-    gain = np.concatenate([part.gain for part in found])
-    step = np.diff(events.t)
-    if (step[events.joined] < 0).any():  # several crossings of one plane, found in any order
+    if len(found) == 1:
+        (events, better, gain) = (found[0].events, found[0].better, found[0].gain)
+    else:
+        events = Events(
+            np.concatenate([part.events.piece for part in found]),
+            np.concatenate([part.events.t for part in found]),
+            np.concatenate([part.events.voxels for part in found], axis=1),
+            np.concatenate([part.events.heading for part in found]),
+        )
+        better = np.concatenate([part.better for part in found], axis=1)
+        gain = np.concatenate([part.gain for part in found])
+    if (
+        (events.t[1:] < events.t[:-1]) & events.joined
+    ).any():  # several crossings of one plane, found in any order
         order = np.lexsort((events.t, events.piece))
         return Crossings(events.take(order), better[:, order], gain[order])
     return Crossings(events, better, gain)
 
 
-def _slopes(knots: Samples) -> Floats:
+@twin
+def slopes_at(knots: Samples) -> Floats:
     """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
     joined = knots.joined
     h = np.where(joined, np.diff(knots.t), 1.0)
@@ -99,8 +115,9 @@ def _slopes(knots: Samples) -> Floats:
     return slopes
 
 
-def _crossing_steps(knots: Samples, low: int, high: int) -> _Steps:
-    """Find the steps beginning at knots low..high-1 which pass planes of their dominant axis."""
+@twin
+def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
+    """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
     stop = min(high + 1, knots.t.size)
     points = knots.points[:, low:stop]
     cells = np.floor(points - 0.5)
@@ -116,127 +133,124 @@ def _crossing_steps(knots: Samples, low: int, high: int) -> _Steps:
     )
     axis, passed = axis[step], passed[step]
     from_cell = _of_axis(cells[:, step], axis)
-    return _Steps(
-        knot=low + step,
-        axis=axis,
-        planes=np.abs(passed).astype(np.int64),
-        # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
-        level=np.where(passed > 0, from_cell + 1.5, from_cell + 0.5),
-        sense=np.sign(passed),
-    )
+    # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
+    first = np.where(passed > 0, from_cell + 1.5, from_cell + 0.5)
+    planes = np.abs(passed).astype(np.int64)
 
-
-def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, steps: _Steps) -> Crossings:
-    left, right = steps.knot, steps.knot + 1
+    left, right = low + step, low + step + 1
     h = knots.t[right] - knots.t[left]
-    begin = _of_axis(knots.points[:, left], steps.axis)
-    length = _of_axis(knots.points[:, right], steps.axis) - begin
-    slope_left, slope_right = slopes[:, left] * h, slopes[:, right] * h  # per step, not per t
+    begin = _of_axis(knots.points[:, left], axis)
+    length = _of_axis(knots.points[:, right], axis) - begin
     with np.errstate(all="ignore"):
-        m_left = length / _of_axis(slope_left, steps.axis)
-        m_right = length / _of_axis(slope_right, steps.axis)
+        m_left = length / (_of_axis(slopes[:, left], axis) * h)
+        m_right = length / (_of_axis(slopes[:, right], axis) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
     m_left[~((m_left > 0) & (m_left < 3))] = 1.0
     m_right[~((m_right > 0) & (m_right < 3))] = 1.0
 
     # From here on everything is per crossing.
-    of = np.repeat(np.arange(left.size), steps.planes)
-    nth = spread(np.zeros_like(steps.planes), steps.planes)
-    axis, sense = steps.axis[of], steps.sense[of]
-    level = steps.level[of] + sense * nth
-    begin, length, h, t_left = begin[of], length[of], h[of], knots.t[left][of]
-    curve = knots.curve[knots.piece[left]][of]
-
-    u = (level - begin) / length
+    of = np.repeat(np.arange(left.size), planes)
+    nth = spread(np.zeros_like(planes), planes)
+    level: Floats = first[of] + np.sign(passed)[of] * nth
+    u = (level - begin[of]) / length[of]
     rest = 1.0 - u
     tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
-    t = np.clip(t_left + tau * h, t_left, knots.t[right][of])
+    knot = left[of]
+    t_left = knots.t[knot]
+    t = np.clip(t_left + tau * h[of], t_left, knots.t[knot + 1])
+    return Aims(knot, axis[of], passed[of] < 0, level, tau, t)
+
+
+def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> Crossings:
+    piece, axis, t, tau = knots.piece[aims.knot], aims.axis, aims.t, aims.tau
+    curve = knots.curve[piece]
     points = batch.evaluate(curve, t)
     found = np.ones(t.size, dtype=bool)
-    miss = _of_axis(points, axis) - level
+    miss = _of_axis(points, axis) - aims.level
     off = np.flatnonzero(np.abs(miss) > TOLERANCE)
     if off.size:
-        bracket, ends = _brackets(t_left, h, begin, length, level, t, miss, off)
+        level = aims.level[off]
+        bracket, ends = _brackets(knots, aims, miss, off)
         t[off], points[:, off], found[off] = cross(
-            batch, curve[off], axis[off].astype(np.int64), level[off], bracket, ends
+            batch, curve[off], axis[off].astype(np.int64), level, bracket, ends
         )
-        tau[off] = (t[off] - t_left[off]) / h[off]
+        left = aims.knot[off]
+        tau[off] = (t[off] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
 
-    nearest = np.floor(points + NUDGE)
-    for row in range(3):
-        np.copyto(nearest[row], level - 0.5, where=axis == row)
-    tangent = slope_left[:, of]
-    tangent += tau * (slope_right[:, of] - tangent)
-    better, gain, foot = _better_corners(nearest, points, tangent, axis)
+    nearest, better, gain, foot = corners(knots, slopes, aims, points)
     check = np.flatnonzero(np.isfinite(foot))
     if check.size:  # at the foot of the perpendicular the curve must be near enough
+        left = aims.knot[check]
         t_foot = np.clip(
-            t[check] + foot[check] * h[check], batch.first[curve[check]], batch.last[curve[check]]
+            t[check] + foot[check] * (knots.t[left + 1] - knots.t[left]),
+            batch.first[curve[check]],
+            batch.last[curve[check]],
         )
         apart = better[:, check] + 0.5 - batch.evaluate(curve[check], t_foot)
         far = check[(apart * apart).sum(axis=0) > 0.5]
         gain[far] = np.inf
 
-    events = Events(
-        knots.piece[left][of].astype(np.int32),
-        t,
-        nearest.astype(np.int32),
-        (2 * axis + (sense < 0)).astype(np.int8),
-    )
-    better_voxels = better.astype(np.int32)
+    heading = (2 * axis + aims.descends).astype(np.int8)
+    events = Events(piece.astype(np.int32), t, nearest, heading)
     if found.all():
-        return Crossings(events, better_voxels, gain)
-    return Crossings(events.take(found), better_voxels[:, found], gain[found])
+        return Crossings(events, better, gain)
+    return Crossings(events.take(found), better[:, found], gain[found])
 
 
-def _brackets(
-    t_left: Floats,
-    h: Floats,
-    begin: Floats,
-    length: Floats,
-    level: Floats,
-    t: Floats,
-    miss: Floats,
-    off: Ints,
-) -> tuple[Floats, Floats]:
-    """Narrow steps, by a first guess ``t`` that is off by ``miss``, to where the crossing is."""
-    bracket = np.stack((t_left[off], t_left[off] + h[off]))
-    ends = np.stack((begin[off] - level[off], begin[off] + length[off] - level[off]))
+def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Floats, Floats]:
+    """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
+    left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
+    begin = _of_axis(knots.points[:, left], axis)
+    length = _of_axis(knots.points[:, left + 1], axis) - begin
+    h = knots.t[left + 1] - knots.t[left]
+    bracket = np.stack((knots.t[left], knots.t[left] + h))
+    ends = np.stack((begin - level, begin + length - level))
     after = (miss[off] < 0) == (ends[0] < 0)  # the crossing comes after the guess
-    bracket[0] = np.where(after, t[off], bracket[0])
+    bracket[0] = np.where(after, t, bracket[0])
     ends[0] = np.where(after, miss[off], ends[0])
-    bracket[1] = np.where(after, bracket[1], t[off])
+    bracket[1] = np.where(after, bracket[1], t)
     ends[1] = np.where(after, ends[1], miss[off])
     return bracket, ends
 
 
-def _better_corners(
-    nearest: Floats, points: Floats, tangent: Floats, axis: NDArray[np.int8]
-) -> tuple[Floats, Floats, Floats]:
-    """Look for the corner of the crossed face that is nearest to the tangent.
+@twin
+def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
+    """Look for the corners of the crossed faces that are nearest to the tangents.
 
     For a line, and up to the second order for a curve, that is the best voxel among all with
     this coordinate on the dominant axis.
 
     Parameters
     ----------
-    nearest, points, tangent : (3, n) float64 arrays
-        Voxel nearest to the crossing, the crossing, and the direction there (of any length).
-    axis : (n,) int8 array
-        The axis crossed.
+    knots : Samples
+        Along the curves.
+    slopes : (3, K) float64 array
+        dP/dt at the knots.
+    aims : Aims
+        Which planes are crossed, where.
+    points : (3, n) float64 array
+        The crossings.
 
     Returns
     -------
-    better : (3, n) float64 array
-        The best corner.
+    nearest, better : (3, n) int32 arrays
+        The corner nearest to the crossing, and the one nearest to the tangent.
     gain : (n,) float64 array
-        How much nearer to the tangent it is than ``nearest``, in square voxels; infinite where
+        How much nearer to the tangent that is than ``nearest``, in square voxels; infinite where
         ``nearest`` is the best.
     foot : (n,) float64 array
-        Where the corner is further than sqrt(1/2) from the crossing: the way along ``tangent``,
-        in its lengths, to the foot of the perpendicular. Infinite elsewhere.
+        Where the better corner is further than sqrt(1/2) from the crossing: the way to the foot of
+        the perpendicular along the tangent, in steps between knots. Infinite elsewhere.
 
     """
+    left, axis, tau = aims.knot, aims.axis, aims.tau
+    nearest = np.floor(points + NUDGE)
+    for row in range(3):
+        np.copyto(nearest[row], aims.level - 0.5, where=axis == row)
+    h = knots.t[left + 1] - knots.t[left]
+    tangent, after = slopes[:, left] * h, slopes[:, left + 1] * h  # per step, not per t
+    tangent += tau * (after - tangent)
+
     apart = nearest + 0.5 - points
     length = np.maximum(np.sqrt((tangent * tangent).sum(axis=0)), np.finfo(float).tiny)
     along = tangent / length
@@ -266,7 +280,7 @@ def _better_corners(
     far = (best < 0) & ((apart * apart).sum(axis=0) > 0.5)
     foot = np.full(axis.size, np.inf)
     foot[far] = (apart[:, far] * along[:, far]).sum(axis=0) / length[far]
-    return better, gain, foot
+    return Corners(nearest.astype(np.int32), better.astype(np.int32), gain, foot)
 
 
 def _of_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:

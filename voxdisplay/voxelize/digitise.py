@@ -11,12 +11,13 @@ from time import perf_counter
 
 import numpy as np
 
+from voxdisplay import compiled
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelize.batch import Batch, Bools, Ints, Samples
+from voxdisplay.voxelize.batch import Batch, Ints, Samples
 from voxdisplay.voxelize.certify import Certificate, certify
 from voxdisplay.voxelize.enclose import Boxes, enclose, see
-from voxdisplay.voxelize.events import Events, near
+from voxdisplay.voxelize.events import Events
 from voxdisplay.voxelize.grid_plane import trace, trace_everything
 from voxdisplay.voxelize.knots import cut_at_jumps, first_look, settle
 from voxdisplay.voxelize.mend import mend
@@ -25,10 +26,13 @@ from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
 
 # Curves handled at once: enough to forget what a batch costs, but not many if they are long.
-CURVES = 1024
+CURVES = 2048
 VOXELS = 2_000_000
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
 TOUCH = 1e-3
+
+ONE_PIECE = np.zeros(1, dtype=np.int64)
+ONE_PIECE.flags.writeable = False
 
 
 def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
@@ -38,46 +42,55 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     size = 16
     while rest := curves[len(sequences) : len(sequences) + size]:
         batch = Batch(rest, len(sequences) if len(curves) > 1 else None)
-        fresh = list(_digitise(batch, certified=certified))
+        ahead = (len(curves) - len(sequences)) / len(rest)
+        fresh = list(_digitise(batch, ahead, certified=certified))
         sequences += fresh
-        size = min(CURVES, VOXELS * len(fresh) // sum(map(len, fresh)) + 1)
+        voxels = sum([len(sequence.voxels) for sequence in fresh])
+        size = min(CURVES, VOXELS * len(fresh) // voxels + 1)
     return sequences
 
 
-def _digitise(batch: Batch, *, certified: bool) -> Iterator[Sequence]:
+def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequence]:
     begin = perf_counter()
     samples = settle(batch, first_look(batch))
+    compiled.prepare(samples.t.size, ahead)
     boxes = enclose(batch, samples) if certified else None
     if boxes:
         samples = settle(batch, see(batch, samples, boxes))
     samples = cut_at_jumps(batch, samples)
     traced = trace(batch, samples)
-    events = reduce(traced, tips=certified)
+    events = reduce(traced, samples, tips=certified)
     closed = _closed(batch, samples)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
     voxels.flags.writeable = t.flags.writeable = False
     # Curve i has the pieces of[i] to of[i + 1], which begin and end at these of the bounds.
     of = np.searchsorted(samples.curve[events.piece[starts]], np.arange(len(batch.curves) + 1))
-    bounds = np.append(starts, len(voxels))
+    bounds = np.append(starts, len(voxels))[of].tolist()
+    single = (np.diff(of) == 1).tolist()
     seconds = (perf_counter() - begin) / len(voxels)
-    for index, curve in enumerate(batch.curves):
+    for index, (curve, low, high) in enumerate(zip(batch.curves, bounds, bounds[1:], strict=False)):
+        if single[index] and not closed[index] and not boxes:  # as most are
+            spent = seconds * (high - low)
+            yield Sequence(voxels[low:high], False, ONE_PIECE, t[low:high], curve, spent)
+            continue
         begin = perf_counter()
-        own = slice(bounds[of[index]], bounds[of[index + 1]])
-        own_starts = starts[of[index] : of[index + 1]] - own.start
-        own_voxels, own_t = voxels[own], t[own]
-        closes = bool(closed[index]) and own_starts.size == 1
+        own_voxels, own_t = voxels[low:high], t[low:high]
+        closes = closed[index] and single[index]
         if closes:
-            thin = events.take(np.arange(own.start, own.stop))
+            thin = events.take(np.arange(low, high))
             loop = close_loop(thin, curve.position, batch.last[index])
             own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
             own_voxels.flags.writeable = own_t.flags.writeable = False
-        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve)
-        if boxes:
-            thin = events.take(np.arange(own.start, own.stop))
-            sequence = _proven(batch, sequence, boxes, index, thin, traced)
         spent = seconds * len(own_voxels) + perf_counter() - begin
-        yield replace(sequence, seconds=spent)
+        own_starts = starts[of[index] : of[index + 1]] - low
+        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
+        if boxes:
+            thin = events.take(np.arange(low, high))
+            sequence = _proven(batch, sequence, boxes, index, thin, traced)
+            spent = seconds * len(sequence) + perf_counter() - begin
+            sequence = replace(sequence, seconds=spent)
+        yield sequence
 
 
 def _proven(
@@ -102,7 +115,7 @@ def _proven(
             points = batch.evaluate(of, t)
             samples = Samples(np.zeros_like(of), t, points, np.array([index]))
             full = trace_everything(batch, samples)
-            thin = reduce(full, tips=True)
+            thin = reduce(full, samples, tips=True)
         else:
             full = traced.take(traced.piece == thin.piece[0])
         mended = mend(thin, full, ends, box, closed=closed)
@@ -116,30 +129,30 @@ def _proven(
 
 def _starts(events: Events) -> Ints:
     """Find where pieces begin. A gap that could not be bridged is a jump like any other."""
-    here, there = events.voxels[:, :-1], events.voxels[:, 1:]
-    return np.concatenate(([0], np.flatnonzero(~(events.joined & near(here, there))) + 1))
+    ends = np.flatnonzero(events.piece[1:] != events.piece[:-1])
+    gaps = events.gaps()
+    ends = np.sort(np.concatenate((ends, gaps))) if gaps.size else ends
+    return np.concatenate(([0], ends + 1))
 
 
-def _closed(batch: Batch, samples: Samples) -> Bools:
+def _closed(batch: Batch, samples: Samples) -> list[bool]:
     """Tell which curves are closed, and stop at those that only say so."""
     first = np.searchsorted(samples.curve[samples.piece], np.arange(len(batch.curves)))
     last = np.append(first[1:], samples.t.size) - 1
     apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
-    way = np.abs(samples.points - samples.points[:, np.repeat(first, last + 1 - first)])
-    extent = np.maximum.reduceat(way.max(axis=0), first)  # a mere point is not closed
-    meet = near(
-        np.floor(samples.points[:, first]).astype(np.int32),
-        np.floor(samples.points[:, last]).astype(np.int32),
-    )
-    said = [curve.closed for curve in batch.curves]
-    for index, claim in enumerate(said):
-        if claim and not meet[index]:
+    closed: list[bool] = (apart <= TOUCH).tolist()
+    for index in np.flatnonzero(apart <= TOUCH).tolist():
+        own = samples.points[:, first[index] : last[index] + 1]
+        closed[index] = bool(np.abs(own - own[:, :1]).max() > TOUCH)  # a mere point is not
+    for index, curve in enumerate(batch.curves):
+        if curve.closed is None:
+            continue
+        ends = samples.points[:, [first[index], last[index]]]
+        closed[index] = curve.closed
+        if curve.closed and (np.abs(np.diff(np.floor(ends))) > 1).any():
             raise CurveError(
                 f"{batch.name(index)}the curve is said to be closed, but its ends are "
                 f"{apart[index]:.6g} voxels apart",
                 hint="leave out `closed`, or complete the curve",
             )
-    found = (apart <= TOUCH) & (extent > TOUCH)
-    return np.array(
-        [own if claim is None else claim for own, claim in zip(found, said, strict=True)]
-    )
+    return closed

@@ -10,6 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import twin
+from voxdisplay.voxelize.ranges import insert
+
 Voxels = NDArray[np.int32]
 
 
@@ -41,14 +44,10 @@ class Events:
         """Give the events at an index array or under a mask."""
         return Events(self.piece[index], self.t[index], self.voxels[:, index], self.heading[index])
 
-    def insert(self, at: NDArray[np.integer], other: Events) -> Events:
+    def insert(self, at: NDArray[np.intp], other: Events) -> Events:
         """Put other events before those at the indices ``at``, which ascend."""
-        return Events(
-            np.insert(self.piece, at, other.piece),
-            np.insert(self.t, at, other.t),
-            np.insert(self.voxels, at, other.voxels, axis=1),
-            np.insert(self.heading, at, other.heading),
-        )
+        mine, others = ((each.piece, each.t, each.voxels, each.heading) for each in (self, other))
+        return Events(*insert(at, mine, others))
 
     def with_voxels(self, voxels: Voxels) -> Events:
         """Give the same events with other voxels."""
@@ -61,7 +60,7 @@ class Events:
 
     def gaps(self) -> NDArray[np.intp]:
         """Find the steps within a piece between voxels that are not neighbours: k for k, k + 1."""
-        return np.flatnonzero(self.joined & ~near(self.voxels[:, :-1], self.voxels[:, 1:]))
+        return torn(self.piece, self.voxels)
 
 
 OTHER = np.int8(-1)
@@ -71,3 +70,9 @@ def near(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
     """Tell which voxels, (3, n) each, are 26-adjacent or equal."""
     close = np.abs(here - there) <= 1
     return np.asarray(close[0] & close[1] & close[2])
+
+
+@twin
+def torn(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
+    """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
+    return np.flatnonzero((piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:]))

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from voxdisplay.compiled import twin
 from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
 from voxdisplay.voxelize.crossings import NUDGE, Crossings, dominant_crossings
 from voxdisplay.voxelize.events import OTHER, Events, Voxels, near
@@ -50,7 +51,7 @@ def trace(batch: Batch, knots: Samples) -> Events:
 
     """
     crossings = dominant_crossings(batch, knots)
-    events = _choose_corners(_with_ends(crossings, knots))
+    events = choose_corners(crossings, knots)
     return _bridge_gaps(batch, events, knots.curve)
 
 
@@ -92,8 +93,10 @@ def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     return Crossings(Events(piece, t, voxels, heading), better, gain)
 
 
-def _choose_corners(crossings: Crossings) -> Events:
-    """Prefer the better corners where neighbours stay neighbours."""
+@twin
+def choose_corners(crossings: Crossings, knots: Samples) -> Events:
+    """Prefer the better corners where neighbours stay neighbours; ends of pieces are added."""
+    crossings = _with_ends(crossings, knots)
     events, better, gain = crossings.events, crossings.better, crossings.gain
     nearest = events.voxels
     gaps = events.gaps()

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from voxdisplay.compiled import twin
+from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import AXES, Batch, Floats, Ints, Samples
 
@@ -60,7 +62,7 @@ def knots(batch: Batch) -> Samples:
 def settle(batch: Batch, samples: Samples) -> Samples:
     """Split steps of samples, one piece for each curve, as far as `knots` says."""
     while True:
-        parts, chord = _needed_parts(samples, batch.resolution)
+        parts, chord = needed_parts(samples, batch.resolution)
         if not (parts > 1).any():
             return samples
         _check_size(batch, samples, parts, chord)
@@ -88,7 +90,8 @@ def first_look(batch: Batch) -> Samples:
     t = batch.first[:, None] + (batch.last - batch.first)[:, None] * _LOOK
     t[:, -1] = batch.last
     index = np.arange(len(batch.curves))
-    if not any(len(curve.breaks) for curve in batch.curves):
+    breaks = [curve.breaks for curve in batch.curves]
+    if not any(each.size for each in breaks if each is not Curve.breaks):
         piece = np.repeat(index, _LOOK.size)
         return Samples(piece, t.ravel(), batch.evaluate(piece, t.ravel()), index)
     looks = []
@@ -100,7 +103,8 @@ def first_look(batch: Batch) -> Samples:
     return Samples(piece, flat, batch.evaluate(piece, flat), index)
 
 
-def _needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+@twin
+def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
     h = np.where(joined, np.diff(samples.t), 1.0)
@@ -173,9 +177,12 @@ def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError
 
 def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
     """Make pieces of what settled, ending where a curve jumps."""
-    chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
     finest = np.diff(samples.t) < 2 * batch.resolution[samples.piece[:-1]]
-    torn = samples.joined & finest & (chord > JUMP)
+    finest &= samples.joined
+    if not finest.any():
+        return samples
+    chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
+    torn = finest & (chord > JUMP)
     if not torn.any():
         return samples
     # A jump tears one step, or two if a knot sits right on it. Where whole stretches are torn

@@ -30,12 +30,12 @@ Floats = NDArray[np.float64]
 # the parameter found for the voxel before.
 Guess = Callable[[Floats, float], Floats]
 
-# Pitch of the search for the nearest point, by variant, and how far it goes to either side: in
-# radians where the parameter is an angle (the paper's curves), else in voxels along the tangent.
-ANGLES = {1: np.radians(0.5), 2: np.radians(0.25), 3: np.radians(0.25)}
-ANGLE_REACH = np.radians(2.0)
-LENGTHS = {1: 0.5, 2: 0.25, 3: 0.25}
-LENGTH_REACH = 2.0
+# Pitch of the search for the nearest point, by variant, and how far it goes to either side, if not
+# said otherwise: see `follow` for the units.
+PITCHES = {1: 0.5, 2: 0.25, 3: 0.25}
+REACH = 2.0
+# A search to this many pitches on either side is no search for a *local* minimum any more.
+MOST_TESTS = 1000
 
 # The matrix M of the paper without the signs: one step along one, two or three axes.
 MOVES = np.array(sorted(product((0, 1), repeat=3), key=sum)[1:]).T
@@ -68,11 +68,13 @@ def march(
     variant: int = 3,
     *,
     tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
     guess: Guess | None = None,
 ) -> Sequence:
     """Voxelise a curve by the tangent march. Parameters are those of `follow`."""
     begin = perf_counter()
-    trail = follow(curve, variant, tangent=tangent, guess=guess)
+    trail = follow(curve, variant, tangent=tangent, pitch=pitch, reach=reach, guess=guess)
     return Sequence(
         voxels=trail.voxels,
         closed=False,
@@ -88,6 +90,8 @@ def follow(
     variant: int = 3,
     *,
     tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
     guess: Guess | None = None,
 ) -> Trail:
     """March along a curve.
@@ -96,12 +100,20 @@ def follow(
     ----------
     curve : Curve
         One connected piece. If its parameter is the angle around an axis parallel to z, its
-        position and derivative are asked for up to 2 degrees outside its range, as in the paper.
+        position and derivative are asked for up to ``reach`` outside its range, as in the paper.
     variant : {1, 2, 3}
         How distances are found around the guessed parameter: by a coarse search, by one twice as
         fine, or by the parabola through its least three.
     tangent : {"analytic", "difference"}, optional
-        From the curve's derivative, or from the first right difference. The first if there is one.
+        From the curve's derivative, or from the first right difference, over one pitch. The first
+        if there is one.
+    pitch : float, optional
+        The step of the search for the point nearest to a voxel (the paper's delta phi): in degrees
+        if the parameter is an angle around an axis parallel to z, as it is of the paper's curves;
+        else in voxels, along the curve. By default 0.5 for variant 1, 0.25 for the others.
+    reach : float, optional
+        How far the search goes to either side of the guessed parameter (the paper's phi_d), in the
+        same unit, rounded to whole pitches; from 1 to 1000 of them. By default 2.
     guess : callable, optional
         Estimates the parameters for points: (3, n) points and the last parameter -> (n,). By
         default equation 11 where the parameter is such an angle, else feet on the last tangent.
@@ -114,11 +126,12 @@ def follow(
     ------
     CurveError
         If the march does not arrive, or the curve cannot be evaluated.
+    ValueError
+        If there is no such variant or tangent, or no search of such a pitch and reach.
 
     """
-    if variant not in ANGLES:
-        raise ValueError(f"there is no variant {variant!r}: take 1, 2 or 3")
-    walk = _Walk(curve, variant, tangent, guess)
+    pitch, reach = search_steps(variant, pitch, reach)
+    walk = _Walk(curve, variant, tangent, (pitch, reach), guess)
     first, last = curve.t_range
     ends = np.floor(walk.position(np.array([first, last])))
     target = ends[:, 1]
@@ -148,11 +161,35 @@ def follow(
     )
 
 
+def search_steps(variant: int, pitch: float | None, reach: float | None) -> tuple[float, float]:
+    """Give pitch and reach of a variant's search, checked; defaults for those that are None."""
+    if variant not in PITCHES:
+        raise ValueError(f"there is no variant {variant!r}: take 1, 2 or 3")
+    pitch = PITCHES[variant] if pitch is None else float(pitch)
+    reach = REACH if reach is None else float(reach)
+    for name, value in (("pitch", pitch), ("reach", reach)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive and finite, not {value:g}")
+    if reach < pitch:
+        raise ValueError(f"reach must be one pitch, {pitch:g}, at least, not {reach:g}")
+    if reach > MOST_TESTS * pitch:
+        raise ValueError(
+            f"reach must be {MOST_TESTS} pitches of {pitch:g} at most, not {reach:g}: "
+            "take a larger pitch or a shorter reach"
+        )
+    return pitch, reach
+
+
 class _Walk:
     """How one march looks at its curve."""
 
     def __init__(
-        self, curve: Curve, variant: int, tangent: str | None, guess: Guess | None
+        self,
+        curve: Curve,
+        variant: int,
+        tangent: str | None,
+        search: tuple[float, float],
+        guess: Guess | None,
     ) -> None:
         self._batch = Batch([curve])
         self._curve = curve
@@ -172,11 +209,11 @@ class _Walk:
         angle = around_axis(t, points)
         self._cylinder = angle is not None
         if self._cylinder:
-            self._pitch, reach = ANGLES[variant], ANGLE_REACH
+            self._pitch, reach = np.radians(search)
         else:
             typical = float(length.sum()) / (curve.t_range[1] - curve.t_range[0])
             per_voxel = 1 / max(typical, 1e-9)
-            self._pitch, reach = LENGTHS[variant] * per_voxel, LENGTH_REACH * per_voxel
+            self._pitch, reach = (each * per_voxel for each in search)
         self._steps = np.arange(-round(reach / self._pitch), round(reach / self._pitch) + 1)
         self.guess = guess or angle or self._foot_on_tangent
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import twin
+
 Ints = NDArray[np.int64]
+Arrays = tuple[NDArray[Any], ...]
 
 
 def spread(low: Ints, count: Ints) -> Ints:
@@ -32,3 +36,17 @@ def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
             begin += size
     if begin < stop:
         yield begin, stop
+
+
+@twin
+def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
+    """Put columns between those of arrays, (M,) or (3, M): before the ones ``at``, ascending."""
+    size = arrays[0].shape[-1]
+    new = np.zeros(size + at.size, dtype=bool)
+    new[at + np.arange(at.size)] = True
+    merged = []
+    for array, other in zip(arrays, fresh, strict=True):
+        both = np.empty((*array.shape[:-1], new.size), dtype=array.dtype)
+        both[..., ~new], both[..., new] = array, other
+        merged.append(both)
+    return tuple(merged)

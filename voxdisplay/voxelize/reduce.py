@@ -1,7 +1,8 @@
 """Thinning: from a connected list of voxels to one without short cuts.
 
 A *chord* is a pair of neighbouring voxels that are not consecutive in the sequence; each one
-gives some voxel a third neighbour. Integer work on events only: nothing here knows a curve.
+gives some voxel a third neighbour. Integer work on events, but for one look at where the curve
+is, as points: what turns back within two voxels, as a hairpin does, may not lose its far end.
 """
 
 from __future__ import annotations
@@ -9,10 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.compiled import twin
+from voxdisplay.voxelize.batch import Samples
 from voxdisplay.voxelize.events import OTHER, Events, near
+from voxdisplay.voxelize.ranges import spread
 
 # How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
 WINDOW = 12
+# How far from the voxels at both ends of a short cut samples of the curve may be between them, in
+# voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
+# which is much more than `knots.BEND` at cusps.
+REACH = 2.0
 
 
 def without_repeats(events: Events) -> Events:
@@ -22,7 +30,8 @@ def without_repeats(events: Events) -> Events:
     return events.take(keep)
 
 
-def reduce(events: Events, *, tips: bool = False) -> Events:
+@twin
+def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 
     J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
@@ -34,6 +43,9 @@ def reduce(events: Events, *, tips: bool = False) -> Events:
     ----------
     events : Events
         Consecutive ones 26-adjacent or equal within a piece.
+    way : Samples, optional
+        Points along the same pieces. Short cuts that leave one of them further than ``REACH``
+        from both ends are not taken: what chords remain are the curve's own.
     tips : bool
         Take no short cut over a tip: a voxel that sticks out of the box around both ends, where
         the sequence comes back so near to itself that it would still be touching without the tip.
@@ -47,7 +59,7 @@ def reduce(events: Events, *, tips: bool = False) -> Events:
     if not events.t.size:
         return events
     full, events = events, without_repeats(events)
-    start, stop = _short_cuts(events, tips=tips)
+    start, stop = _short_cuts(events, way, tips=tips)
     change = np.zeros(events.t.size, dtype=np.int8)
     change[start + 1] += 1
     change[stop] -= 1
@@ -72,7 +84,9 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     return on
 
 
-def _short_cuts(events: Events, *, tips: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _short_cuts(
+    events: Events, way: Samples | None, *, tips: bool
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
@@ -89,6 +103,9 @@ def _short_cuts(events: Events, *, tips: bool) -> tuple[NDArray[np.intp], NDArra
     starts, stops = look[short], look[short] + leap[short]
     if tips:
         keep = ~_over_tips(events, starts, stops)
+        starts, stops = starts[keep], stops[keep]
+    if way:
+        keep = ~_leave_behind(events, way, starts, stops)
         starts, stops = starts[keep], stops[keep]
     taken = []
     end = -1
@@ -114,6 +131,25 @@ def _over_tips(
         voxel = voxels[:, np.minimum(starts + skipped, stops)]
         out |= ((voxel < low) | (voxel > high)).any(axis=0)
     return np.asarray(touches & out)
+
+
+def _leave_behind(
+    events: Events, way: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Tell which short cuts leave a point of the curve out of ``REACH``."""
+    # Complex numbers are ordered by their real parts, then by their imaginary ones.
+    order, piece = way.piece + 1j * way.t, events.piece[starts]
+    low = np.searchsorted(order, piece + 1j * events.t[starts])
+    count = np.searchsorted(order, piece + 1j * events.t[stops]) - low
+    of = np.repeat(np.arange(starts.size), count)
+    points = way.points[:, spread(low, count)]
+    far = np.ones(of.size, dtype=bool)
+    for end in (starts[of], stops[of]):
+        apart = points - (events.voxels[:, end] + 0.5)
+        far &= (apart * apart).sum(axis=0) > REACH * REACH
+    behind = np.zeros(starts.size, dtype=bool)
+    behind[of[far]] = True
+    return behind
 
 
 def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:

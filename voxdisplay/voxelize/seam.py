@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.voxelize.events import OTHER, Events, near
-from voxdisplay.voxelize.reduce import WINDOW, furthest
+from voxdisplay.voxelize.reduce import REACH, WINDOW, furthest
 
 Floats = NDArray[np.float64]
 Voxel = tuple[int, int, int]
 
 # How far from the seam voxels may be replaced, and by how many on each side.
-REACH = 7
+SPAN = 7
 DETOUR = 3
 # Samples per voxel of the sequence, to tell how far voxels are from the curve.
 DENSE = 16
@@ -45,7 +45,7 @@ def close_loop(loop: Events, position: Callable[[Floats], Floats], end: float) -
     Events
         The first voxel is the same; the last is a neighbour of it. No two voxels near the seam
         are neighbours but consecutive ones, or else there is no way to have it so with voxels
-        that are near the curve.
+        that are near the curve, and the curve near them.
 
     """
     size = loop.t.size
@@ -94,7 +94,7 @@ def _lead_through(
     size = ring.t.size
     if size == loop.t.size:
         return None  # a chord, but what is between its ends goes its own way
-    reach = min(REACH, size // 2 - 1)
+    reach = min(SPAN, size // 2 - 1)
     if reach < 1:
         return None
     start = _as_voxels(loop.voxels[:, :1])[0]
@@ -102,8 +102,9 @@ def _lead_through(
     before = _as_voxels(ring.voxels[:, : -reach - 1 : -1])
     t_before = np.linspace(ring.t[-reach], end, DENSE * reach)
     t_after = np.linspace(loop.t[0], ring.t[reach - 1], DENSE * reach)
-    square = _square_distances(position(np.concatenate((t_before, t_after))), {*after, *before})
-    detour = _best_detour(start, after, before, square)
+    points = position(np.concatenate((t_before, t_after)))
+    square = _square_distances(points, {*after, *before})
+    detour = _best_detour(start, after, before, points, square)
     if detour is None:
         return None
     out, j, back, i = detour
@@ -122,7 +123,11 @@ def _lead_through(
 
 
 def _best_detour(
-    start: Voxel, after: list[Voxel], before: list[Voxel], square: dict[Voxel, float]
+    start: Voxel,
+    after: list[Voxel],
+    before: list[Voxel],
+    points: Floats,
+    square: dict[Voxel, float],
 ) -> tuple[list[Voxel], int, list[Voxel], int] | None:
     """Choose ways from ``start`` to both sides of a ring, as near to the curve as can be.
 
@@ -142,8 +147,9 @@ def _best_detour(
             or any(_near(a, b) for a in out for b in before[i:])
             or any(_near(a, b) for a in back for b in after[j:])
         )
-        cost = sum(square[voxel] for voxel in [*out, *back, *after[j:], *before[i:]])
-        if not touching and cost < least:
+        voxels = [*out, *back, *after[j:], *before[i:]]
+        cost = sum(square[voxel] for voxel in voxels)
+        if not touching and cost < least and _shown(points, [start, *voxels]):
             best, least = (out, j, back, i), cost
     return best
 
@@ -191,6 +197,13 @@ def _square_distances(points: Floats, known: set[Voxel]) -> dict[Voxel, float]:
     centres = np.array(voxels, dtype=float).T + 0.5
     apart = centres[:, :, None] - points[:, None, :]
     return dict(zip(voxels, (apart * apart).sum(axis=0).min(axis=1).tolist(), strict=True))
+
+
+def _shown(points: Floats, voxels: list[Voxel]) -> bool:
+    """Tell whether all points, (3, n), are within ``REACH`` of a voxel."""
+    centres = np.array(voxels, dtype=float).T + 0.5
+    apart = centres[:, :, None] - points[:, None, :]
+    return bool(((apart * apart).sum(axis=0).min(axis=0) <= REACH * REACH).all())
 
 
 def _near(a: Voxel, b: Voxel) -> bool:

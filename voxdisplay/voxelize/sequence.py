@@ -55,7 +55,7 @@ class Report:
     certified: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Sequence:
     """An ordered, 26-connected list of voxels along a curve.
 
@@ -85,6 +85,26 @@ class Sequence:
     curve: Curve = field(repr=False)
     seconds: float = field(default=0.0, repr=False)
     proof: Certificate | str | None = field(default=None, repr=False)
+
+    def __init__(
+        self,
+        voxels: NDArray[np.int32],
+        closed: bool,
+        starts: NDArray[np.int64],
+        t: NDArray[np.float64],
+        curve: Curve,
+        seconds: float = 0.0,
+        proof: Certificate | str | None = None,
+    ) -> None:
+        # What a frozen dataclass has takes twice as long, and there are a hundred thousand curves.
+        own = self.__dict__
+        own["voxels"] = voxels
+        own["closed"] = closed
+        own["starts"] = starts
+        own["t"] = t
+        own["curve"] = curve
+        own["seconds"] = seconds
+        own["proof"] = proof
 
     def __len__(self) -> int:
         return len(self.voxels)

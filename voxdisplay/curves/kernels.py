@@ -1,0 +1,43 @@
+"""The compiled twins of functions of this package: see `voxdisplay.compiled`.
+
+What is computed, and in what order, is what numpy does in their place, so that all bits agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voxdisplay.compiled import jit
+from voxdisplay.curves.curve import Floats, Ints
+
+# Points worked on at once: they stay in the innermost cache.
+BLOCK = 128
+
+
+@jit
+def beziers(control: Floats, which: Ints, t: Floats) -> Floats:
+    """Evaluate Bezier curves with control points (degree + 1, 3, curves): `splines.beziers`."""
+    size, order = t.size, control.shape[0]
+    points = np.empty((3, size))
+    layer, rest = np.empty((order, BLOCK)), np.empty(BLOCK)
+    begin = 0
+    while begin < size:
+        of, end = which[begin], begin + 1
+        while end < size and end - begin < BLOCK and which[end] == of:
+            end += 1
+        count, times = end - begin, t[begin:end]
+        for k in range(count):
+            rest[k] = 1 - times[k]
+        for axis in range(3):
+            for j in range(order - 1):
+                row, one, other = layer[j], control[j, axis, of], control[j + 1, axis, of]
+                for k in range(count):
+                    row[k] = one * rest[k] + other * times[k]
+            for last in range(order - 2, 0, -1):
+                for j in range(last):
+                    row, following = layer[j], layer[j + 1]
+                    for k in range(count):
+                        row[k] = row[k] * rest[k] + following[k] * times[k]
+            points[axis, begin:end] = layer[0, :count]
+        begin = end
+    return points

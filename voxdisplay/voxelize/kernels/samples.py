@@ -1,0 +1,231 @@
+"""From samples to the voxels of crossings: the twins of `knots` and `crossings`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voxdisplay.compiled import jit
+from voxdisplay.voxelize.batch import Bools, Floats, Ints, Samples
+from voxdisplay.voxelize.crossings import MARGIN, NUDGE, Aims, Corners
+from voxdisplay.voxelize.events import Voxels
+from voxdisplay.voxelize.kernels.packed import Bytes, packed
+from voxdisplay.voxelize.knots import BEND, CHORD, PARTS
+
+TINY = float(np.finfo(float).tiny)
+
+
+def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+    """See `knots.needed_parts`."""
+    points, limits = packed(samples.points), (CHORD, BEND, float(PARTS))
+    return _needed_parts(samples.piece, samples.t, points, resolution[samples.curve], limits)
+
+
+@jit
+def _most(a: float, b: float) -> float:
+    """Give the larger, or the one that is not a number, as numpy does."""
+    return a if a >= b or a != a else b  # noqa: PLR0124 - that is how to tell
+
+
+@jit
+def _needed_parts(
+    piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: tuple[float, float, float]
+) -> tuple[Ints, Floats]:
+    size, (most_chord, most_bend, most_parts) = t.size, limits
+    short, straight = 0.99 * most_chord, 0.99 * most_bend  # below these nothing is split
+    parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
+    room = 64
+    velocity, turn = np.empty(room), np.empty(room + 1)
+    first = 0
+    while first < size:
+        last = first
+        while last + 1 < size and piece[last + 1] == piece[first]:
+            last += 1
+        steps, times = last - first, t[first : last + 1]
+        if steps > room:
+            room = steps
+            velocity, turn = np.empty(room), np.empty(room + 1)
+        turn[: steps + 1] = 0.0
+        longest = chord[first:last]
+        for axis in range(3):
+            row = points[axis, first : last + 1]
+            for k in range(steps):
+                velocity[k] = (row[k + 1] - row[k]) / (times[k + 1] - times[k])
+                longest[k] = _most(longest[k], abs(row[k + 1] - row[k]))
+            for k in range(1, steps):
+                turn[k] = _most(turn[k], abs(velocity[k] - velocity[k - 1]))
+        for k in range(1, steps):
+            turn[k] /= (times[k + 1] - times[k]) + (times[k] - times[k - 1])
+        for k in range(steps):
+            h = times[k + 1] - times[k]
+            bend = h * h * _most(turn[k], turn[k + 1]) / 4
+            if (longest[k] <= short) & (bend <= straight):
+                continue
+            wanted = np.ceil(_most(longest[k] / most_chord, np.sqrt(bend / most_bend)))
+            if wanted > 1:
+                possible = np.floor(h / resolution[piece[first]])
+                parts[first + k] = max(int(min(wanted, possible, most_parts)), 1)
+        first = last + 1
+    return parts, chord
+
+
+def slopes_at(knots: Samples) -> Floats:
+    """See `crossings.slopes_at`."""
+    return _slopes_at(knots.piece, knots.t, packed(knots.points))
+
+
+@jit
+def _slopes_at(piece: Ints, t: Floats, points: Floats) -> Floats:
+    size = t.size
+    slopes, velocity = np.zeros_like(points), np.empty(0)
+    first = 0
+    while first < size:
+        last = first
+        while last + 1 < size and piece[last + 1] == piece[first]:
+            last += 1
+        steps, times = last - first, t[first : last + 1]
+        if steps > velocity.size:
+            velocity = np.empty(steps)
+        for axis in range(3):
+            row, slope = points[axis, first : last + 1], slopes[axis, first : last + 1]
+            for k in range(steps):
+                velocity[k] = (row[k + 1] - row[k]) / (times[k + 1] - times[k])
+            for k in range(1, steps):
+                h, h_next = times[k] - times[k - 1], times[k + 1] - times[k]
+                slope[k] = (velocity[k - 1] * h_next + velocity[k] * h) / (h_next + h)
+            if steps == 1:
+                slope[0] = slope[1] = velocity[0]
+            elif steps:
+                slope[0] = 2 * velocity[0] - slope[1]
+                slope[steps] = 2 * velocity[steps - 1] - slope[steps - 1]
+        first = last + 1
+    return slopes
+
+
+def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
+    """See `crossings.aim`."""
+    points = packed(knots.points)
+    return Aims(*_aim(knots.piece, knots.t, points, packed(slopes), low, high, NUDGE))
+
+
+@jit
+def _monotone(slope: float) -> float:
+    return slope if 0 < slope < 3 else 1.0
+
+
+@jit
+def _aim(
+    piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int, nudge: float
+) -> tuple[Ints, Bytes, Bools, Floats, Floats, Floats]:
+    stop = min(high, t.size - 1)
+    # The steps that pass planes, of which axis, how many.
+    step, dominant = np.empty(stop - low + 1, dtype=np.int64), np.empty(stop - low + 1, np.int8)
+    planes = np.empty(stop - low + 1)
+    count, total = 0, 0.0
+    px, py, pz = points[0, low : stop + 1], points[1, low : stop + 1], points[2, low : stop + 1]
+    of = piece[low : stop + 1]
+    for k in range(stop - low):
+        x, y, z = px[k + 1] - px[k], py[k + 1] - py[k], pz[k + 1] - pz[k]
+        x, y, z = abs(x) * (1 + nudge), abs(y), abs(z) * (1 - nudge)
+        if (x >= y) & (x >= z):
+            axis, begin, end = 0, px[k], px[k + 1]
+        elif y >= z:
+            axis, begin, end = 1, py[k], py[k + 1]
+        else:
+            axis, begin, end = 2, pz[k], pz[k + 1]
+        passed = np.floor(end - 0.5) - np.floor(begin - 0.5)
+        if of[k] != of[k + 1]:
+            passed = 0.0
+        step[count], dominant[count], planes[count] = low + k, axis, passed
+        count += passed != 0
+        total += abs(passed)
+    size = int(total)
+    knot, axes = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int8)
+    descends = np.empty(size, dtype=np.bool_)
+    levels, taus, times = np.empty(size), np.empty(size), np.empty(size)
+    at = 0
+    for nth in range(count):
+        k, axis, passed = step[nth], dominant[nth], planes[nth]
+        h = t[k + 1] - t[k]
+        begin = points[axis, k]
+        length = points[axis, k + 1] - begin
+        m_left = _monotone(length / (slopes[axis, k] * h))
+        m_right = _monotone(length / (slopes[axis, k + 1] * h))
+        sense = 1.0 if passed > 0 else -1.0
+        first = np.floor(begin - 0.5) + (1.5 if passed > 0 else 0.5)
+        for plane in range(int(abs(passed))):
+            level = first + sense * plane
+            u = (level - begin) / length
+            rest = 1.0 - u
+            tau = u * (u * (3 - 2 * u) + rest * (m_left * rest - m_right * u))
+            knot[at], axes[at], descends[at] = k, axis, passed < 0
+            levels[at], taus[at] = level, tau
+            times[at] = min(max(t[k] + tau * h, t[k]), t[k + 1])
+            at += 1
+    return knot, axes, descends, levels, taus, times
+
+
+def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
+    """See `crossings.corners`."""
+    aimed = aims.knot, aims.axis, aims.level, aims.tau
+    return Corners(*_corners(knots.t, packed(slopes), *aimed, packed(points), NUDGE, MARGIN))
+
+
+@jit
+def _corners(
+    t: Floats,
+    slopes: Floats,
+    knot: Ints,
+    axes: Bytes,
+    level: Floats,
+    tau: Floats,
+    points: Floats,
+    nudge: float,
+    margin: float,
+) -> tuple[Voxels, Voxels, Floats, Floats]:
+    size = knot.size
+    nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
+    gain, foot = np.full(size, np.inf), np.full(size, np.inf)
+    apart, along, tangent, corner = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    towards, shift, change = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(size):
+        left, axis = knot[k], axes[k]
+        h = t[left + 1] - t[left]
+        for row in range(3):
+            corner[row] = np.floor(points[row, k] + nudge)
+            begin = slopes[row, left] * h
+            tangent[row] = begin + tau[k] * (slopes[row, left + 1] * h - begin)
+        corner[axis] = level[k] - 0.5
+        length = np.sqrt(
+            tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]
+        )
+        length = _most(length, TINY)
+        for row in range(3):
+            apart[row] = corner[row] + 0.5 - points[row, k]
+            along[row] = tangent[row] / length
+        project = apart[0] * along[0] + apart[1] * along[1] + apart[2] * along[2]
+        for row in range(3):
+            towards[row] = -1.0 if apart[row] > 0 else 1.0
+            shift[row] = towards[row] * along[row]
+            change[row] = 1.0 - 2.0 * abs(apart[row]) - (2.0 * project + shift[row]) * shift[row]
+        best, one, other = 0.0, -1, -1
+        for row in range(3):
+            if row != axis and change[row] < best - margin:
+                best, one = change[row], row
+        # Of the three pairs of axes, in the order of `crossings.corners`, the one on the face.
+        first, second = (1, 2) if axis == 0 else ((0, 2) if axis == 1 else (0, 1))
+        total = change[first] + change[second] - 2.0 * shift[first] * shift[second]
+        if total < best - margin:
+            best, one, other = total, first, second
+        for row in range(3):
+            nearest[row, k] = better[row, k] = int(corner[row])
+        if best < 0:
+            gain[k] = -best
+            for row in range(3):
+                if row in (one, other):
+                    better[row, k] = int(corner[row] + towards[row])
+                    apart[row] += towards[row]
+            square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]
+            if square > 0.5:
+                reach = apart[0] * along[0] + apart[1] * along[1] + apart[2] * along[2]
+                foot[k] = reach / length
+    return nearest, better, gain, foot
