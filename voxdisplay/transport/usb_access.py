@@ -1,0 +1,79 @@
+"""What stands between a program and a USB device: libusb, permission, and other programs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import usb.backend.libusb1
+import usb.util
+
+from voxdisplay.errors import OpenError
+from voxdisplay.transport import diagnosis
+from voxdisplay.wire import spec
+
+# Lets who sits at the machine use any device with an interface of the protocol's class.
+UDEV_RULE = (
+    'SUBSYSTEM=="usb", ENV{ID_USB_INTERFACES}=="*:'
+    f'{spec.USB_CLASS:02x}{spec.USB_SUBCLASS:02x}{spec.USB_PROTOCOL:02x}:*", TAG+="uaccess"'
+)
+_UDEV_FILE = "/etc/udev/rules.d/70-voxdisplay.rules"
+_NODES = Path("/dev/bus/usb")
+
+
+def find_backend(port: str) -> Any:
+    """Find libusb: the one that the package ``libusb-package`` brings, or else the system's.
+
+    Parameters
+    ----------
+    port : str
+        For the error.
+
+    Returns
+    -------
+    object
+        A backend of pyusb.
+
+    Raises
+    ------
+    OpenError
+        If there is none.
+
+    """
+    try:
+        import libusb_package  # noqa: PLC0415 - need not be there
+    except ImportError:
+        backend = usb.backend.libusb1.get_backend()
+    else:
+        backend = libusb_package.get_libusb1_backend() or usb.backend.libusb1.get_backend()
+    if backend is None:
+        raise OpenError(
+            f"{port}: there is no libusb on this machine",
+            port=port,
+            hint="install it: pip install 'voxdisplay[usb]'",
+        )
+    return backend
+
+
+def forbidden(port: str) -> OpenError:
+    """Give the error for a device that may not be opened, with the way to be allowed."""
+    hint = (
+        f"allow it, and plug the display in again:\n  echo '{UDEV_RULE}' | sudo tee {_UDEV_FILE}\n"
+        "  sudo udevadm control --reload"
+    )
+    if not sys.platform.startswith("linux"):
+        hint = "ask whoever runs this machine"
+    return OpenError(f"{port} may not be opened", port=port, hint=hint)
+
+
+def busy(port: str, device: Any) -> OpenError:
+    """Give the error for a device that another program uses, with its name if it can be known."""
+    if device is not None:
+        usb.util.dispose_resources(device)  # or else we would be one of those who have it open
+        node = _NODES / f"{device.bus or 0:03d}" / f"{device.address or 0:03d}"
+        if node.exists():
+            return diagnosis.busy(port, str(node))
+    return OpenError(
+        f"{port} is busy", port=port, hint="another program has it open: end it, or let go there"
+    )
