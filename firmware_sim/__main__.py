@@ -20,7 +20,9 @@ from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
-from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.serve import check_local, linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.tap import Tap
+from firmware_sim.viewer import viewer
 from firmware_sim.wire import Wire
 
 _EPILOG = """\
@@ -33,6 +35,8 @@ examples:
       a smaller one on TCP that swaps at once
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
+  voxdisplay-sim --view
+      with a page for the browser that shows what is on display; its address is in the first line
 """
 
 
@@ -137,6 +141,15 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         help="write the front page there at the start and after each swap",
     )
+    parser.add_argument(
+        "--view",
+        metavar="HOST:PORT",
+        nargs="?",
+        const=("127.0.0.1", 0),
+        type=_argument(_parse_address),
+        help="show the front page in browsers at that address, on this machine only unless "
+        "--allow-remote is given (default: any free port of 127.0.0.1)",
+    )
     return parser
 
 
@@ -169,7 +182,18 @@ def _dump_swaps(device: Device, path: Path) -> None:
         except OSError as error:
             sys.stderr.write(f"voxdisplay-sim: {error}: this picture is not dumped\n")
 
-    device.on_swap = dump
+    _also(device, dump)
+
+
+def _also(device: Device, act: Callable[[], object]) -> None:
+    """Do something more at each swap."""
+    before = device.on_swap
+
+    def both() -> None:
+        before()
+        act()
+
+    device.on_swap = both
 
 
 @contextlib.contextmanager
@@ -188,25 +212,33 @@ def _signals() -> Iterator[int]:
 
 
 def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
-    if options.tcp:
-        with listen(*options.tcp, remote=options.allow_remote) as listener:
-            host, port = listener.getsockname()[:2]
-            _announce(wire, f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
-            serve_tcp(wire, listener, stop)
-        return
     with contextlib.ExitStack() as stack:
-        line, name = stack.enter_context(open_pty())
-        if options.link:
-            stack.enter_context(linked(options.link, name))
-        _announce(wire, name)
-        serve_wire(wire, line, stop)
+        if options.tcp:
+            listener = stack.enter_context(listen(*options.tcp, remote=options.allow_remote))
+            port = "tcp://" + _address(listener.getsockname())
+        else:
+            line, port = stack.enter_context(open_pty())
+            if options.link:
+                stack.enter_context(linked(options.link, port))
+        config = wire.device.config
+        place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
+        if options.view:
+            check_local(options.view[0], remote=options.allow_remote)
+            tap = stack.enter_context(Tap(wire.device))
+            _also(wire.device, tap.notice)
+            place["view"] = stack.enter_context(viewer(tap, _address(options.view), port))
+        sys.stdout.write(json.dumps(place) + "\n")
+        sys.stdout.flush()
+        if options.tcp:
+            serve_tcp(wire, listener, stop)
+        else:
+            serve_wire(wire, line, stop)
 
 
-def _announce(wire: Wire, port: str) -> None:
-    config = wire.device.config
-    place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
-    sys.stdout.write(json.dumps(place) + "\n")
-    sys.stdout.flush()
+def _address(place: tuple[Any, ...]) -> str:
+    """Write an address as `_parse_address` reads it."""
+    host, port = place[:2]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 if __name__ == "__main__":

@@ -36,6 +36,8 @@ class Snapshot:
         Frame id, or None if no frame of the open session is on display.
     digest
         Digest of the page, section 8.
+    boot, swaps
+        Boot id of the device, and how many swaps there have been since it started.
     """
 
     pixels: bytes
@@ -43,6 +45,8 @@ class Snapshot:
     pixel_format: str
     frame: int | None
     digest: int
+    boot: int
+    swaps: int
 
 
 @dataclass(frozen=True)
@@ -83,16 +87,19 @@ class Bench:
         self._device = device
 
     def snapshot(self) -> Snapshot:
-        """Return what is on display."""
+        """Return what is on display; any thread may ask."""
         device = self._device
-        front = device.memory.front
-        return Snapshot(
-            bytes(front.pixels),
-            device.config.grid,
-            device.config.pixel_format,
-            device.session.shown if device.session else None,
-            front.digest,
-        )
+        with device.showing:
+            front, session = device.memory.front, device.session
+            return Snapshot(
+                bytes(front.pixels),
+                device.config.grid,
+                device.config.pixel_format,
+                session.shown if session else None,
+                front.digest,
+                device.boot,
+                device.swaps,
+            )
 
     def counters(self) -> Counters:
         """Return what has happened since the start of the device."""
