@@ -19,11 +19,12 @@ MAY_IMPORT = {
     "voxelize": {"errors", "curves", "voxelize"},
     "pixel": {"wire.spec"},
     "wire": {"errors", "grid", "pixel", "wire"},
-    "frame": {"color", "curves", "grid", "pixel", "voxelize", "wire"},
+    "frame": {"color", "curves", "grid", "pixel", "view", "voxelize", "wire"},
     "scene": {"color", "curves", "errors", "grid", "scene"},
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport"},
     "device": {"errors", "grid", "pixel", "wire"},
+    "view": {"errors", "grid", "pixel", "view"},
     "display": {"device", "errors", "frame", "link", "pixel", "transport", "wire"},
 }
 

@@ -1,0 +1,105 @@
+"""Where the eye is: the one definition of how a voxel comes to lie on the screen.
+
+The page in a browser repeats `Camera.project` word for word; a test holds the two together. Knows
+no picture and no voxel's colour.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+# From here no corner of a grid, at most sqrt(3)/2 from its centre, can come behind the eye.
+NEAREST = 1.0
+FARTHEST = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """An eye that looks at the grid's centre, z up.
+
+    Attributes
+    ----------
+    yaw, pitch : float
+        Radians. At yaw 0 and pitch 0 the eye is in front: x grows to the right, z up, and y away
+        from it. A greater yaw turns the grid clockwise as seen from above; a greater pitch lifts
+        the eye, and at pi/2 it looks straight down.
+    distance : float
+        From the eye to the grid's centre, in longest sides of the grid; 1 to 10.
+    fov : float
+        The angle that the picture's shorter side spans, in radians.
+
+    """
+
+    yaw: float = -0.6
+    pitch: float = 0.42
+    distance: float = 2.6
+    fov: float = 0.72
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (self.yaw, self.pitch, self.distance, self.fov))):
+            raise ValueError("a camera is made of finite numbers")
+        if not NEAREST <= self.distance <= FARTHEST:
+            raise ValueError(f"the distance {self.distance} is not {NEAREST:g} to {FARTHEST:g}")
+        if not 0 < self.fov < math.pi:
+            raise ValueError(f"the field of view {self.fov} is not between 0 and pi")
+
+    def project(
+        self, points: ArrayLike, grid: tuple[int, int, int], size: tuple[int, int]
+    ) -> tuple[Floats, Floats, Floats]:
+        """Find where points lie in the picture.
+
+        With ``(nx, ny, nz)`` the grid, ``L = max(nx, ny, nz)``, ``(W, H)`` the picture::
+
+            X = (x - nx/2) / L,  Y = (y - ny/2) / L,  Z = (z - nz/2) / L
+            right = X*cos(yaw) - Y*sin(yaw)
+            away  = X*sin(yaw) + Y*cos(yaw)
+            up    = Z*cos(pitch) + away*sin(pitch)
+            depth = distance + away*cos(pitch) - Z*sin(pitch)
+            k = min(W, H) / (2 * tan(fov/2)) / depth
+            x_px = W/2 + k*right,  y_px = H/2 - k*up,  scale = k / L
+
+        Parameters
+        ----------
+        points : (n, 3) array
+            Voxel space, columns x, y, z: the centre of voxel (i, j, k) is (i, j, k) + 1/2.
+        grid : Grid or (nx, ny, nz)
+        size : (W, H)
+            The picture, in pixels.
+
+        Returns
+        -------
+        x_px, y_px : (n,) float64 arrays
+            Right and down from the picture's upper left corner; pixel (i, j) is
+            [i, i+1) x [j, j+1).
+        scale : (n,) float64 array
+            How many pixels wide a voxel is there: the greater, the nearer.
+
+        """
+        width, height = size
+        longest = max(grid)
+        centred = (np.asarray(points, dtype=np.float64) - np.array(grid) / 2) / longest
+        turned = centred @ self._turn()
+        depth = self.distance + turned[:, 2]
+        k = min(width, height) / (2 * math.tan(self.fov / 2)) / depth
+        return width / 2 + k * turned[:, 0], height / 2 - k * turned[:, 1], k / longest
+
+    def _turn(self) -> Floats:
+        """Matrix from X, Y, Z to right, up and depth - distance, for rows: (3, 3)."""
+        cy, sy = math.cos(self.yaw), math.sin(self.yaw)
+        cp, sp = math.cos(self.pitch), math.sin(self.pitch)
+        return np.array([[cy, sy * sp, sy * cp], [-sy, cy * sp, cy * cp], [0.0, cp, -sp]])
+
+    def turned(self, yaw: float, pitch: float = 0.0) -> Camera:
+        """Give the camera turned by some radians; the pitch stays between the poles."""
+        pitch = min(max(self.pitch + pitch, -math.pi / 2), math.pi / 2)
+        return replace(self, yaw=math.remainder(self.yaw + yaw, 2 * math.pi), pitch=pitch)
+
+    def zoomed(self, factor: float) -> Camera:
+        """Give the camera nearer, by a factor above 1, or farther, as near and far as it may."""
+        return replace(self, distance=min(max(self.distance / factor, NEAREST), FARTHEST))
