@@ -227,12 +227,16 @@ def _serve(wire: Wire, options: argparse.Namespace, stop: int) -> None:
             tap = stack.enter_context(Tap(wire.device))
             _also(wire.device, tap.notice)
             place["view"] = stack.enter_context(viewer(tap, _address(options.view), port))
-        sys.stdout.write(json.dumps(place) + "\n")
-        sys.stdout.flush()
+        _announce(place)
         if options.tcp:
             serve_tcp(wire, listener, stop)
         else:
             serve_wire(wire, line, stop)
+
+
+def _announce(place: dict[str, str]) -> None:
+    sys.stdout.write(json.dumps(place) + "\n")
+    sys.stdout.flush()
 
 
 def _address(place: tuple[Any, ...]) -> str:

@@ -40,7 +40,7 @@ import socket
 import struct
 import threading
 import time
-from typing import Final
+from typing import Final, Self
 
 from firmware_sim import spec
 from firmware_sim.bench import Bench
@@ -99,7 +99,7 @@ class Tap:
         for one in (self._listener, self._bell, self._ringer):
             one.close()
 
-    def __enter__(self) -> "Tap":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
