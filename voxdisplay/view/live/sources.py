@@ -1,0 +1,185 @@
+"""Where pictures come from: the emulator's tap, or a display that can be read back.
+
+A source waits, in a thread that is its own, until the display shows something else; it is asked
+only while somebody looks. Knows no browser.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import threading
+from collections.abc import Hashable
+from typing import Protocol
+
+import numpy as np
+
+from voxdisplay.display import Display
+from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.view.live.message import Shot
+
+_POLL_S = 0.05
+# A display that gives no digest is read as a whole to find out whether it shows something else.
+_BLIND_POLL_S = 0.5
+_CONNECT_S = 5.0
+
+
+class Source(Protocol):
+    """Brings pictures."""
+
+    def next(self) -> tuple[Hashable, Shot]:
+        """Wait for another picture than the last one; give it and what tells it from others.
+
+        Raises
+        ------
+        VoxDisplayError
+            If there will be none any more.
+
+        """
+
+    def forget(self) -> None:
+        """Let the next picture be what is on display now, even if it is the last one again."""
+
+    def close(self) -> None:
+        """Give back what is held; from another thread, it ends a `next` that waits."""
+
+
+class TapSource:
+    """The emulator's tap; its format stands in the first paragraphs of ``firmware_sim/tap.py``.
+
+    Parameters
+    ----------
+    host, port
+        Where the tap listens.
+    title : str
+        What is written over its pictures.
+
+    Raises
+    ------
+    OpenError
+        If nothing listens there.
+
+    """
+
+    _QUESTION = struct.Struct("<HI")
+    _HEADER = struct.Struct("<4sHHHHHHIIIIII")
+    _MAGIC = b"VXT1"
+    _NOTHING = (0xFFFF, 0xFFFFFFFF)
+    _COUNTED = ("Packets", "Refused", "Damaged", "Overruns")
+
+    def __init__(self, host: str, port: int, title: str) -> None:
+        self._name = f"the emulator's tap at {host}:{port}"
+        self._title = title
+        self._has = self._NOTHING
+        try:
+            self._socket = socket.create_connection((host, port), _CONNECT_S)
+        except OSError as error:
+            raise OpenError(f"{self._name} cannot be reached: {error}", port=self._name) from error
+        self._socket.settimeout(None)
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._has = self._NOTHING
+
+    def next(self) -> tuple[Hashable, Shot]:
+        """See `Source.next`."""
+        try:
+            self._socket.sendall(self._QUESTION.pack(*self._has))
+            header = self._HEADER.unpack(self._receive(self._HEADER.size))
+            magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
+            format_ = PixelFormat.of_wire(number)
+            if magic != self._MAGIC or format_ is None:
+                raise TransportClosed(f"{self._name} speaks another language: {magic!r}")
+            grid = Grid(nx, ny, nz)
+            data = self._receive(grid.voxels * format_.bytes)
+        except OSError as error:
+            raise TransportClosed(f"{self._name} is gone: {error}") from error
+        page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
+        self._has = boot, swaps
+        return self._has, Shot(
+            page.reshape(format_.shape(grid.array_shape)),
+            grid,
+            format_,
+            swaps,
+            self._title,
+            digest,
+            dict(zip(self._COUNTED, counts, strict=True)),
+        )
+
+    def _receive(self, size: int) -> bytearray:
+        data = bytearray(size)
+        view = memoryview(data)
+        while view:
+            got = self._socket.recv_into(view)
+            if not got:
+                raise TransportClosed(f"{self._name} is gone")
+            view = view[got:]
+        return data
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        with contextlib.suppress(OSError):  # it is gone already
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+
+class DisplaySource:
+    """A display that is open: asked for its digest, and read back when that has changed.
+
+    Parameters
+    ----------
+    display : Display
+        With the feature READ. From now on it is the source's, whose thread alone may use it.
+
+    """
+
+    def __init__(self, display: Display) -> None:
+        self._display = display
+        self._last: Shot | None = None
+        self._told = False  # whether the last picture has been given since it was asked for anew
+        self._closing = threading.Event()
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._told = False
+
+    def next(self) -> tuple[Hashable, Shot]:
+        """See `Source.next`."""
+        while True:
+            digest = self._display.digest()
+            if self._last is None or digest is None or digest != self._last.digest:
+                self._look(digest)
+            if self._last and not self._told:
+                self._told = True
+                return self._last.number, self._last
+            if self._closing.wait(_POLL_S if digest is not None else _BLIND_POLL_S):
+                raise TransportClosed(f"{self._display.port} is closed")
+
+    def _look(self, digest: int | None) -> None:
+        """Read the page back, and note it if it is another."""
+        page = self._display.read()
+        last, info, counters = self._last, self._display.info, self._display.counters
+        if last and digest is None and np.array_equal(page, last.page):
+            return
+        self._told = False
+        self._last = Shot(
+            page,
+            info.grid,
+            info.format,
+            last.number + 1 if last else 1,
+            self._display.port,
+            digest,
+            {
+                "Bytes sent": counters.wire_bytes,
+                "Asked": counters.statuses,
+                "Sessions": counters.sessions,
+                "Damaged": counters.device_damaged,
+            },
+        )
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self._closing.set()
