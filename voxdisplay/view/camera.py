@@ -83,17 +83,17 @@ class Camera:
         """
         width, height = size
         longest = max(grid)
-        centred = (np.asarray(points, dtype=np.float64) - np.array(grid) / 2) / longest
-        turned = centred @ self._turn()
-        depth = self.distance + turned[:, 2]
+        # By columns, and not as a product of matrices: half the time, and no threads.
+        x, y, z = (
+            (column - side / 2) / longest
+            for column, side in zip(np.asarray(points, dtype=np.float64).T, grid, strict=True)
+        )
+        right = x * math.cos(self.yaw) - y * math.sin(self.yaw)
+        away = x * math.sin(self.yaw) + y * math.cos(self.yaw)
+        up = z * math.cos(self.pitch) + away * math.sin(self.pitch)
+        depth = self.distance + away * math.cos(self.pitch) - z * math.sin(self.pitch)
         k = min(width, height) / (2 * math.tan(self.fov / 2)) / depth
-        return width / 2 + k * turned[:, 0], height / 2 - k * turned[:, 1], k / longest
-
-    def _turn(self) -> Floats:
-        """Matrix from X, Y, Z to right, up and depth - distance, for rows: (3, 3)."""
-        cy, sy = math.cos(self.yaw), math.sin(self.yaw)
-        cp, sp = math.cos(self.pitch), math.sin(self.pitch)
-        return np.array([[cy, sy * sp, sy * cp], [-sy, cy * sp, cy * cp], [0.0, cp, -sp]])
+        return width / 2 + k * right, height / 2 - k * up, k / longest
 
     def turned(self, yaw: float, pitch: float = 0.0) -> Camera:
         """Give the camera turned by some radians; the pitch stays between the poles."""

@@ -1,0 +1,135 @@
+"""The stage on which the voxels float: a dark ground, the grid's box, its floor and its axes.
+
+x is red, y green, z blue, as everywhere; each axis starts at voxel (0, 0, 0) and points where its
+coordinate grows. Knows no voxel.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from voxdisplay.grid import Grid
+from voxdisplay.view.camera import Camera, Floats
+
+Rgb = tuple[int, int, int]
+
+GROUND: Rgb = (7, 9, 14)
+AXIS_COLORS: tuple[Rgb, Rgb, Rgb] = ((255, 84, 84), (72, 214, 112), (92, 148, 255))
+_EDGE: Rgb = (92, 104, 128)
+_FLOOR: Rgb = (60, 70, 92)
+_TEXT: Rgb = (150, 160, 180)
+# How far an axis reaches beyond the box, in longest sides: a flat grid's axes stay apart.
+_BEYOND = 0.075
+# The floor has at most so many cells along the longest side.
+_CELLS = 8
+# Lines are drawn on a raster this much finer, and reduced: Pillow draws hard edges.
+_FINER = 3
+
+
+@functools.lru_cache(maxsize=2)
+def stage(grid: Grid, camera: Camera, size: tuple[int, int]) -> Image.Image:
+    """Draw the stage. Do not draw on it: it is kept for the next picture."""
+    fine = size[0] * _FINER, size[1] * _FINER
+    pen = _Pen(grid, camera, fine)
+    for start, end in _floor(grid):
+        pen.line(start, end, _FLOOR, 0.9)
+    for start, end in _edges(grid):
+        pen.line(start, end, _EDGE, 1.0)
+    tips = _tips(grid)
+    for tip, color in zip(tips, AXIS_COLORS, strict=True):
+        pen.arrow(np.zeros(3), tip, color, 1.7)
+    image = pen.image.reduce(_FINER)
+    _label(image, tips, grid, camera)
+    return image
+
+
+def _tips(grid: Grid) -> Floats:
+    """Where the three axes end: rows x, y, z."""
+    return np.diag(np.array(grid) + _BEYOND * max(grid))
+
+
+def _edges(grid: Grid) -> list[tuple[Floats, Floats]]:
+    """Give the nine edges of the box that are no axes."""
+    corners = [np.array(corner) * grid for corner in itertools.product((0.0, 1.0), repeat=3)]
+    return [
+        (one, other)
+        for one, other in itertools.combinations(corners, 2)
+        if np.count_nonzero(one != other) == 1 and one.any()
+    ]
+
+
+def _floor(grid: Grid) -> list[tuple[Floats, Floats]]:
+    """Give lines on the floor, z = 0, a power of two voxels apart."""
+    nx, ny, _ = grid
+    step = 1
+    while max(grid) > _CELLS * step:
+        step *= 2
+    along_y = [(np.array([x, 0.0, 0.0]), np.array([x, ny, 0.0])) for x in range(step, nx, step)]
+    along_x = [(np.array([0.0, y, 0.0]), np.array([nx, y, 0.0])) for y in range(step, ny, step)]
+    return along_y + along_x
+
+
+class _Pen:
+    """Draws lines between points of voxel space, fainter the farther away."""
+
+    def __init__(self, grid: Grid, camera: Camera, size: tuple[int, int]) -> None:
+        self.image = Image.new("RGB", size, GROUND)
+        self._draw = ImageDraw.Draw(self.image)
+        self._grid, self._camera = grid, camera
+        self._unit = _FINER * max(1.0, min(size) / _FINER / 600)
+        self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
+
+    def _project(self, points: Floats) -> tuple[Floats, Floats]:
+        x, y, scale = self._camera.project(points, self._grid, self.image.size)
+        return np.stack((x, y), axis=1), scale / self._middle
+
+    def line(self, start: Floats, end: Floats, color: Rgb, width: float) -> None:
+        """Draw a line whose brightness shows its distance, in a few pieces."""
+        pieces = 12
+        points, near = self._project(np.linspace(start, end, pieces + 1))
+        for i in range(pieces):
+            fade = min(1.0, max(0.12, (near[i] + near[i + 1]) / 2 * 1.55 - 0.95))
+            mixed = tuple(round(g + (c - g) * fade) for g, c in zip(GROUND, color, strict=True))
+            self._draw.line(
+                [tuple(points[i]), tuple(points[i + 1])],
+                fill=mixed,
+                width=max(1, round(width * self._unit)),
+            )
+
+    def arrow(self, start: Floats, end: Floats, color: Rgb, width: float) -> None:
+        """Draw an axis with its head."""
+        points, _ = self._project(np.stack((start, end)))
+        thick = width * self._unit
+        along = points[1] - points[0]
+        length = float(np.hypot(*along))
+        if length < thick:
+            return  # it points at the eye
+        along /= length
+        across = np.array([-along[1], along[0]])
+        neck = points[1] - along * 5.5 * thick
+        self._draw.line([tuple(points[0]), tuple(neck)], fill=color, width=round(thick))
+        head = [points[1], neck + across * 2.1 * thick, neck - across * 2.1 * thick]
+        self._draw.polygon([tuple(corner) for corner in head], fill=color)
+
+
+def _label(image: Image.Image, tips: Floats, grid: Grid, camera: Camera) -> None:
+    """Write at each axis its name and how many voxels it has."""
+    draw = ImageDraw.Draw(image)
+    height = max(9.0, min(image.size) / 40)
+    font = ImageFont.load_default(height)
+    points = np.stack(camera.project(np.vstack((np.zeros(3), tips)), grid, image.size)[:2], axis=1)
+    for axis, (name, side) in enumerate(zip("xyz", grid, strict=True)):
+        along = points[axis + 1] - points[0]
+        along /= max(1.0, float(np.hypot(*along)))
+        left, top, right, bottom = draw.textbbox((0, 0), f"{name} {side}", font=font)
+        box = np.array([right - left, bottom - top])
+        # The text's middle goes beyond the tip, as far as its box needs in that direction.
+        middle = points[axis + 1] + along * (np.abs(along) @ box / 2 + 0.5 * height)
+        corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
+        draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis])
+        ahead = draw.textlength(f"{name} ", font=font)
+        draw.text((corner[0] + ahead, corner[1]), str(side), font=font, fill=_TEXT)

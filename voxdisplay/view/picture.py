@@ -1,0 +1,153 @@
+"""A page as a picture: light on a stage, exposed like a photograph of the display.
+
+Used for files, notebooks, films and terminals. Knows no device and no scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageChops
+
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.view.axes import GROUND, stage
+from voxdisplay.view.camera import Camera
+from voxdisplay.view.light import Light, gather, spread
+from voxdisplay.view.voxels import Lit, lit_voxels
+
+SIZE = (800, 600)
+
+# The halo is made on a raster this much coarser.
+_COARSER = 8
+# Its blurs: variance in square pixels of that raster, and share.
+_SCATTER = ((0.8, 0.6), (12.0, 0.8))
+_STEP = 0.6
+# How white the brightest light becomes.
+_WHITEST = 0.35
+# It is amplified to this brightness of 255 at most, and by no more than this.
+_HALO_PEAK, _MOST_GAIN = 72.0, 3.0
+_SMOOTH = Image.Resampling.BICUBIC
+# How bright the light is, as a share of full, that this share of the lit pixels does not exceed.
+_SHARE, _BRIGHT = 0.92, 0.8
+
+# Of so many pixels at most.
+_METERED = 1 << 15
+_STEPS = 4096
+_TO_SRGB = np.rint(255 * (np.arange(_STEPS) / (_STEPS - 1)) ** (1 / 2.2)).astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a picture is taken.
+
+    Attributes
+    ----------
+    size : (W, H)
+        In pixels.
+    camera : Camera
+    glow, axes : bool
+        Whether bright voxels have a halo; whether the grid's box and axes are drawn.
+
+    """
+
+    size: tuple[int, int] = SIZE
+    camera: Camera = field(default_factory=Camera)
+    glow: bool = True
+    axes: bool = True
+
+
+def picture(
+    page: NDArray[np.integer],
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002 - the word of the command line
+    look: Look = Look(),
+) -> Image.Image:
+    """Draw a page.
+
+    Parameters
+    ----------
+    page : ndarray
+        What `Display.read` and `Frame.array` give, indexed [z, y, x].
+    grid : Grid
+    format : PixelFormat
+    look : Look
+
+    Returns
+    -------
+    PIL.Image.Image
+        RGB, of the look's size.
+
+    """
+    return picture_of(lit_voxels(page, grid, format), grid, look)
+
+
+def picture_of(lit: Lit, grid: Grid, look: Look, exposure: float | None = None) -> Image.Image:
+    """Draw lit voxels.
+
+    Parameters
+    ----------
+    lit : Lit
+    grid : Grid
+    look : Look
+    exposure : float, optional
+        What light is multiplied by; by default as much as shows it best. A film has one for all
+        its pictures, by `meter`.
+
+    """
+    image = _stage(grid, look)
+    glare = gather(lit, grid, look.camera, look.size)
+    if not glare.light.size:
+        return image
+    exposed = _toned(glare.light * np.float32(exposure or meter(glare.light)))
+    sharp = Image.new("RGB", look.size)
+    sharp.paste(_srgb(exposed), (glare.left, glare.top))
+    image = ImageChops.screen(image, sharp)
+    return ImageChops.screen(image, _halo(sharp)) if look.glow else image
+
+
+def meter(light: Light) -> float:
+    """Find the exposure that shows light best: most of what is lit clearly, little of it burnt."""
+    apart = max(1, round((light[0].size / _METERED) ** 0.5))
+    most = light[:, ::apart, ::apart].max(axis=0)
+    most = most[most > most.max(initial=0.0) / 50]
+    if not len(most):
+        return 1.0
+    return -float(np.log(1 - _BRIGHT)) / float(np.quantile(most, _SHARE))
+
+
+def _stage(grid: Grid, look: Look) -> Image.Image:
+    if look.axes:
+        return stage(grid, look.camera, look.size).copy()
+    return Image.new("RGB", look.size, GROUND)
+
+
+def _toned(light: Light) -> Light:
+    """Bring light of any strength below 1, keeping its hue; the brightest turns towards white."""
+    most = light.max(axis=0)
+    toned = 1 - np.exp(-most)
+    white = toned * toned * toned
+    white *= white * np.float32(_WHITEST)
+    kept = toned * (1 - white) / np.maximum(most, np.float32(1e-6))
+    return np.asarray(light * kept + toned * white, dtype=np.float32)
+
+
+def _srgb(light: Light) -> Image.Image:
+    """Encode linear light of 0 to 1."""
+    steps = (light * np.float32(_STEPS - 1)).astype(np.uint16)
+    return Image.merge("RGB", [Image.fromarray(plane) for plane in _TO_SRGB.take(steps)])
+
+
+def _halo(sharp: Image.Image) -> Image.Image:
+    """Give the light that scatters around what is bright: a narrow and a wide blur of it."""
+    coarse = np.asarray(sharp.reduce(_COARSER), dtype=np.float32).transpose(2, 0, 1)
+    scattered = np.zeros_like(coarse)
+    for variance, share in _SCATTER:
+        scattered += share * spread(coarse, variance, _STEP)
+    gain = min(_MOST_GAIN, _HALO_PEAK / max(1.0, float(scattered.max())))
+    planes = np.rint(scattered * gain).astype(np.uint8)
+    small = Image.merge("RGB", [Image.fromarray(plane) for plane in planes])
+    large = small.resize((small.width * _COARSER, small.height * _COARSER), _SMOOTH)
+    return large.crop((0, 0, *sharp.size))
