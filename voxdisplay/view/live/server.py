@@ -84,8 +84,9 @@ class LiveServer:
 
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, name: str) -> None:
         self.url = ""
+        self._name = name
         self._source = source
         self._newest = _Newest()
         self._closing = False
@@ -125,7 +126,7 @@ class LiveServer:
     async def _answer(self, browser: ServerConnection, request: Request) -> Response | None:
         """Answer an HTTP request; None lets it become a WebSocket."""
         host = request.headers.get("Host", "")
-        if not _is_ours(host, browser.local_address[0]):
+        if not _is_ours(host, self._name):
             return _text(HTTPStatus.FORBIDDEN, f"this is no place called {host!r}\n")
         match urlsplit(request.path).path:
             case "/":
@@ -183,7 +184,7 @@ async def open_server(source: Source, host: str, port: int) -> AsyncIterator[Liv
         If the address cannot be had.
 
     """
-    live = LiveServer(source)
+    live = LiveServer(source, host)
     try:
         async with serve(
             live._show,  # noqa: SLF001 - of this module
@@ -212,8 +213,8 @@ def _url(server: Server) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
-def _is_ours(host: str, local: str) -> bool:
-    """Tell whether a browser that asks for a host means this server.
+def _is_ours(host: str, known_as: str) -> bool:
+    """Tell whether a browser that asks for a host means this server, which has one name.
 
     A number is fine: only a name can be made to point here by somebody else. The port is not
     looked at, so that a tunnel (``ssh -L``) may have another one.
@@ -222,8 +223,8 @@ def _is_ours(host: str, local: str) -> bool:
         name = urlsplit(f"//{host}").hostname or ""
     except ValueError:
         return False
-    if name == "localhost":
-        return ipaddress.ip_address(local.partition("%")[0]).is_loopback
+    if name in ("localhost", known_as.lower()):
+        return True
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -238,7 +239,7 @@ def _same_origin(origin: str | None, host: str) -> bool:
 
 def _page() -> Response:
     headers = {
-        "Content-Security-Policy": f"{policy(chr(39) + 'self' + chr(39))}; frame-ancestors 'none'",
+        "Content-Security-Policy": policy(connect="'self'") + "; frame-ancestors 'none'",
         "Referrer-Policy": "no-referrer",
     }
     return _response(HTTPStatus.OK, "text/html; charset=utf-8", page().encode(), headers)
