@@ -14,7 +14,8 @@
     |  `- IncompatibleDevice      a version or a grid that cannot be served
     |- SceneError               the scene is wrong: .path and what; also a ValueError
     |- CurveError               a curve cannot be evaluated or drawn; also a ValueError
-    `- DesyncError              the device's digest differs from ours after recovery was tried
+    |- DesyncError              the device's digest differs from ours after recovery was tried
+    `- MissingExtra             an optional library is not installed; also an ImportError
 
 A damaged packet is a counter and a recovery, not an exception. Wrong arguments to a Python
 function are ordinary ``ValueError`` and ``TypeError``. This module knows nothing of the rest.
@@ -159,6 +160,10 @@ class CurveError(VoxDisplayError, ValueError):
 
 class DesyncError(VoxDisplayError):
     """What the device shows is not what was sent, after recovery was tried."""
+
+
+class MissingExtra(VoxDisplayError, ImportError):  # noqa: N818 - a state, and the word of pip
+    """An optional library is not installed; the hint says how to get it."""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:

@@ -10,10 +10,12 @@ import click
 
 from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, ports, read
+from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
     CurveError,
+    MissingExtra,
     ProtocolError,
     SceneError,
     TransportError,
@@ -30,6 +32,7 @@ EXIT_INTERRUPT: Final = 130
 _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
     (SceneError, EXIT_USAGE),
     (CurveError, EXIT_USAGE),
+    (MissingExtra, EXIT_USAGE),
     (TransportError, EXIT_PIPE),
     (ProtocolError, EXIT_PROTOCOL),
     (VoxDisplayError, EXIT_REFUSED),
@@ -56,7 +59,7 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, voxelize, info, ports, clear, read):
+for command in (push, preview, voxelize, info, ports, clear, read):
     cli.add_command(command)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import click
@@ -57,6 +59,16 @@ def port_options(function: _C) -> _C:
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
+fit_option = click.option(
+    "--fit",
+    type=click.Choice(["contain", "none"]),
+    default="contain",
+    show_default=True,
+    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
+    "and clip.",
+)
+
+
 def open_display(port: str | None, baud: int, timeout_s: float) -> vd.Display:
     """Open what ``--port`` names, or the emulator, and say so."""
     if not port:
@@ -103,3 +115,20 @@ class SizeType(click.ParamType[vd.Grid]):
             return vd.Grid.parse(str(value).replace(",", "x"))
         except ValueError as error:
             self.fail(str(error), param, ctx)
+
+
+@contextlib.contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a bar on a terminal, once there is more than one step to wait for."""
+    stream = sys.stderr
+    if not stream.isatty():
+        yield None
+        return
+    with click.progressbar(length=1, label=what, file=stream) as bar:
+        bar.hidden = True
+
+        def update(done: int, total: int) -> None:
+            bar.length, bar.hidden = total, total <= 1
+            bar.update(done - bar.pos)
+
+        yield update

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable, Iterator
 from typing import Literal
 
 import click
@@ -12,14 +9,16 @@ import click
 import voxdisplay as vd
 from voxdisplay.cli.options import (
     device_json,
+    fit_option,
     json_option,
     note,
     open_display,
     plural,
     port_options,
     print_json,
+    progress_bar,
 )
-from voxdisplay.cli.scenes import voxelize_scene
+from voxdisplay.cli.scenes import draw
 
 
 @click.command(
@@ -32,14 +31,7 @@ from voxdisplay.cli.scenes import voxelize_scene
 )
 @click.argument("scene", type=click.Path())
 @port_options
-@click.option(
-    "--fit",
-    type=click.Choice(["contain", "none"]),
-    default="contain",
-    show_default=True,
-    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
-    "and clip.",
-)
+@fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
 @json_option
 def push(
@@ -61,12 +53,13 @@ def push(
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
-        frame = draw(fitted, display)
-        with _progress("sending") as progress:
+        frame = display.frame()
+        draw(fitted, frame)
+        with progress_bar("sending") as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
         if verify:
-            with _progress("reading back") as progress:
+            with progress_bar("reading back") as progress:
                 display.verify(frame, progress=progress)
         if as_json:
             print_json(
@@ -85,41 +78,6 @@ def push(
             )
         else:
             click.echo(_summary(display, receipt, verify=verify))
-
-
-def draw(scene: vd.Scene, display: vd.Display) -> vd.Frame:
-    """Draw a scene, and say on stderr what the display cannot show."""
-    frame = display.frame()
-    drawings = [
-        frame.draw(sequence, item.color)
-        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
-    ]
-    total = sum(drawing.voxels for drawing in drawings)
-    clipped = sum(drawing.clipped for drawing in drawings)
-    if total and clipped == total:
-        note(f"warning: all {total} voxels are outside the display: the picture is empty")
-    elif clipped:
-        note(f"{clipped} of {total} voxels are outside the display, and not shown")
-    if not all(drawing.exact_color for drawing in drawings):
-        note(f"this is a {display.info.format.value} display: colours are the nearest it has")
-    return frame
-
-
-@contextlib.contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a bar on a terminal, once there is more than one step to wait for."""
-    stream = sys.stderr
-    if not stream.isatty():
-        yield None
-        return
-    with click.progressbar(length=1, label=what, file=stream) as bar:
-        bar.hidden = True
-
-        def update(done: int, total: int) -> None:
-            bar.length, bar.hidden = total, total <= 1
-            bar.update(done - bar.pos)
-
-        yield update
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import voxdisplay as vd
+from voxdisplay.cli.options import note
 
 
 def voxelize_scene(scene: vd.Scene, **how: Any) -> list[vd.Sequence]:
@@ -32,3 +33,19 @@ def voxelize_scene(scene: vd.Scene, **how: Any) -> list[vd.Sequence]:
             except vd.CurveError as error:
                 raise vd.SceneError(str(error), path=item.path, hint=error.hint) from error
         raise
+
+
+def draw(scene: vd.Scene, frame: vd.Frame) -> None:
+    """Draw a scene, and say on stderr what a display of the frame's kind cannot show."""
+    drawings = [
+        frame.draw(sequence, item.color)
+        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
+    ]
+    total = sum(drawing.voxels for drawing in drawings)
+    clipped = sum(drawing.clipped for drawing in drawings)
+    if total and clipped == total:
+        note(f"warning: all {total} voxels are outside the display: the picture is empty")
+    elif clipped:
+        note(f"{clipped} of {total} voxels are outside the display, and not shown")
+    if not all(drawing.exact_color for drawing in drawings):
+        note(f"this is a {frame.format.value} display: colours are the nearest it has")

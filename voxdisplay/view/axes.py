@@ -10,10 +10,10 @@ import functools
 import itertools
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 
 from voxdisplay.grid import Grid
 from voxdisplay.view.camera import Camera, Floats
+from voxdisplay.view.pillow import Image, ImageDraw, ImageFont
 
 Rgb = tuple[int, int, int]
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from voxdisplay.grid import Grid
 from voxdisplay.view.camera import Camera, Floats
+from voxdisplay.view.pillow import Image
 from voxdisplay.view.voxels import Lit
 
 Light = NDArray[np.float32]

@@ -5,17 +5,17 @@ Used for files, notebooks, films and terminals. Knows no device and no scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageChops
 
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.axes import GROUND, stage
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.light import Light, gather, spread
+from voxdisplay.view.pillow import Image, ImageChops
 from voxdisplay.view.voxels import Lit, lit_voxels
 
 SIZE = (800, 600)
@@ -57,6 +57,12 @@ class Look:
     camera: Camera = field(default_factory=Camera)
     glow: bool = True
     axes: bool = True
+
+    def seen_from(self, angle: tuple[float, float] | None) -> Look:
+        """Give the look from a yaw and a pitch, in radians; None: as it is."""
+        if angle is None:
+            return self
+        return replace(self, camera=replace(self.camera, yaw=angle[0], pitch=angle[1]))
 
 
 def picture(

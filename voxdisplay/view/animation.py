@@ -1,0 +1,179 @@
+"""Films: a display that turns once, as an animated GIF or as MP4.
+
+A film has one exposure, and a GIF one palette, so that nothing flickers. Knows no file names.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+
+from voxdisplay.errors import MissingExtra
+from voxdisplay.grid import Grid
+from voxdisplay.view.axes import AXIS_COLORS
+from voxdisplay.view.light import gather
+from voxdisplay.view.picture import Look, meter, picture_of
+from voxdisplay.view.pillow import Image
+from voxdisplay.view.voxels import Lit
+
+# Pictures that the palette is made from, spread over the film, and how much a colour's frequency
+# counts in it: 0 not at all, 1 fully.
+_SAMPLES, _COMMON = 4, 0.4
+
+
+class Turntable(Sequence[Image.Image]):
+    """The pictures of one whole turn, drawn as they are asked for.
+
+    Parameters
+    ----------
+    lit : Lit
+    grid : Grid
+    look : Look
+        Its camera is where the turn begins.
+    count : int
+        Pictures.
+    progress : callable, optional
+        Called with (number of a picture that was drawn, from 1; pictures in all).
+
+    """
+
+    def __init__(
+        self,
+        lit: Lit,
+        grid: Grid,
+        look: Look,
+        count: int,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        self._lit, self._grid, self._look, self._count = lit, grid, look, count
+        self._progress = progress
+        light = gather(lit, grid, look.camera, look.size).light
+        self._exposure = meter(light) if light.size else 1.0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, number: int) -> Image.Image: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[Image.Image]: ...
+    def __getitem__(self, number: int | slice) -> Image.Image | list[Image.Image]:
+        if isinstance(number, slice):
+            return [self[i] for i in range(*number.indices(self._count))]
+        if not -self._count <= number < self._count:
+            raise IndexError(number)
+        if self._progress:
+            self._progress(number % self._count + 1, self._count)
+        camera = self._look.camera.turned(2 * math.pi * number / self._count)
+        return picture_of(self._lit, self._grid, replace(self._look, camera=camera), self._exposure)
+
+
+def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
+    """Write an animated GIF that repeats for ever.
+
+    Its clock ticks a hundred times a second: the times of the pictures are rounded to that, and
+    the whole is as long as it should be.
+    """
+    palette = _palette(pictures)
+    quantised = (
+        picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
+    )
+    ticks = [round(100 * i / fps) for i in range(len(pictures) + 1)]
+    next(quantised).save(
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=quantised,
+        duration=[10 * (after - at) for at, after in itertools.pairwise(ticks)],
+        loop=0,
+        optimize=False,  # it would give pictures palettes of their own
+        disposal=1,
+    )
+
+
+def _palette(pictures: Sequence[Image.Image]) -> Image.Image:
+    """Find 256 colours for all pictures.
+
+    Those of some of them count, a colour that is rare nearly as much as one that is common: the
+    ground is most of a picture, and least of what one looks at.
+    """
+    some = [np.asarray(pictures[i * len(pictures) // _SAMPLES])[::2, ::2] for i in range(_SAMPLES)]
+    colors = np.concatenate([picture.reshape(-1, 3) for picture in some]).astype(np.uint32)
+    coarse = colors @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32) & 0xFEFEFE
+    distinct, counts = np.unique(coarse, return_counts=True)
+    repeated = np.repeat(distinct, np.ceil(counts**_COMMON).astype(np.int64))
+    rgb = np.stack([repeated >> 16, repeated >> 8 & 255, repeated & 255], axis=1).astype(np.uint8)
+    count = 256 - len(AXIS_COLORS)  # thin lines, which an average would lose
+    found = Image.fromarray(rgb[None]).quantize(count, method=Image.Quantize.MEDIANCUT)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*(found.getpalette() or [])[: 3 * count], *np.ravel(AXIS_COLORS).tolist()])
+    return palette
+
+
+def save_mp4(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
+    """Write H.264 in an MP4 file, by PyAV or by an ``ffmpeg`` on the PATH.
+
+    Raises
+    ------
+    MissingExtra
+        If there is neither.
+    OSError
+        If the encoder fails.
+
+    """
+    width, height = (side & ~1 for side in pictures[0].size)  # colour has half the resolution
+    frames = (picture.crop((0, 0, width, height)) for picture in pictures)
+    try:
+        import av  # noqa: F401, PLC0415 - an extra, and 120 MB
+    except ModuleNotFoundError:
+        if (ffmpeg := shutil.which("ffmpeg")) is None:
+            raise MissingExtra(
+                "MP4 films need PyAV or ffmpeg, and neither is installed",
+                hint="pip install 'voxdisplay[mp4]', or install ffmpeg, or write a .gif",
+            ) from None
+        _by_ffmpeg(ffmpeg, path, frames, (width, height), fps)
+    else:
+        _by_pyav(path, frames, (width, height), fps)
+
+
+def _by_pyav(path: Path, frames: Iterator[Image.Image], size: tuple[int, int], fps: float) -> None:
+    import av  # noqa: PLC0415
+
+    picture_of_av: Any = av.VideoFrame  # of which PyAV gives no types
+    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as film:
+        stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": "18", "preset": "veryfast"}
+        stream.width, stream.height = size
+        for picture in frames:
+            film.mux(stream.encode(picture_of_av.from_image(picture)))
+        film.mux(stream.encode(None))
+
+
+def _by_ffmpeg(
+    ffmpeg: str, path: Path, frames: Iterator[Image.Image], size: tuple[int, int], fps: float
+) -> None:
+    command = [ffmpeg, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    command += ["-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"]
+    command += ["-c:v", "libx264", "-crf", "18", "-preset", "veryfast", "-pix_fmt", "yuv420p"]
+    command += ["-movflags", "+faststart", "-f", "mp4", "-y", str(path.resolve())]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:  # noqa: S603 - no shell
+        assert encoder.stdin and encoder.stderr  # noqa: S101, PT018 - they are pipes
+        try:
+            for picture in frames:
+                encoder.stdin.write(picture.tobytes())
+            encoder.stdin.close()
+        except BrokenPipeError:
+            pass  # it says why below
+        said = encoder.stderr.read().decode(errors="replace").strip()
+    if encoder.returncode:
+        raise OSError(0, f"ffmpeg failed: {said.splitlines()[-1][:200] if said else ''}", str(path))

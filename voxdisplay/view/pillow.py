@@ -1,0 +1,12 @@
+"""Pillow, which pictures are drawn with, or a word on how to get it."""
+
+from voxdisplay.errors import MissingExtra
+
+try:
+    from PIL import Image, ImageChops, ImageDraw, ImageFont
+except ModuleNotFoundError as error:
+    raise MissingExtra(
+        "pictures need Pillow, which is not installed", hint="pip install 'voxdisplay[view]'"
+    ) from error
+
+__all__ = ["Image", "ImageChops", "ImageDraw", "ImageFont"]

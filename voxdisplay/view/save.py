@@ -1,0 +1,125 @@
+"""A page into a file: a picture, a film, or a page for a browser, by the file's suffix.
+
+Files are replaced whole or not at all. Knows what formats there are, not how they are made.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.view.animation import Turntable, save_gif, save_mp4
+from voxdisplay.view.picture import Look, picture
+from voxdisplay.view.voxels import lit_voxels
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A page and how it is to be taken.
+
+    Attributes
+    ----------
+    page : ndarray
+        Indexed [z, y, x].
+    grid : Grid
+    format : PixelFormat
+    look : Look
+    title : str
+    seconds, fps : float
+        Of a film: how long one turn takes, and pictures a second.
+
+    """
+
+    page: NDArray[np.integer]
+    grid: Grid
+    format: PixelFormat
+    look: Look = field(default_factory=Look)
+    title: str = "voxdisplay"
+    seconds: float = 3.0
+    fps: float = 20.0
+
+    def turn(self, progress: Progress | None) -> Turntable:
+        """Give the pictures of one turn."""
+        lit = lit_voxels(self.page, self.grid, self.format)
+        count = max(1, round(self.seconds * self.fps))
+        return Turntable(lit, self.grid, self.look, count, progress)
+
+
+def save(path: Path, shot: Shot, progress: Progress | None = None) -> None:
+    """Write a file of the kind that its suffix names; one of `WRITERS`.
+
+    Parameters
+    ----------
+    path : Path
+    shot : Shot
+    progress : callable, optional
+        Called with (pictures drawn, pictures in all) of a film.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    MissingExtra
+        If a library is missing for it.
+
+    """
+    writer = WRITERS[path.suffix.lower()]
+    with replacing(path) as unfinished:
+        writer(unfinished, shot, progress)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a file to write to that takes the place of another when it is done, and is gone if not.
+
+    What is no ordinary file, such as ``/dev/null``, is written to as it is.
+    """
+    target = Path(os.path.realpath(path))  # a link stays a link
+    if target.exists() and not target.is_file():
+        yield target
+        return
+    unfinished = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
+    try:
+        unfinished.touch(exist_ok=False)
+        yield unfinished
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _png(path: Path, shot: Shot, _: Progress | None) -> None:
+    picture(shot.page, shot.grid, shot.format, shot.look).save(path, format="PNG")
+
+
+def _gif(path: Path, shot: Shot, progress: Progress | None) -> None:
+    save_gif(path, shot.turn(progress), shot.fps)
+
+
+def _mp4(path: Path, shot: Shot, progress: Progress | None) -> None:
+    save_mp4(path, shot.turn(progress), shot.fps)
+
+
+def _html(path: Path, shot: Shot, _: Progress | None) -> None:
+    from voxdisplay.view.export import save_html  # noqa: PLC0415 - it brings a page of its own
+
+    save_html(path, [shot.page], shot.grid, shot.format, title=shot.title, fps=shot.fps)
+
+
+WRITERS: dict[str, Callable[[Path, Shot, Progress | None], None]] = {
+    ".png": _png,
+    ".gif": _gif,
+    ".mp4": _mp4,
+    ".html": _html,
+}
+FILMS = (".gif", ".mp4")
