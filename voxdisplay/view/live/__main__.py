@@ -26,7 +26,8 @@ def main() -> int:
     parser.add_argument("--title", default="voxdisplay-sim")
     options = parser.parse_args()
     try:
-        run(TapSource(*options.tap, options.title), *options.listen, _announce)
+        (host, port), (at_host, at_port) = options.tap, options.listen
+        run(TapSource(host, port, options.title), at_host, at_port, _announce)
     except TransportClosed:
         return 0
     except (OpenError, OSError) as error:

@@ -30,7 +30,7 @@ _OFFSET = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
-class Shot:
+class Moment:
     """What a display shows at a moment.
 
     Attributes
@@ -59,10 +59,10 @@ class Shot:
     counters: Mapping[str, int] = field(default_factory=dict)
 
 
-def encode(shot: Shot) -> bytes:
+def encode(moment: Moment) -> bytes:
     """Write a message."""
-    grid = shot.grid
-    voxels = lit_voxels(shot.page, grid, shot.format).positions
+    grid = moment.grid
+    voxels = lit_voxels(moment.page, grid, moment.format).positions
     wide = max(grid) > 256
     bitmap = grid.voxels / 8 < voxels.nbytes / (1 if wide else 2)
     if bitmap:
@@ -73,27 +73,27 @@ def encode(shot: Shot) -> bytes:
         places = voxels.T.astype("<u2" if wide else "u1").tobytes()
     head = json.dumps(
         {
-            "number": shot.number,
-            "title": shot.title,
+            "number": moment.number,
+            "title": moment.title,
             "size": list(grid),
-            "format": shot.format.value,
+            "format": moment.format.value,
             "voxels": len(voxels),
-            "digest": None if shot.digest is None else f"{shot.digest:08x}",
-            "counters": dict(shot.counters),
+            "digest": None if moment.digest is None else f"{moment.digest:08x}",
+            "counters": dict(moment.counters),
             "bitmap": bitmap,
             "wide": wide,
         }
     ).encode()
     head += b" " * (-(len(head) + _OFFSET.size) % 8)
-    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(shot, voxels)
+    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(moment, voxels)
 
 
-def _planes(shot: Shot, voxels: NDArray[np.integer]) -> bytes:
+def _planes(moment: Moment, voxels: NDArray[np.integer]) -> bytes:
     """Give the pixel values of voxels, byte by byte."""
-    if shot.format is PixelFormat.MONO1:
+    if moment.format is PixelFormat.MONO1:
         return b""
     x, y, z = voxels.T
-    values = shot.page[z, y, x].reshape(len(voxels), -1)
-    if shot.format is PixelFormat.RGB565:
+    values = moment.page[z, y, x].reshape(len(voxels), -1)
+    if moment.format is PixelFormat.RGB565:
         values = np.stack((values & 0xFF, values >> 8), axis=1)
-    return values.T.astype("u1").tobytes()
+    return bytes(values.T.astype("u1").tobytes())

@@ -24,7 +24,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from voxdisplay.view.live.message import Shot, encode
+from voxdisplay.view.live.message import Moment, encode
 from voxdisplay.view.live.page import page, policy
 from voxdisplay.view.live.sources import Source
 from voxdisplay.view.picture import picture
@@ -40,7 +40,7 @@ class _Newest:
     def __init__(self) -> None:
         self.serial = 0
         self.message = b""
-        self.shot: Shot | None = None
+        self.moment: Moment | None = None
         self.wanted = threading.Event()  # for the source's thread: somebody waits
         self._key: Hashable = None
         self._fresh = False  # nothing else can have been on display since
@@ -60,11 +60,11 @@ class _Newest:
                 self.wanted.clear()
         return self.serial
 
-    def put(self, key: Hashable, shot: Shot, message: bytes) -> None:
+    def put(self, key: Hashable, moment: Moment, message: bytes) -> None:
         """Take what is on display now."""
         self._fresh = True
         if key != self._key:
-            self._key, self.shot, self.message = key, shot, message
+            self._key, self.moment, self.message = key, moment, message
             self.serial += 1
         self._changed.set()
         self._changed = asyncio.Event()
@@ -109,8 +109,8 @@ class LiveServer:
                     loop.call_soon_threadsafe(newest.doubt)
                     newest.wanted.wait()
                     source.forget()
-                key, shot = source.next()
-                loop.call_soon_threadsafe(newest.put, key, shot, encode(shot))
+                key, moment = source.next()
+                loop.call_soon_threadsafe(newest.put, key, moment, encode(moment))
         except Exception as error:  # noqa: BLE001 - raised again where somebody waits for it
             if not self._closing:
                 loop.call_soon_threadsafe(self._ended.set_exception, error)
@@ -141,9 +141,9 @@ class LiveServer:
 
     async def _picture(self) -> Response:
         await self._newest.after(0)
-        shot = self._newest.shot
-        assert shot is not None  # noqa: S101 - there is a first one now
-        return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, shot))
+        moment = self._newest.moment
+        assert moment is not None  # noqa: S101 - there is a first one now
+        return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, moment))
 
     async def _show(self, browser: ServerConnection) -> None:
         """Send frames, as the browser has room for them."""
@@ -263,7 +263,7 @@ def _response(
     return Response(status, status.phrase, Headers(common | (headers or {})), body)
 
 
-def _png(shot: Shot) -> bytes:
+def _png(moment: Moment) -> bytes:
     out = io.BytesIO()
-    picture(shot.page, shot.grid, shot.format).save(out, "PNG", compress_level=1)
+    picture(moment.page, moment.grid, moment.format).save(out, "PNG", compress_level=1)
     return out.getvalue()

@@ -19,7 +19,7 @@ from voxdisplay.display import Display
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
-from voxdisplay.view.live.message import Shot
+from voxdisplay.view.live.message import Moment
 
 _POLL_S = 0.05
 # A display that gives no digest is read as a whole to find out whether it shows something else.
@@ -30,7 +30,7 @@ _CONNECT_S = 5.0
 class Source(Protocol):
     """Brings pictures."""
 
-    def next(self) -> tuple[Hashable, Shot]:
+    def next(self) -> tuple[Hashable, Moment]:
         """Wait for another picture than the last one; give it and what tells it from others.
 
         Raises
@@ -84,7 +84,7 @@ class TapSource:
         """See `Source.forget`."""
         self._has = self._NOTHING
 
-    def next(self) -> tuple[Hashable, Shot]:
+    def next(self) -> tuple[Hashable, Moment]:
         """See `Source.next`."""
         try:
             self._socket.sendall(self._QUESTION.pack(*self._has))
@@ -99,7 +99,7 @@ class TapSource:
             raise TransportClosed(f"{self._name} is gone: {error}") from error
         page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
         self._has = boot, swaps
-        return self._has, Shot(
+        return self._has, Moment(
             page.reshape(format_.shape(grid.array_shape)),
             grid,
             format_,
@@ -138,7 +138,7 @@ class DisplaySource:
 
     def __init__(self, display: Display) -> None:
         self._display = display
-        self._last: Shot | None = None
+        self._last: Moment | None = None
         self._told = False  # whether the last picture has been given since it was asked for anew
         self._closing = threading.Event()
 
@@ -146,7 +146,7 @@ class DisplaySource:
         """See `Source.forget`."""
         self._told = False
 
-    def next(self) -> tuple[Hashable, Shot]:
+    def next(self) -> tuple[Hashable, Moment]:
         """See `Source.next`."""
         while True:
             digest = self._display.digest()
@@ -165,7 +165,7 @@ class DisplaySource:
         if last and digest is None and np.array_equal(page, last.page):
             return
         self._told = False
-        self._last = Shot(
+        self._last = Moment(
             page,
             info.grid,
             info.format,
