@@ -51,12 +51,10 @@ def helix(phase: float) -> vd.Frame:
 
 
 def ripple(phase: float, count: int) -> vd.Frame:
-    """Give a surface that moves: all voxels of a sheet, each of another colour."""
+    """Give a thick surface that moves: ``count`` voxels, each of another colour."""
     frame = vd.Frame(GRID)
-    side = int(np.ceil(count**0.5))
-    x, y = np.divmod(np.arange(count), side)
-    x, y = x * 128 / side, y * 128 / side
-    z = 64 + 30 * np.sin(np.hypot(x - 64, y - 64) / 8 + phase) + np.arange(count) % 7
+    x, y, layer = np.unravel_index(np.arange(count), (128, 128, 16), order="F")
+    z = 56 + 40 * np.sin(np.hypot(x - 64, y - 64) / 8 + phase) + layer
     voxels = np.stack((x, y, z), axis=1).astype(np.int64)
     colors = np.stack((x * 2, y * 2, 255 - z), axis=1).astype(np.uint8)
     frame.draw(voxels, colors)
