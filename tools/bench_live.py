@@ -76,6 +76,9 @@ class Film:
     def forget(self) -> None:
         """See `Source`."""
 
+    def check(self) -> None:
+        """See `Source`."""
+
     def close(self) -> None:
         """See `Source`."""
 

@@ -30,6 +30,7 @@ from voxdisplay.view.live.sources import Source
 from voxdisplay.view.picture import picture
 
 _UNDER_WAY = 2
+_IDLE_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
 _END_S = 2.0  # how long the source may take to end
 _LONGEST_WORD = 64  # a browser has little to say
 
@@ -107,7 +108,8 @@ class LiveServer:
             while not self._closing:
                 if not newest.wanted.is_set():
                     loop.call_soon_threadsafe(newest.doubt)
-                    newest.wanted.wait()
+                    while not newest.wanted.wait(_IDLE_S):
+                        source.check()
                     source.forget()
                 key, moment = source.next()
                 loop.call_soon_threadsafe(newest.put, key, moment, encode(moment))

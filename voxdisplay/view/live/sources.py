@@ -7,6 +7,7 @@ only while somebody looks. Knows no browser.
 from __future__ import annotations
 
 import contextlib
+import select
 import socket
 import struct
 import threading
@@ -42,6 +43,16 @@ class Source(Protocol):
 
     def forget(self) -> None:
         """Let the next picture be what is on display now, even if it is the last one again."""
+
+    def check(self) -> None:
+        """Find out, without waiting, whether there can be pictures still.
+
+        Raises
+        ------
+        VoxDisplayError
+            If not.
+
+        """
 
     def close(self) -> None:
         """Give back what is held; from another thread, it ends a `next` that waits."""
@@ -109,6 +120,12 @@ class TapSource:
             dict(zip(self._COUNTED, counts, strict=True)),
         )
 
+    def check(self) -> None:
+        """See `Source.check`: a tap says nothing unasked, so that what can be read is its end."""
+        readable, _, _ = select.select([self._socket], [], [], 0)
+        if readable:
+            raise TransportClosed(f"{self._name} is gone")
+
     def _receive(self, size: int) -> bytearray:
         data = bytearray(size)
         view = memoryview(data)
@@ -157,6 +174,9 @@ class DisplaySource:
                 return self._last.number, self._last
             if self._closing.wait(_POLL_S if digest is not None else _BLIND_POLL_S):
                 raise TransportClosed(f"{self._display.port} is closed")
+
+    def check(self) -> None:
+        """See `Source.check`: a display tells only who asks, and none is asked for nothing."""
 
     def _look(self, digest: int | None) -> None:
         """Read the page back, and note it if it is another."""
