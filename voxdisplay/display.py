@@ -372,7 +372,7 @@ class Display:
         shape = self.info.format.shape(self.info.grid.array_shape)
         return self.info.format.pixels(values).reshape(shape)
 
-    def verify(self, frame: Frame, *, progress: Progress | None = None) -> None:
+    def verify(self, frame: Frame, *, progress: Progress | None = None) -> Pixels:
         """Read the front page back and compare it with a frame, voxel by voxel.
 
         Parameters
@@ -382,6 +382,11 @@ class Display:
         progress : callable, optional
             As of `read`.
 
+        Returns
+        -------
+        ndarray
+            What was read back, as of `read`.
+
         Raises
         ------
         DesyncError
@@ -390,9 +395,11 @@ class Display:
             If the device cannot read.
 
         """
-        difference = _difference(frame.array(), self.read(progress=progress))
+        page = self.read(progress=progress)
+        difference = _difference(frame.array(), page)
         if difference:
             raise DesyncError(f"what was read back is not the frame: {difference}")
+        return page
 
     # -- the end
 

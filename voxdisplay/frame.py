@@ -6,6 +6,7 @@ pixels, and says what was lost in that. It knows nothing of packets on their way
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from voxdisplay import voxelize as voxelizing
 from voxdisplay.color import parse_colors
 from voxdisplay.curves.curve import Curve
+from voxdisplay.errors import MissingExtra
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat, Pixels, Values
 from voxdisplay.wire.chains import encode_chains
@@ -149,6 +151,16 @@ class Frame:
     def array(self) -> Pixels:
         """Give the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
         return self._raster.reshape(self.format.shape(self.grid.array_shape)).copy()
+
+    def _repr_png_(self) -> bytes | None:
+        """Give notebooks a picture, if Pillow is installed."""
+        try:
+            from voxdisplay.view.picture import picture  # noqa: PLC0415 - an extra
+        except MissingExtra:
+            return None
+        file = io.BytesIO()
+        picture(self.array(), self.grid, self.format).save(file, format="PNG")
+        return file.getvalue()
 
     def lit(self) -> tuple[NDArray[np.int64], Values]:
         """Give the lit voxels: their scan-order indices, ascending, and their pixel values."""

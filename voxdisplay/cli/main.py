@@ -12,6 +12,8 @@ from voxdisplay import __version__
 from voxdisplay.cli.device import clear, info, ports, read
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
+from voxdisplay.cli.test_pattern import test_pattern
+from voxdisplay.cli.view import view
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
     CurveError,
@@ -59,7 +61,7 @@ def cli(*, debug: bool) -> None:
     del debug  # read where errors are caught
 
 
-for command in (push, preview, voxelize, info, ports, clear, read):
+for command in (push, preview, view, voxelize, info, ports, clear, read, test_pattern):
     cli.add_command(command)
 
 
@@ -68,9 +70,8 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     try:
-        cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
-    except click.exceptions.Exit as error:
-        return error.exit_code
+        # A command that ends by click's Exit gives its code; all others give nothing.
+        ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return EXIT_USAGE
@@ -95,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         click.echo("  please report it with what voxdisplay --debug ... prints", err=True)
         return EXIT_INTERNAL
-    return 0
+    return ended if isinstance(ended, int) else 0
 
 
 if __name__ == "__main__":

@@ -118,10 +118,10 @@ class SizeType(click.ParamType[vd.Grid]):
 
 
 @contextlib.contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
+def progress_bar(what: str, *, hidden: bool = False) -> Iterator[Callable[[int, int], None] | None]:
     """Show a bar on a terminal, once there is more than one step to wait for."""
     stream = sys.stderr
-    if not stream.isatty():
+    if hidden or not stream.isatty():
         yield None
         return
     with click.progressbar(length=1, label=what, file=stream) as bar:

@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import voxdisplay as vd
+from voxdisplay.cli.options import note, plural
+from voxdisplay.pixel import Pixels
+
 if TYPE_CHECKING:
     from voxdisplay.view.save import Shot
 
@@ -104,3 +108,13 @@ def save_picture(
         save(path, shot, progress)
     except OSError as error:
         raise click.ClickException(f"{path} cannot be written: {error.strerror}") from error
+
+
+def save_page(path: Path, page: Pixels, info: vd.DeviceInfo) -> None:
+    """Write a picture of what was read back from a display."""
+    from voxdisplay.view.save import Shot  # noqa: PLC0415
+
+    title = f"{info.name or 'voxdisplay'} {info.serial}".strip()
+    save_picture(path, Shot(page, info.grid, info.format, title=title))
+    lit = int(page.any(axis=-1).sum() if page.ndim == 4 else (page != 0).sum())
+    note(f"{path}: {plural(lit, 'voxel')} read back from the display")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
     device_json,
     fit_option,
@@ -18,6 +20,7 @@ from voxdisplay.cli.options import (
     print_json,
     progress_bar,
 )
+from voxdisplay.cli.pictures import PictureFileType, save_page
 from voxdisplay.cli.scenes import draw
 
 
@@ -26,6 +29,7 @@ from voxdisplay.cli.scenes import draw
     Examples:
       voxdisplay push examples/paper-curve.json
       voxdisplay push curve.json --port /dev/ttyUSB0 --verify
+      voxdisplay push curve.json --port tcp://127.0.0.1:5000 --preview shown.png
       cat curve.json | voxdisplay push - --port tcp://127.0.0.1:5000 --json
     """
 )
@@ -33,6 +37,13 @@ from voxdisplay.cli.scenes import draw
 @port_options
 @fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
+@click.option(
+    "--preview",
+    type=PictureFileType(),
+    metavar="FILE",
+    help="Read the page back, and draw what the display says it shows: .png, .gif, .mp4 or .html.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="No progress, and no picture on the terminal.")
 @json_option
 def push(
     *,
@@ -42,12 +53,16 @@ def push(
     timeout_s: float,
     fit: Literal["contain", "none"],
     verify: bool,
+    preview: Path | None,
+    quiet: bool,
     as_json: bool,
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
 
     Waits until the device has shown it and its digest agrees.
     """
+    if preview:
+        import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
     loaded = vd.load_scene(scene)
     with open_display(port, baud, timeout_s) as display:
         fitted, remark = loaded.fitted(display.info.grid, fit)
@@ -55,12 +70,19 @@ def push(
             note(remark)
         frame = display.frame()
         draw(fitted, frame)
-        with progress_bar("sending") as progress:
+        with progress_bar("sending", hidden=quiet) as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
-        if verify:
-            with progress_bar("reading back") as progress:
-                display.verify(frame, progress=progress)
+        page = None
+        if verify or preview:
+            with progress_bar("reading back", hidden=quiet) as progress:
+                page = (
+                    display.verify(frame, progress=progress)
+                    if verify
+                    else display.read(progress=progress)
+                )
+        if preview and page is not None:
+            save_page(preview, page, display.info)
         if as_json:
             print_json(
                 {
@@ -78,6 +100,8 @@ def push(
             )
         else:
             click.echo(_summary(display, receipt, verify=verify))
+            if not quiet:
+                glimpse(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

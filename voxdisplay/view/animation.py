@@ -95,6 +95,7 @@ def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
         append_images=quantised,
         duration=[10 * (after - at) for at, after in itertools.pairwise(ticks)],
         loop=0,
+        palette=bytes(palette.getpalette() or b""),  # said twice, or each picture has a copy
         optimize=False,  # it would give pictures palettes of their own
         disposal=1,
     )

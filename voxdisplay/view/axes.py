@@ -31,7 +31,7 @@ _FINER = 3
 
 
 @functools.lru_cache(maxsize=2)
-def stage(grid: Grid, camera: Camera, size: tuple[int, int]) -> Image.Image:
+def stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
     """Draw the stage. Do not draw on it: it is kept for the next picture."""
     fine = size[0] * _FINER, size[1] * _FINER
     pen = _Pen(grid, camera, fine)
@@ -39,16 +39,17 @@ def stage(grid: Grid, camera: Camera, size: tuple[int, int]) -> Image.Image:
         pen.line(start, end, _FLOOR, 0.9)
     for start, end in _edges(grid):
         pen.line(start, end, _EDGE, 1.0)
-    tips = _tips(grid)
-    for tip, color in zip(tips, AXIS_COLORS, strict=True):
+    ends = tips(grid)
+    for tip, color in zip(ends, AXIS_COLORS, strict=True):
         pen.arrow(np.zeros(3), tip, color, 1.7)
     image = pen.image.reduce(_FINER)
-    _label(image, tips, grid, camera)
+    if labels:
+        _label(image, ends, grid, camera)
     return image
 
 
-def _tips(grid: Grid) -> Floats:
-    """Where the three axes end: rows x, y, z."""
+def tips(grid: Grid) -> Floats:
+    """Give the points where the three axes end: rows x, y, z."""
     return np.diag(np.array(grid) + _BEYOND * max(grid))
 
 
@@ -116,12 +117,12 @@ class _Pen:
         self._draw.polygon([tuple(corner) for corner in head], fill=color)
 
 
-def _label(image: Image.Image, tips: Floats, grid: Grid, camera: Camera) -> None:
+def _label(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None:
     """Write at each axis its name and how many voxels it has."""
     draw = ImageDraw.Draw(image)
     height = max(9.0, min(image.size) / 40)
     font = ImageFont.load_default(height)
-    points = np.stack(camera.project(np.vstack((np.zeros(3), tips)), grid, image.size)[:2], axis=1)
+    points = np.stack(camera.project(np.vstack((np.zeros(3), ends)), grid, image.size)[:2], axis=1)
     for axis, (name, side) in enumerate(zip("xyz", grid, strict=True)):
         along = points[axis + 1] - points[0]
         along /= max(1.0, float(np.hypot(*along)))

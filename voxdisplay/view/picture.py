@@ -48,8 +48,9 @@ class Look:
     size : (W, H)
         In pixels.
     camera : Camera
-    glow, axes : bool
-        Whether bright voxels have a halo; whether the grid's box and axes are drawn.
+    glow, axes, labels : bool
+        Whether bright voxels have a halo; whether the grid's box and axes are drawn; whether the
+        axes have their names and lengths.
 
     """
 
@@ -57,6 +58,7 @@ class Look:
     camera: Camera = field(default_factory=Camera)
     glow: bool = True
     axes: bool = True
+    labels: bool = True
 
     def seen_from(self, angle: tuple[float, float] | None) -> Look:
         """Give the look from a yaw and a pitch, in radians; None: as it is."""
@@ -126,7 +128,7 @@ def meter(light: Light) -> float:
 
 def _stage(grid: Grid, look: Look) -> Image.Image:
     if look.axes:
-        return stage(grid, look.camera, look.size).copy()
+        return stage(grid, look.camera, look.size, labels=look.labels).copy()
     return Image.new("RGB", look.size, GROUND)
 
 

@@ -1,0 +1,159 @@
+"""Pictures by command: of scenes, and of what a display says it shows."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+import voxdisplay as vd
+from voxdisplay.cli.main import cli
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.view.camera import Camera
+from voxdisplay.view.picture import Look, picture
+
+TREFOIL = "examples/trefoil.json"
+
+
+def pixels(path):
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def test_a_scene_as_a_picture(run, tmp_path):
+    path = tmp_path / "x.png"
+    done = run("preview", TREFOIL, "-o", path, "--size", "320x200", "--view-angle", "-90,10")
+    assert done.returncode == 0
+    assert done.stdout == ""
+    assert "495 voxels on 128x128x128 rgb888" in done.stderr
+    scene = vd.load_scene(TREFOIL)
+    frame = vd.Frame((128, 128, 128))
+    for item in scene.items:
+        frame.draw(item.curve, item.color)
+    look = Look(size=(320, 200), camera=Camera(np.radians(-90), np.radians(10)))
+    meant = picture(frame.array(), frame.grid, frame.format, look)
+    assert np.array_equal(pixels(path), np.asarray(meant))
+
+
+def test_on_another_display(run, tmp_path):
+    path = tmp_path / "x.png"
+    options = ["--display-size", "9,12,20", "--format", "mono1", "--size", "200x200", "--plain"]
+    done = run("preview", TREFOIL, "-o", path, *options)
+    assert "scaled by" in done.stderr
+    assert "on 9x12x20 mono1" in done.stderr
+    shown = pixels(path).astype(int)
+    assert np.ptp(shown[100:], axis=2).max() < 30, (
+        "one colour, nearly grey on a nearly black ground"
+    )
+    assert shown.max() > 150
+
+
+def test_a_film(run, tmp_path):
+    path = tmp_path / "x.gif"
+    options = ["--size", "120x90", "--seconds", "0.5", "--fps", "10"]
+    assert run("preview", TREFOIL, "-o", path, *options).returncode == 0
+    with Image.open(path) as film:
+        assert film.n_frames == 5
+        assert film.size == (120, 90)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["preview", TREFOIL], ["--output"]),
+        (["preview", TREFOIL, "-o", "x.bmp"], ["x.bmp", ".png", ".gif", ".mp4", ".html"]),
+        (["preview", TREFOIL, "-o", "x"], [".png"]),
+        (["preview", TREFOIL, "-o", "/nowhere/x.png"], ["/nowhere"]),
+        (["preview", TREFOIL, "-o", "x.png", "--size", "8x8"], ["800x600"]),
+        (["preview", TREFOIL, "-o", "x.png", "--size", "99999x99999"], ["4096"]),
+        (["preview", TREFOIL, "-o", "x.png", "--view-angle", "1"], ["-34,24"]),
+        (["preview", TREFOIL, "-o", "x.png", "--view-angle", "nan,0"], ["-34,24"]),
+        (["preview", TREFOIL, "-o", "x.png", "--view-angle", "0,91"], ["-90 to 90"]),
+        (["preview", TREFOIL, "-o", "x.gif", "--size", "4096x4096"], ["--fps"]),
+        (["preview", TREFOIL, "-o", "x.png", "--format", "rgb"], ["rgb565"]),
+        (["push", TREFOIL, "--port", "sim:", "--preview", "x.txt"], [".png"]),
+        (["test-pattern", "--port", "sim:", "--pattern", "cross"], ["axes"]),
+        (["test-pattern", "--port", "sim:", "--brightness", "101"], ["--brightness"]),
+    ],
+)
+def test_bad_usage(run, tmp_path, arguments, words):
+    here = [tmp_path / word if word.startswith("x.") else word for word in arguments]
+    done = run(*here)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert all(word in done.stderr for word in words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_may_not_be_written_to(run):
+    # /proc is one in which nobody makes files, not even root.
+    done = run("preview", TREFOIL, "-o", "/proc/x.png")
+    assert done.returncode == 2
+    assert "/proc/x.png cannot be written" in done.stderr
+
+
+@pytest.mark.parametrize("format_", ["rgb888", "rgb565", "index8", "mono1"])
+def test_push_preview_is_of_the_device_s_own_page(run, emulator, tmp_path, format_):
+    dump = tmp_path / "front.npy"
+    size = ["--size", "40x24x32", "--format", format_]
+    running = emulator("--tcp", "127.0.0.1:0", *size, "--dump", dump)
+    path = tmp_path / "shown.png"
+    done = run("push", "examples/house.json", "--port", running.port, "--preview", path)
+    assert done.returncode == 0, done.stderr
+    assert "read back from the display" in done.stderr
+    page = np.load(dump)
+    assert page.any()
+    meant = picture(page, vd.Grid(40, 24, 32), PixelFormat(format_))
+    assert np.array_equal(pixels(path), np.asarray(meant))
+
+
+def test_push_preview_is_not_of_what_the_host_believes(tmp_path, monkeypatch):
+    other = np.zeros((7, 5, 3, 3), np.uint8)
+    other[6, 4, 2] = (0, 255, 0)
+    monkeypatch.setattr(vd.Display, "read", lambda _, **__: other)
+    path = tmp_path / "shown.png"
+    arguments = ["push", TREFOIL, "--port", "sim:?size=3x5x7", "--preview", str(path)]
+    assert CliRunner().invoke(cli, arguments).exit_code == 0
+    meant = picture(other, vd.Grid(3, 5, 7), PixelFormat.RGB888)
+    assert np.array_equal(pixels(path), np.asarray(meant))
+
+
+def without(module, *arguments):
+    """Run a command where a module is not installed; give the finished process."""
+    code = f"import sys; sys.modules[{module!r}] = None\nfrom voxdisplay.cli import main\n"
+    code += "code = main(sys.argv[1:])\nprint(*sys.modules)\nsys.exit(code)"
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("command", [["preview", TREFOIL, "-o"], ["push", TREFOIL, "--preview"]])
+def test_without_pillow_it_says_what_to_install(command, tmp_path):
+    done = without("PIL", *command, tmp_path / "x.png")
+    assert done.returncode == 2
+    assert "pip install 'voxdisplay[view]'" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_push_imports_no_picture_code():
+    done = without("nothing", "push", TREFOIL, "--port", "sim:?size=24x16x12")
+    assert done.returncode == 0
+    loaded = set(done.stdout.splitlines()[-1].split())
+    assert "voxdisplay.cli.push" in loaded
+    assert not {name for name in loaded if name.split(".")[0] in {"PIL", "av", "websockets"}}
+    assert not {
+        name for name in loaded if name.startswith(("voxdisplay.view", "voxdisplay.pattern"))
+    }
+
+
+def test_a_frame_without_pillow_has_no_picture():
+    code = "import sys; sys.modules['PIL'] = None; import voxdisplay as vd; "
+    code += "print(vd.Frame((3, 5, 7))._repr_png_())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "None\n"

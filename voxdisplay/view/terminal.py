@@ -1,0 +1,199 @@
+"""A view in a terminal, that keys turn: for displays at the other end of ssh.
+
+Draws when something has changed, and leaves the terminal as it was, however it ends. Needs a Unix
+terminal. Where the pages come from is not known here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+from voxdisplay.grid import Grid
+from voxdisplay.view.blocks import CAMERA, full_color, half_blocks
+from voxdisplay.view.camera import Camera
+from voxdisplay.view.voxels import Lit
+
+# Without a key, how soon a changed window size is seen, and how often a turning view is drawn.
+_GLANCE_S, _TURN_S = 0.25, 0.05
+_STEP, _TURN, _ZOOM = 0.1, 0.03, 1.1
+# Re-reading takes a fifth of the time at most, and happens once a second at most.
+_REREAD_S, _SHARE = 1.0, 5.0
+
+_ENTER = "\x1b[?1049h\x1b[?25l\x1b[2J"
+_LEAVE = "\x1b[0m\x1b[?25h\x1b[?1049l"
+# The terminal shows what comes between the two at once, if it knows them.
+_BEGIN, _END = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
+_KEY = re.compile(rb"\x1b[\[O][A-D]|[^\x1b]")
+_MOVES: dict[bytes, Callable[[Camera], Camera]] = {
+    **dict.fromkeys((b"D", b"h"), lambda camera: camera.turned(-_STEP)),
+    **dict.fromkeys((b"C", b"l"), lambda camera: camera.turned(_STEP)),
+    **dict.fromkeys((b"A", b"k"), lambda camera: camera.turned(0, _STEP)),
+    **dict.fromkeys((b"B", b"j"), lambda camera: camera.turned(0, -_STEP)),
+    **dict.fromkeys((b"+", b"="), lambda camera: camera.zoomed(_ZOOM)),
+    **dict.fromkeys((b"-", b"_"), lambda camera: camera.zoomed(1 / _ZOOM)),
+    b"0": lambda _: CAMERA,
+}
+_QUIT = (b"q", b"\x03", b"\x04")
+_HELP = "arrows turn  + - zoom  space spins  0 as at first  q quits"
+
+
+@dataclass
+class View:
+    """What is shown, and from where.
+
+    Attributes
+    ----------
+    grid : Grid
+    title : str
+        The first words of the last line.
+    read : callable
+        Gives the lit voxels.
+    changes : bool
+        Whether to read again from time to time.
+
+    """
+
+    grid: Grid
+    title: str
+    read: Callable[[], Lit]
+    changes: bool
+    camera: Camera = CAMERA
+    spins: bool = False
+    done: bool = False
+    _lit: Lit = field(init=False)
+    _next_read_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the voxels, and decide when to do it again."""
+        began_s = time.monotonic()
+        self._lit = self.read()
+        took_s = time.monotonic() - began_s
+        self._next_read_s = time.monotonic() + max(_REREAD_S, _SHARE * took_s)
+
+    @property
+    def stale(self) -> bool:
+        """Whether it is time to read again."""
+        return self.changes and time.monotonic() >= self._next_read_s
+
+    def press(self, keys: bytes) -> None:
+        """Do what keys say; what is no key of this view does nothing."""
+        for found in _KEY.findall(keys):
+            key = found[-1:] if len(found) > 1 else found.lower()
+            if key in _MOVES:
+                self.camera = _MOVES[key](self.camera)
+            elif key == b" ":
+                self.spins = not self.spins
+            elif key in _QUIT:
+                self.done = True
+
+    def lines(self, columns: int, rows: int, *, full: bool) -> list[str]:
+        """Draw it, with a line that says what it is and which keys there are."""
+        picture = half_blocks(
+            self._lit, self.grid, columns, max(1, rows - 1), camera=self.camera, full=full
+        )
+        words = f" {self.title}  {len(self._lit.positions)} voxels  {_HELP}"
+        return [*picture, words[: columns - 1]] if rows > 1 else picture
+
+
+def show(view: View) -> None:
+    """Show a view until somebody quits.
+
+    Raises
+    ------
+    ValueError
+        If there is no terminal, or it cannot show the characters.
+    KeyboardInterrupt
+        On Ctrl-C and when the process is told to end; the terminal has been restored.
+
+    """
+    if not sys.stdout.isatty():
+        raise ValueError("the standard output is no terminal")
+    if "utf" not in (sys.stdout.encoding or "").lower():
+        raise ValueError(f"the terminal's encoding is {sys.stdout.encoding}, not UTF-8")
+    with _keyboard() as keyboard, _screen():
+        _loop(view, keyboard)
+
+
+def _loop(view: View, keyboard: int) -> None:
+    full = full_color()
+    drawn: object = None
+    while not view.done:
+        size = os.get_terminal_size(sys.stdout.fileno())
+        shown = size, view.camera, id(view._lit)  # noqa: SLF001
+        if shown != drawn and min(size) > 0:
+            lines = view.lines(size.columns, size.lines, full=full)
+            _write(_BEGIN + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END)
+            drawn = shown
+        wait_s = _TURN_S if view.spins else _GLANCE_S
+        if select.select([keyboard], [], [], wait_s)[0]:
+            keys = os.read(keyboard, 1024)
+            if not keys:
+                return  # the terminal is gone
+            view.press(keys)
+        elif view.spins:
+            view.camera = view.camera.turned(_TURN)
+        if view.stale:
+            view.refresh()
+
+
+def _write(text: str) -> None:
+    sys.stdout.write(text)
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _keyboard() -> Iterator[int]:
+    """Give a terminal's keys as they are pressed, unechoed; put it back as it was."""
+    try:
+        import termios  # noqa: PLC0415 - not everywhere
+        import tty  # noqa: PLC0415
+    except ModuleNotFoundError:
+        raise ValueError("this system has no Unix terminal") from None
+    ours = not sys.stdin.isatty()  # the scene may come from stdin
+    try:
+        keyboard = os.open("/dev/tty", os.O_RDONLY) if ours else sys.stdin.fileno()
+    except OSError as error:
+        raise ValueError(f"there is no keyboard: {error.strerror}") from error
+    before = termios.tcgetattr(keyboard)
+    try:
+        tty.setcbreak(keyboard)
+        mode = termios.tcgetattr(keyboard)
+        mode[6][termios.VSUSP] = b"\0"  # nobody could put the screen back when it is stopped
+        termios.tcsetattr(keyboard, termios.TCSADRAIN, mode)
+        yield keyboard
+    finally:
+        with contextlib.suppress(termios.error):  # when the terminal is gone
+            termios.tcsetattr(keyboard, termios.TCSAFLUSH, before)
+        if ours:
+            os.close(keyboard)
+
+
+@contextlib.contextmanager
+def _screen() -> Iterator[None]:
+    """Take the terminal's other screen; give it back, also when told to end."""
+    before = {number: signal.signal(number, _end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        _write(_ENTER)
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        with contextlib.suppress(OSError):
+            _write(_LEAVE)
+
+
+def _end(number: int, frame: Any) -> NoReturn:
+    del number, frame
+    raise KeyboardInterrupt
