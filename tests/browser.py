@@ -7,6 +7,7 @@ what goes wrong in it is kept.
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
 import itertools
 import json
@@ -101,7 +102,8 @@ class Tab:
     """One page in the browser."""
 
     def __init__(self, address):
-        self._socket = connect(address, max_size=None, compression=None)
+        self._open = contextlib.ExitStack()
+        self._socket = self._open.enter_context(connect(address, max_size=None, compression=None))
         self._ids = itertools.count(1)
         self.requests = []  # URLs
         self.errors = []  # what went wrong in the page
@@ -198,5 +200,5 @@ class Tab:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
     def close(self):
-        with self._socket:
+        with self._open:
             self.call("Page.close")

@@ -9,9 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import json
 import statistics
-import subprocess
 import sys
 import tempfile
 import threading
@@ -25,7 +23,6 @@ import numpy as np
 import voxdisplay as vd
 from voxdisplay.view.live.message import Moment, encode
 from voxdisplay.view.live.page import page
-from voxdisplay.view.live.run import run
 from voxdisplay.view.live.server import open_server
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -65,7 +62,10 @@ class Film:
     """A source whose pictures never end."""
 
     def __init__(self, frames: list[vd.Frame]) -> None:
-        self._moments = [Moment(f.array(), f.grid, f.format, n, "bench", f.digest()) for n, f in enumerate(frames)]
+        self._moments = [
+            Moment(f.array(), f.grid, f.format, n, "bench", f.digest())
+            for n, f in enumerate(frames)
+        ]
         self._turns = itertools.count()
 
     def next(self) -> tuple[Hashable, Moment]:
@@ -124,14 +124,21 @@ def bench_browser(repeats: int) -> None:
                     for _ in range(repeats):
                         before, began_s = tab.run("painted"), time.perf_counter()
                         time.sleep(_SECONDS)
-                        counts.append((tab.run("painted") - before) / (time.perf_counter() - began_s))
+                        counts.append(
+                            (tab.run("painted") - before) / (time.perf_counter() - began_s)
+                        )
                     size = tab.run("`${canvas.width}x${canvas.height}`")
                     tab.close()
                 shown = len(frames[0].lit()[0])
-                print(f"{name:<12} {way}  {shown:7d} lit  {size}  {statistics.median(counts):6.1f} frames/s", flush=True)
+                print(
+                    f"{name:<12} {way}  {shown:7d} lit  {size}  {statistics.median(counts):6.1f} frames/s",
+                    flush=True,
+                )
         finally:
             browser.close()
     moment = Film(films["50k voxels"]).next()[1]
     began_s = time.perf_counter()
     size = len(encode(moment))
-    print(f"a message of 50k voxels: {size} bytes in {(time.perf_counter() - began_s) * 1000:.1f} ms; page {len(page().encode())} bytes")
+    print(
+        f"a message of 50k voxels: {size} bytes in {(time.perf_counter() - began_s) * 1000:.1f} ms; page {len(page().encode())} bytes"
+    )

@@ -9,16 +9,17 @@ import argparse
 import json
 import sys
 
-from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.errors import MissingExtra, OpenError, TransportClosed
+from voxdisplay.view.live.address import parse_address
 
 
 def main() -> int:
     """Show a tap; give 0 when it has ended."""
     try:
-        from voxdisplay.view.live.run import parse_address, run  # noqa: PLC0415 - the extra "view"
+        from voxdisplay.view.live.run import run  # noqa: PLC0415 - the extra "view"
         from voxdisplay.view.live.sources import TapSource  # noqa: PLC0415
-    except ImportError as error:
-        sys.stderr.write(f"the live view needs {error.name}: pip install 'voxdisplay[view]'\n")
+    except MissingExtra as error:
+        sys.stderr.write(f"{error}: {error.hint}\n")
         return 2
     parser = argparse.ArgumentParser(description="Show an emulator's tap in browsers.")
     for option in ("--tap", "--listen"):

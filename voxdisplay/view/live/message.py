@@ -93,7 +93,7 @@ def _planes(moment: Moment, voxels: NDArray[np.integer]) -> bytes:
     if moment.format is PixelFormat.MONO1:
         return b""
     x, y, z = voxels.T
-    values = moment.page[z, y, x].reshape(len(voxels), -1)
+    values = moment.page[z, y, x].T
     if moment.format is PixelFormat.RGB565:
-        values = np.stack((values & 0xFF, values >> 8), axis=1)
-    return bytes(values.T.astype("u1").tobytes())
+        values = np.stack((values & 0xFF, values >> 8))
+    return bytes(values.astype("u1").tobytes())

@@ -19,15 +19,22 @@ from collections.abc import AsyncIterator, Hashable
 from http import HTTPStatus
 from urllib.parse import urlsplit
 
-from websockets.asyncio.server import Server, ServerConnection, serve
-from websockets.datastructures import Headers
-from websockets.exceptions import ConnectionClosed
-from websockets.http11 import Request, Response
-
+from voxdisplay.errors import MissingExtra
 from voxdisplay.view.live.message import Moment, encode
 from voxdisplay.view.live.page import page, policy
 from voxdisplay.view.live.sources import Source
 from voxdisplay.view.picture import picture
+
+try:
+    from websockets.asyncio.server import Server, ServerConnection, serve
+    from websockets.datastructures import Headers
+    from websockets.exceptions import ConnectionClosed
+    from websockets.http11 import Request, Response
+except ModuleNotFoundError as error:
+    raise MissingExtra(
+        "the live view needs websockets, which is not installed",
+        hint="pip install 'voxdisplay[view]'",
+    ) from error
 
 _UNDER_WAY = 2
 _IDLE_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
@@ -125,7 +132,7 @@ class LiveServer:
 
     # -- browsers
 
-    async def _answer(self, browser: ServerConnection, request: Request) -> Response | None:
+    async def _answer(self, _: ServerConnection, request: Request) -> Response | None:
         """Answer an HTTP request; None lets it become a WebSocket."""
         host = request.headers.get("Host", "")
         if not _is_ours(host, self._name):

@@ -1,4 +1,4 @@
-"""Where pictures come from: the emulator's tap, or a display that can be read back.
+"""Where pictures come from: the emulator's tap, a display that can be read back, or one that stays.
 
 A source waits, in a thread that is its own, until the display shows something else; it is asked
 only while somebody looks. Knows no browser.
@@ -11,15 +11,14 @@ import select
 import socket
 import struct
 import threading
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Protocol
 
 import numpy as np
 
-from voxdisplay.display import Display
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.grid import Grid
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.pixel import PixelFormat, Pixels
 from voxdisplay.view.live.message import Moment
 
 _POLL_S = 0.05
@@ -143,18 +142,42 @@ class TapSource:
         self._socket.close()
 
 
+class Readable(Protocol):
+    """A display, as far as it is looked at: see `Display`."""
+
+    port: str
+
+    def digest(self) -> int | None:
+        """Ask what is on display."""
+
+    def read(self) -> Pixels:
+        """Read the front page back."""
+
+
 class DisplaySource:
     """A display that is open: asked for its digest, and read back when that has changed.
 
     Parameters
     ----------
-    display : Display
-        With the feature READ. From now on it is the source's, whose thread alone may use it.
+    display : Readable
+        It is the source's from now on: no other thread may use it.
+    grid : Grid
+    format : PixelFormat
+    counters : callable
+        Gives what the link has counted, by names for people.
 
     """
 
-    def __init__(self, display: Display) -> None:
+    def __init__(
+        self,
+        display: Readable,
+        grid: Grid,
+        format: PixelFormat,  # noqa: A002 - the word of the command line
+        counters: Callable[[], dict[str, int]] = dict,
+    ) -> None:
         self._display = display
+        self._grid, self._format = grid, format
+        self._counters = counters
         self._last: Moment | None = None
         self._told = False  # whether the last picture has been given since it was asked for anew
         self._closing = threading.Event()
@@ -175,30 +198,47 @@ class DisplaySource:
             if self._closing.wait(_POLL_S if digest is not None else _BLIND_POLL_S):
                 raise TransportClosed(f"{self._display.port} is closed")
 
-    def check(self) -> None:
-        """See `Source.check`: a display tells only who asks, and none is asked for nothing."""
-
     def _look(self, digest: int | None) -> None:
         """Read the page back, and note it if it is another."""
-        page = self._display.read()
-        last, info, counters = self._last, self._display.info, self._display.counters
+        page, last = self._display.read(), self._last
         if last and digest is None and np.array_equal(page, last.page):
             return
         self._told = False
+        number = last.number + 1 if last else 1
         self._last = Moment(
-            page,
-            info.grid,
-            info.format,
-            last.number + 1 if last else 1,
-            self._display.port,
-            digest,
-            {
-                "Bytes sent": counters.wire_bytes,
-                "Asked": counters.statuses,
-                "Sessions": counters.sessions,
-                "Damaged": counters.device_damaged,
-            },
+            page, self._grid, self._format, number, self._display.port, digest, self._counters()
         )
+
+    def check(self) -> None:
+        """See `Source.check`: a display tells only who asks, and is asked for nothing in vain."""
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self._closing.set()
+
+
+class StillSource:
+    """One picture that stays."""
+
+    def __init__(self, moment: Moment) -> None:
+        self._moment = moment
+        self._told = False
+        self._closing = threading.Event()
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._told = False
+
+    def next(self) -> tuple[Hashable, Moment]:
+        """See `Source.next`."""
+        if self._told:
+            self._closing.wait()
+            raise TransportClosed(f"{self._moment.title} is closed")
+        self._told = True
+        return self._moment.number, self._moment
+
+    def check(self) -> None:
+        """See `Source.check`: it stays."""
 
     def close(self) -> None:
         """See `Source.close`."""
