@@ -168,13 +168,16 @@ class Tab:
             raise RuntimeError(str(answer["exceptionDetails"]))
         return answer["result"].get("value")
 
-    def wait(self, condition):
-        """Wait until a condition, written in JavaScript, holds; give its value."""
+    def wait(self, condition, *, errors=False):
+        """Wait until a condition, written in JavaScript, holds; give its value.
+
+        An error in the page ends it, unless some are expected.
+        """
         end_s = time.monotonic() + DEADLINE_S
         while time.monotonic() < end_s:
             if value := self.run(condition):
                 return value
-            if self.errors:
+            if self.errors and not errors:
                 raise RuntimeError(f"waiting for {condition}: {self.errors[0]}")
             time.sleep(0.02)
         raise TimeoutError(f"never: {condition}")
