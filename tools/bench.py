@@ -2,7 +2,7 @@
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
 ``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`).
+beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_view import bench_view
 
 import voxdisplay as vd
 
@@ -215,12 +216,14 @@ def bench_cold(repeats: int) -> None:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["push", "cold", "curves"])
+    parser.add_argument("what", choices=["push", "cold", "curves", "view"])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--quick", action="store_true", help="curves: only a few")
+    parser.add_argument("--quick", action="store_true", help="curves, view: only a few")
     options = parser.parse_args()
     if options.what == "curves":
         bench_curves(options.repeats, quick=options.quick)
+    elif options.what == "view":
+        bench_view(options.repeats, quick=options.quick)
     else:
         {"push": bench_push, "cold": bench_cold}[options.what](options.repeats)
 

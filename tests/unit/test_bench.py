@@ -12,3 +12,9 @@ def test_the_table_of_curves_runs():
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "this engine" in run.stdout
     assert "bytes a voxel" in run.stdout
+
+
+def test_the_table_of_pictures_runs():
+    command = [sys.executable, str(BENCH), "view", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "paper curve" in run.stdout

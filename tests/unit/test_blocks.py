@@ -10,6 +10,7 @@ from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.axes import GROUND
 from voxdisplay.view.blocks import CAMERA, RESET, full_color, half_blocks
+from voxdisplay.view.picture import Look, picture_of
 from voxdisplay.view.voxels import lit_voxels
 
 GRID = Grid(3, 5, 7)
@@ -54,6 +55,16 @@ def test_a_voxel_is_in_the_cell_that_the_camera_names():
     red, green, blue = map(int, with_voxel[int(y), int(x)].split(";")[1:])
     assert red > 180
     assert red >= green > blue
+
+
+def test_it_is_the_picture_two_rows_a_line():
+    voxels = lit((2, 4, 6), (0, 0, 0))
+    characters, pixels = screen(half_blocks(voxels, GRID, COLUMNS, ROWS))
+    look = Look(size=(2 * COLUMNS, 4 * ROWS), camera=CAMERA, labels=False)
+    meant = np.asarray(picture_of(voxels, GRID, look).reduce(2))
+    for row, column in np.ndindex(2 * ROWS, COLUMNS):
+        if characters[row // 2][column] not in "xyz":
+            assert pixels[row, column] == "2;{};{};{}".format(*meant[row, column])
 
 
 def test_the_axes_have_their_names():

@@ -39,6 +39,15 @@ def test_a_gif_is_as_long_as_asked(tmp_path):
         assert film.n_frames == 4
 
 
+def test_who_has_the_old_file_open_keeps_it_whole(tmp_path):
+    path, old = tmp_path / "x.png", tmp_path / "old"
+    path.write_bytes(b"old")
+    os.link(path, old)
+    save(path, SHOT)
+    assert old.read_bytes() == b"old", "it was replaced, and not written over"
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
 def write_and_fail(path):
     with replacing(path) as unfinished:
         unfinished.write_bytes(b"half")

@@ -19,6 +19,8 @@ _COLUMNS, _ROWS = 56, 18
 # at 115 200 baud 0.07 s for a thousand bits. The built-in emulator reads 128^3 in 0.03 to 0.4 s
 # and 256^3 rgb888 in 4 s.
 _MOST_VOXELS = 1 << 21
+# Drawing a million takes a third of a second.
+_MOST_DRAWN = 1 << 20
 _BITS_A_VOXEL = 80
 _PATIENCE_S = 0.5
 
@@ -39,13 +41,16 @@ def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: int
     """
     if not _can_show():
         return
+    count = len(frame.lit()[0])
+    if count > _MOST_DRAWN:
+        return
     try:
         from voxdisplay.view.blocks import full_color, half_blocks  # noqa: PLC0415 - an extra
         from voxdisplay.view.voxels import lit_voxels  # noqa: PLC0415
     except vd.MissingExtra:
         return
     info = display.info
-    if page is None and _cheap(info, len(frame.lit()[0]), baud):
+    if page is None and _cheap(info, count, baud):
         page = display.read()
     what = "what was sent, not read back" if page is None else "read back from the display"
     lit = lit_voxels(frame.array() if page is None else page, info.grid, info.format)

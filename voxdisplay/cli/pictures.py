@@ -35,8 +35,12 @@ class PictureFileType(click.ParamType[Path]):
         path = Path(value)
         if path.suffix.lower() not in SUFFIXES:
             self.fail(f"{path} should end in {', '.join(SUFFIXES)}", param, ctx)
-        if path.is_dir() or not path.parent.is_dir():
-            why = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        try:
+            why = "it is a folder" if path.is_dir() else ""
+            why = why or ("" if path.parent.is_dir() else f"there is no folder {path.parent}")
+        except OSError as error:
+            why = error.strerror or "it cannot be looked up"
+        if why:
             self.fail(f"{path} cannot be written: {why}", param, ctx)
         return path
 

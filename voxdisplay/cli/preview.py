@@ -50,6 +50,13 @@ _MOST_PIXELS = 1 << 29
 )
 @view_angle_option
 @click.option(
+    "--zoom",
+    type=click.FloatRange(0.3, 2.5),
+    default=1.0,
+    show_default=True,
+    help="Come nearer, above 1, or go away.",
+)
+@click.option(
     "--display-size",
     type=SizeType(),
     metavar="NX,NY,NZ",
@@ -85,6 +92,7 @@ def preview(
     output: Path,
     size_px: tuple[int, int],
     view_angle: tuple[float, float] | None,
+    zoom: float,
     display_size: vd.Grid | None,
     format_: str,
     fit: Literal["contain", "none"],
@@ -113,7 +121,7 @@ def preview(
         note(remark)
     frame = vd.Frame(grid, format_)
     draw(fitted, frame)
-    look = Look(size=size_px, glow=not plain, axes=not plain).seen_from(view_angle)
+    look = Look(size=size_px, glow=not plain, axes=not plain).seen_from(view_angle, zoom)
     shot = Shot(frame.array(), grid, frame.format, look, _title(scene), seconds, fps)
     with progress_bar("drawing") as progress:
         save_picture(output, shot, progress)

@@ -81,8 +81,6 @@ def push(
                     if verify
                     else display.read(progress=progress)
                 )
-        if preview and page is not None:
-            save_page(preview, page, display.info)
         if as_json:
             print_json(
                 {
@@ -100,8 +98,10 @@ def push(
             )
         else:
             click.echo(_summary(display, receipt, verify=verify))
-            if not quiet:
-                glimpse(display, frame, page, baud)
+        if preview and page is not None:  # what was shown has been said, if this fails
+            save_page(preview, page, display.info)
+        if not quiet and not as_json:
+            glimpse(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

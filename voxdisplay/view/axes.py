@@ -126,11 +126,12 @@ def _label(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None
     for axis, (name, side) in enumerate(zip("xyz", grid, strict=True)):
         along = points[axis + 1] - points[0]
         along /= max(1.0, float(np.hypot(*along)))
-        left, top, right, bottom = draw.textbbox((0, 0), f"{name} {side}", font=font)
+        ahead = draw.textlength(name, font=font) + height * 0.45
+        left, top, right, bottom = draw.textbbox((0, 0), f"{name}{side}", font=font)
+        right += height * 0.45
         box = np.array([right - left, bottom - top])
         # The text's middle goes beyond the tip, as far as its box needs in that direction.
         middle = points[axis + 1] + along * (np.abs(along) @ box / 2 + 0.5 * height)
         corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
         draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis])
-        ahead = draw.textlength(f"{name} ", font=font)
         draw.text((corner[0] + ahead, corner[1]), str(side), font=font, fill=_TEXT)

@@ -60,11 +60,10 @@ class Look:
     axes: bool = True
     labels: bool = True
 
-    def seen_from(self, angle: tuple[float, float] | None) -> Look:
-        """Give the look from a yaw and a pitch, in radians; None: as it is."""
-        if angle is None:
-            return self
-        return replace(self, camera=replace(self.camera, yaw=angle[0], pitch=angle[1]))
+    def seen_from(self, angle: tuple[float, float] | None, zoom: float = 1.0) -> Look:
+        """Give the look from a yaw and a pitch, in radians, and nearer by a factor."""
+        yaw, pitch = angle or (self.camera.yaw, self.camera.pitch)
+        return replace(self, camera=replace(self.camera, yaw=yaw, pitch=pitch).zoomed(zoom))
 
 
 def picture(
