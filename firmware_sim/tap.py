@@ -89,7 +89,9 @@ class Tap:
             self._ring()
 
     def close(self) -> None:
-        """Stop; the watcher is cut off."""
+        """Stop; the watcher is cut off. Twice is fine."""
+        if self._closing.is_set():
+            return
         self._closing.set()
         self._ring()
         if connection := self._connection:

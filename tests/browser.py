@@ -83,7 +83,7 @@ class Browser:
 
     def tab(self, url, *, width=1000, height=700, **emulated):
         """Open a tab and wait until its page is loaded."""
-        request = urllib.request.Request(  # noqa: S310 - http, on this machine
+        request = urllib.request.Request(
             f"http://127.0.0.1:{self._port}/json/new?about:blank", method="PUT"
         )
         with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:  # noqa: S310

@@ -2,7 +2,8 @@
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
 ``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`).
+beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`)
+and how fast the live view is (`bench_live`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_live import bench_live
 from bench_view import bench_view
 
 import voxdisplay as vd
@@ -224,6 +226,7 @@ def main() -> None:
         bench_curves(options.repeats, quick=options.quick)
     elif options.what == "view":
         bench_view(options.repeats, quick=options.quick)
+        bench_live(options.repeats, quick=options.quick)
     else:
         {"push": bench_push, "cold": bench_cold}[options.what](options.repeats)
 

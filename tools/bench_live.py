@@ -1,7 +1,8 @@
 """Measures the live view: frames a second in a real browser, and what the tap costs the emulator.
 
 The frames come from a source in this process, all voxels of all frames different; they are painted
-by Chromium without a graphics processor, and counted there.
+by Chromium, without a graphics processor if there is none, and counted there. The emulator decodes
+here too, while its tap is read in another process, as fast as it lets itself be read.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import asyncio
 import contextlib
 import itertools
 import statistics
+import subprocess
 import sys
 import tempfile
 import threading
@@ -21,17 +23,21 @@ from typing import Any
 import numpy as np
 
 import voxdisplay as vd
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+from firmware_sim.tap import Tap
 from voxdisplay.view.live.message import Moment, encode
 from voxdisplay.view.live.page import page
 from voxdisplay.view.live.server import open_server
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
-from browser import Browser  # noqa: E402 - the tests' own
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from browser import PROGRAM, Browser
 
 GRID = vd.Grid(128, 128, 128)
 _PICTURES = 24
-_SECONDS = 5.0
+_SECONDS = 4.0
 
 
 def helix(phase: float) -> vd.Frame:
@@ -105,40 +111,121 @@ def served(source: Any) -> Iterator[str]:
         thread.join()
 
 
-def bench_browser(repeats: int) -> None:
+def bench_browser(repeats: int, *, quick: bool) -> None:
     """Print frames a second in Chromium."""
+    if PROGRAM is None:
+        print("no Chromium: no frames a second")
+        return
     phases = np.linspace(0, 2 * np.pi, _PICTURES, endpoint=False)
     films = {
         "paper curve": [helix(p) for p in phases],
         "50k voxels": [ripple(p, 50_000) for p in phases],
         "200k voxels": [ripple(p, 200_000) for p in phases[:8]],
     }
-    with tempfile.TemporaryDirectory() as folder:
-        browser = Browser(Path(folder))
+    ways = ("2d",) if quick else ("2d", "gl")
+    with tempfile.TemporaryDirectory() as folder, contextlib.closing(Browser(Path(folder))) as one:
+        for (name, frames), way in itertools.product(films.items(), ways):
+            with served(Film(frames)) as url:
+                tab = one.tab(f"{url}?r={way}", width=1080, height=700)
+                rate = statistics.median(_rate(tab) for _ in range(repeats))
+                size = tab.run("`${canvas.width}x${canvas.height}`")
+                tab.close()
+            lit = len(frames[0].lit()[0])
+            print(f"{name:<12} {way}  {lit:7d} lit  {size}  {rate:6.1f} frames/s", flush=True)
+
+
+def _rate(tab: Any) -> float:
+    """Count the pictures that are painted in a second."""
+    tab.wait("painted > 3")
+    before, began_s = tab.run("painted"), time.perf_counter()
+    time.sleep(_SECONDS)
+    return float((tab.run("painted") - before) / (time.perf_counter() - began_s))
+
+
+def bench_tap(repeats: int) -> None:
+    """Print how fast the emulator decodes, with a watcher on its tap and without, in turns."""
+    for name, frame in (("paper curve", helix(0)), ("50k voxels", ripple(0, 50_000))):
+        payloads = frame.payloads(1024)
+        alone, watched, seen = [], [], []
+        for _ in range(2 * repeats):
+            alone.append(_decode(Device(Config(GRID, refresh=0)), payloads))
+            device = Device(Config(GRID, refresh=0))
+            with Tap(device) as tap, _watching(tap) as counted:
+                device.on_swap = tap.notice
+                watched.append(_decode(device, payloads))
+            seen.append(counted[0] / _SECONDS)
+        for which, clock in enumerate(("CPU time", "time")):
+            pairs = [(a[which], w[which]) for a, w in zip(alone, watched, strict=True)]
+            plain, slowed = (statistics.median(pair[k] for pair in pairs) for k in (0, 1))
+            share = statistics.median(100 * w / a for a, w in pairs)
+            print(
+                f"{name}: the emulator decodes {plain:.1f} frames a second of {clock} alone, "
+                f"{slowed:.1f} watched ({share:.0f} %); {statistics.median(seen):.1f} are seen",
+                flush=True,
+            )
+
+
+@contextlib.contextmanager
+def _watching(tap: Tap) -> Iterator[list[int]]:
+    """Watch a tap in another process; give how many pictures it has seen, in the end."""
+    command, counted = [sys.executable, "-c", _WATCHER, tap.address], [0]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watcher:
+        assert watcher.stdout is not None  # noqa: S101 - it is a pipe
+        watcher.stdout.readline()
         try:
-            for (name, frames), way in itertools.product(films.items(), ("2d", "gl")):
-                with served(Film(frames)) as url:
-                    tab = browser.tab(f"{url}?r={way}", width=1080, height=700)
-                    tab.wait("painted > 3")
-                    counts = []
-                    for _ in range(repeats):
-                        before, began_s = tab.run("painted"), time.perf_counter()
-                        time.sleep(_SECONDS)
-                        counts.append(
-                            (tab.run("painted") - before) / (time.perf_counter() - began_s)
-                        )
-                    size = tab.run("`${canvas.width}x${canvas.height}`")
-                    tab.close()
-                shown = len(frames[0].lit()[0])
-                print(
-                    f"{name:<12} {way}  {shown:7d} lit  {size}  {statistics.median(counts):6.1f} frames/s",
-                    flush=True,
-                )
+            yield counted
         finally:
-            browser.close()
-    moment = Film(films["50k voxels"]).next()[1]
+            tap.close()
+            counted[0] = int(watcher.stdout.readline())
+
+
+_WATCHER = """
+import sys
+from voxdisplay.errors import TransportClosed
+from voxdisplay.view.live.message import encode
+from voxdisplay.view.live.sources import TapSource
+host, port = sys.argv[1].split(":")
+source, seen = TapSource(host, int(port), ""), 0
+print(flush=True)
+try:
+    while True:
+        encode(source.next()[1])
+        seen += 1
+except TransportClosed:
+    print(seen)
+"""
+
+
+def _decode(device: Device, payloads: list[bytes]) -> tuple[float, float]:
+    """Let a device decode the same frame for a while; give frames a second of CPU time, of time.
+
+    On a busy machine the watcher takes time from everybody; CPU time is the device's own.
+    """
+    device.receive(b"\0" + packets.encode(packets.Hello(session=1)))
+    device.transmit()
+    seconds, cpu_s, seq = 0.0, 0.0, 0
+    end_s = time.monotonic() + _SECONDS
+    while time.monotonic() < end_s:
+        for number, ops in enumerate(payloads, 1):
+            flags = spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT * (number == len(payloads))
+            frame = device.swaps % 256
+            wire = packets.encode(packets.Data(seq=seq % 256, frame=frame, flags=flags, ops=ops))
+            began_s, began_cpu_s = time.perf_counter(), time.thread_time()
+            device.receive(wire)
+            seconds += time.perf_counter() - began_s
+            cpu_s += time.thread_time() - began_cpu_s
+            device.transmit()
+            seq += 1
+    return device.swaps / cpu_s, device.swaps / seconds
+
+
+def bench_live(repeats: int, *, quick: bool) -> None:
+    """Print all of it."""
+    moment = Film([ripple(0, 50_000)]).next()[1]
+    encode(moment)
     began_s = time.perf_counter()
     size = len(encode(moment))
-    print(
-        f"a message of 50k voxels: {size} bytes in {(time.perf_counter() - began_s) * 1000:.1f} ms; page {len(page().encode())} bytes"
-    )
+    took_ms = (time.perf_counter() - began_s) * 1000
+    print(f"page: {len(page().encode())} bytes; 50k voxels: {size} bytes, made in {took_ms:.1f} ms")
+    bench_tap(repeats)
+    bench_browser(1 if quick else repeats, quick=quick)

@@ -233,9 +233,9 @@ class Pushed:
 
 
 def fetch(url, **headers):
-    request = urllib.request.Request(url, headers=headers)
+    request = urllib.request.Request(url, headers=headers)  # noqa: S310 - http, here
     try:
-        with urllib.request.urlopen(request, timeout=WAIT) as answer:
+        with urllib.request.urlopen(request, timeout=WAIT) as answer:  # noqa: S310
             return answer.status, answer.headers, answer.read()
     except urllib.error.HTTPError as error:
         with error:
@@ -258,7 +258,14 @@ def test_what_is_served():
 def test_only_its_own_names_are_answered():
     """A name that an attacker lets point here is none of them; a number cannot be."""
     with served(StillSource(still())) as url:
-        for host in ("evil.example", "evil.example:80", "", "127.0.0.1.evil.example", "[::1", "a b"):
+        for host in (
+            "evil.example",
+            "evil.example:80",
+            "",
+            "127.0.0.1.evil.example",
+            "[::1",
+            "a b",
+        ):
             assert fetch(url, Host=host)[0] == 403, host
         for host in ("127.0.0.1:9", "localhost:8000", "LOCALHOST", "[::1]:5", "192.168.0.7"):
             assert fetch(url, Host=host)[0] == 200, host
@@ -345,7 +352,9 @@ def test_the_end_of_a_source_is_the_end_of_the_view():
     asyncio.run(asyncio.wait_for(serve(), WAIT))
 
 
-@pytest.mark.parametrize("text", ["", "8000", "127.0.0.1", "127.0.0.1:x", "127.0.0.1:65536", "::1:5]"])
+@pytest.mark.parametrize(
+    "text", ["", "8000", "127.0.0.1", "127.0.0.1:x", "127.0.0.1:65536", "::1:5]"]
+)
 def test_a_bad_address(text):
     with pytest.raises(ValueError, match="write HOST:PORT"):
         parse_address(text)

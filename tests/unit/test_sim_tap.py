@@ -206,7 +206,7 @@ def install(monkeypatch: pytest.MonkeyPatch, folder: Path, text: str | None) -> 
         (folder / "a_viewer.py").write_text(textwrap.dedent(text))
         monkeypatch.setenv("PYTHONPATH", str(folder))
         entries = [EntryPoint("browser", "a_viewer", viewers.GROUP)]
-    monkeypatch.setattr(viewers, "entry_points", lambda group: entries)
+    monkeypatch.setattr(viewers, "entry_points", lambda **_: entries)
 
 
 def test_a_viewer_runs_as_long_as_it_is_wanted(
