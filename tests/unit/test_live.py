@@ -7,6 +7,7 @@ import contextlib
 import json
 import struct
 import threading
+import time
 import urllib.error
 import urllib.request
 
@@ -330,6 +331,20 @@ def test_nobody_is_asked_while_nobody_looks():
         with connect(url.replace("http", "ws") + "live") as browser:
             browser.recv(WAIT)
         assert source.asked.acquire(timeout=WAIT)
+
+
+def test_who_comes_later_sees_nothing_old():
+    """What was on display when somebody last looked may be long gone."""
+    source = Pushed()
+    with served(source) as url:
+        live = url.replace("http", "ws") + "live"
+        for number in (1, 4, 7):
+            with connect(live) as browser:
+                assert read_back(browser.recv(WAIT))[0]["number"] == number
+            assert source.asked.acquire(timeout=WAIT)
+            for _ in range(3):  # the first may still be asked for, the others are not
+                source.push()
+                time.sleep(0.02)
 
 
 def test_the_end_of_a_source_is_the_end_of_the_view():

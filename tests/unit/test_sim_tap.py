@@ -11,7 +11,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -56,6 +56,13 @@ def take(watcher: socket.socket, size: int = 3 * 5 * 7 * 3) -> tuple[tuple, byte
         got += piece
     assert len(got) == HEADER.size + size
     return HEADER.unpack(got[: HEADER.size]), got[HEADER.size :]
+
+
+def until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + WAIT
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.001)
 
 
 def question(header: tuple) -> bytes:
@@ -135,8 +142,7 @@ def test_closing_ends_it_whatever_it_waits_for(asked: bytes) -> None:
         if asked == NOTHING:
             take(watcher)
         else:
-            while tap._connection is None or (asked and not tap._waiting):
-                time.sleep(0.001)
+            until(lambda: tap._connection is not None and (tap._waiting or not asked))
         tap.close()
         assert watcher.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):
@@ -165,35 +171,37 @@ def test_a_bell_that_rings_already_is_not_waited_for() -> None:
 
 
 def test_no_picture_is_torn() -> None:
-    """What a watcher sees is one whole page, however fast the pages change meanwhile."""
+    """While somebody looks, pages are not exchanged; and nobody looks while they are."""
     watched = device()
     watched.receive(hello())
-    digests = {0}
+    done = []
+    acts = (
+        lambda: Bench(watched).snapshot(),
+        lambda: watched.receive(data(0, 0, DOT, CLEAR | COMMIT)),
+        lambda: Bench(watched).power_cycle(),
+    )
+    for act in acts:
+        with watched.showing:
+            thread = threading.Thread(target=lambda act=act: done.append(act()))
+            thread.start()
+            thread.join(0.02)
+            assert thread.is_alive()
+        thread.join(WAIT)
+        assert not thread.is_alive()
+    assert len(done) == len(acts)
+
+
+def test_a_bell_without_a_swap_is_no_harm() -> None:
+    watched = device()
+    watched.receive(hello())
     with tapped(watched) as tap, watch(tap) as watcher:
-        done = threading.Event()
-
-        def draw() -> None:
-            number = 0
-            while not done.is_set():
-                full = b"\xa0" if number % 2 else b""
-                watched.receive(data(number % 256, number % 256, full, CLEAR | COMMIT))
-                watched.transmit()
-                digests.add(watched.memory.front.digest)
-                number += 1
-
-        drawing = threading.Thread(target=draw)
-        drawing.start()
-        asked = NOTHING
-        try:
-            for _ in range(50):
-                watcher.sendall(asked)
-                header, page = take(watcher)
-                asked = question(header)
-                assert bool(header[8]) == any(page)
-        finally:
-            done.set()
-            drawing.join()
-    assert len(digests) == 2
+        watcher.sendall(struct.pack("<HI", 0x1234, 0))
+        for number in range(20):
+            until(lambda: tap._waiting)
+            tap.notice()
+            if number == 19:
+                watched.receive(data(0, 0, DOT, CLEAR | COMMIT))
+        assert take(watcher)[0][7] == 1
 
 
 # The viewer
