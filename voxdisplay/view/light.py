@@ -6,6 +6,7 @@ how that is exposed on a picture is not known here.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -111,8 +112,8 @@ def _box(lit: Lit, grid: Grid, camera: Camera, size: tuple[int, int], factor: in
     """Find the part of the raster that can have light: where the lit voxels' own box is seen."""
     if len(lit.positions) == 0:
         return _Box(0, 0, 0, 0)
-    ends = np.stack((lit.positions.min(axis=0), lit.positions.max(axis=0))) + 0.5
-    corners = [[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]
+    ends = [(column.min() + 0.5, column.max() + 0.5) for column in lit.positions.T]
+    corners = list(itertools.product(*ends))
     x, y, scale = camera.project(corners, grid, size)
     margin = 2 + math.ceil(3.5 * _spread_px(float(scale.max())) / factor)
     left, right = (
