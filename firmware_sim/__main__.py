@@ -9,7 +9,6 @@ import json
 import os
 import re
 import signal
-import socket
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,10 +30,12 @@ from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
 from firmware_sim.pace import PacedWire, paced
-from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.serve import check_local, linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.tap import Tap
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction, SerialFunction
 from firmware_sim.usb.usbip_server import serve_usbip
+from firmware_sim.viewer import viewer
 from firmware_sim.wire import Wire
 
 _EPILOG = """\
@@ -52,18 +53,8 @@ examples:
       usbip attach -r 127.0.0.1 -b 1-1 and push to usb:
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
-  voxdisplay-sim --fault down.stall=0.2@0.001,up.delay=0.05@0.02,reboot@100000
-      what the host sends stands still now and then, what it gets is late, and the device
-      starts again behind 100000 bytes
-  voxdisplay-sim --format index8 --features line,digest --lie credit
-      a device that has few ops, and announces more room than it has
-
-faults, with commas between them:
-  KIND=RATE           flip (bits), drop, double, insert (bytes), lose, reorder (packets),
-                      short (writes and reads end behind a byte)
-  KIND=SECONDS@RATE   stall (the line stands still, at bytes), delay (packets held back)
-  KIND=RATE, KIND@BYTES   reboot, unplug (behind a byte to the device)
-  down. or up. in front: only to, or only from the device
+  voxdisplay-sim --view
+      with a page for the browser that shows what is on display; its address is in the first line
 """
 
 
@@ -210,6 +201,15 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         help="write the front page there at the start and after each swap",
     )
+    parser.add_argument(
+        "--view",
+        metavar="HOST:PORT",
+        nargs="?",
+        const=("127.0.0.1", 0),
+        type=_argument(_parse_address),
+        help="show the front page in browsers at that address, on this machine only unless "
+        "--allow-remote is given (default: any free port of 127.0.0.1)",
+    )
     return parser
 
 
@@ -242,7 +242,18 @@ def _dump_swaps(device: Device, path: Path) -> None:
         except OSError as error:
             sys.stderr.write(f"voxdisplay-sim: {error}: this picture is not dumped\n")
 
-    device.on_swap = dump
+    _also(device, dump)
+
+
+def _also(device: Device, act: Callable[[], object]) -> None:
+    """Do something more at each swap."""
+    before = device.on_swap
+
+    def both() -> None:
+        before()
+        act()
+
+    device.on_swap = both
 
 
 @contextlib.contextmanager
@@ -261,35 +272,47 @@ def _signals() -> Iterator[int]:
 
 
 def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> None:
+    with contextlib.ExitStack() as stack:
+        port, serve = _carrier(wire, options, stack)
+        config = wire.device.config
+        place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
+        if options.view:
+            check_local(options.view[0], remote=options.allow_remote)
+            tap = stack.enter_context(Tap(wire.device))
+            _also(wire.device, tap.notice)
+            place["view"] = stack.enter_context(viewer(tap, _address(options.view), port))
+        _announce(place)
+        serve(stop)
+
+
+def _carrier(
+    wire: Wire | PacedWire, options: argparse.Namespace, stack: contextlib.ExitStack
+) -> tuple[str, Callable[[int], object]]:
+    """Open what carries the bytes; return its port, and what serves it until told to stop."""
     if options.tcp:
-        with listen(*options.tcp, remote=options.allow_remote) as listener:
-            _announce(wire, f"tcp://{_address_of(listener)}")
-            serve_tcp(wire, listener, stop)
-        return
+        listener = stack.enter_context(listen(*options.tcp, remote=options.allow_remote))
+        port = f"tcp://{_address(listener.getsockname())}"
+        return port, lambda stop: serve_tcp(wire, listener, stop)
     if options.usbip:
         kind = SerialFunction if options.usb_class == "cdc-acm" else DisplayFunction
-        with listen(*options.usbip, remote=options.allow_remote) as listener:
-            _announce(wire, f"usbip://{_address_of(listener)}")
-            serve_usbip(UsbDevice(kind(wire)), listener, stop)
-        return
-    with contextlib.ExitStack() as stack:
-        line, name = stack.enter_context(open_pty())
-        if options.link:
-            stack.enter_context(linked(options.link, name))
-        _announce(wire, name)
-        serve_wire(wire, line, stop)
+        listener = stack.enter_context(listen(*options.usbip, remote=options.allow_remote))
+        port = f"usbip://{_address(listener.getsockname())}"
+        return port, lambda stop: serve_usbip(UsbDevice(kind(wire)), listener, stop)
+    line, port = stack.enter_context(open_pty())
+    if options.link:
+        stack.enter_context(linked(options.link, port))
+    return port, lambda stop: serve_wire(wire, line, stop)
 
 
-def _address_of(listener: socket.socket) -> str:
-    host, port = listener.getsockname()[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-
-
-def _announce(wire: Wire | PacedWire, port: str) -> None:
-    config = wire.device.config
-    place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
+def _announce(place: dict[str, str]) -> None:
     sys.stdout.write(json.dumps(place) + "\n")
     sys.stdout.flush()
+
+
+def _address(place: tuple[Any, ...]) -> str:
+    """Write an address as `_parse_address` reads it."""
+    host, port = place[:2]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 if __name__ == "__main__":

@@ -36,6 +36,8 @@ class Snapshot:
         Frame id, or None if no frame of the open session is on display.
     digest
         Digest of the page, section 8.
+    boot, swaps
+        Boot id of the device, and how many swaps there have been since it started.
     palette
         256 colours of red, green and blue, a byte each; none if the format is not INDEX8.
     """
@@ -45,6 +47,8 @@ class Snapshot:
     pixel_format: str
     frame: int | None
     digest: int
+    boot: int
+    swaps: int
     palette: bytes = b""
 
 
@@ -86,17 +90,21 @@ class Bench:
         self._device = device
 
     def snapshot(self) -> Snapshot:
-        """Return what is on display."""
+        """Return what is on display; any thread may ask."""
         device = self._device
-        front = device.memory.front
-        return Snapshot(
-            bytes(front.pixels),
-            device.config.grid,
-            device.config.pixel_format,
-            device.session.shown if device.session else None,
-            front.digest,
-            bytes(front.palette) if device.config.pixels.code == spec.FORMAT_INDEX8 else b"",
-        )
+        has_palette = device.config.pixels.code == spec.FORMAT_INDEX8
+        with device.showing:
+            front, session = device.memory.front, device.session
+            return Snapshot(
+                bytes(front.pixels),
+                device.config.grid,
+                device.config.pixel_format,
+                session.shown if session else None,
+                front.digest,
+                device.boot,
+                device.swaps,
+                bytes(front.palette) if has_palette else b"",
+            )
 
     def counters(self) -> Counters:
         """Return what has happened since the start of the device."""

@@ -6,6 +6,7 @@ No clock, no input or output and no thread inside: all that happens, happens in 
 import random
 import re
 import struct
+import threading
 from typing import TYPE_CHECKING
 
 from firmware_sim import spec
@@ -54,7 +55,10 @@ class Device:
     damaged, swaps : int
         How many damaged segments there have been, and how many swaps.
     on_swap : callable
-        Is called with nothing after each swap, for who looks on.
+        Is called with nothing after each swap and each new start, for who looks on.
+    showing : Lock
+        Who holds it knows that the pages are not exchanged meanwhile: for who looks on from
+        another thread.
     """
 
     def __init__(self, config: Config) -> None:
@@ -64,6 +68,7 @@ class Device:
         # What it does, which is what it announces unless it lies.
         self._features = 0 if "features" in config.lies else config.feature_bits
         self._unpacker = Unpacker(config.shape, config.pixels, self._features)
+        self.showing = threading.Lock()
         self._start()
 
     def _start(self) -> None:
@@ -77,8 +82,10 @@ class Device:
 
     def power_cycle(self) -> None:
         """Start again: another boot id, no session, dark pages."""
-        self.boot = (self.boot + 1) % 0x10000
-        self._start()
+        with self.showing:
+            self.boot = (self.boot + 1) % 0x10000
+            self._start()
+        self.on_swap()
 
     def disconnect(self) -> None:
         """End the session and drop what has not been taken or sent: the carrier is gone (16)."""
@@ -265,9 +272,10 @@ class Device:
             self._acknowledge()
 
     def _swap(self, session: Session) -> None:
-        session.swap()
-        self.memory.swap()
-        self.swaps += 1
+        with self.showing:
+            session.swap()
+            self.memory.swap()
+            self.swaps += 1
         self.on_swap()
 
     def _acknowledge(self, tag: int | None = None) -> None:

@@ -20,6 +20,7 @@ from firmware_sim.wire import Wire
 
 __all__ = [
     "InProcessPort",
+    "check_local",
     "linked",
     "listen",
     "open_in_process",
@@ -149,12 +150,35 @@ def listen(host: str, port: int, *, remote: bool = False) -> socket.socket:
     OSError
         If there is no such address, or it is taken.
     """
+    check_local(host, "draw", remote=remote)
     family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    return socket.create_server(address[:2], family=family, backlog=1)
+
+
+def check_local(host: str, what: str = "look on", *, remote: bool) -> None:
+    """Refuse to listen where other machines could come, unless they may.
+
+    Parameters
+    ----------
+    host
+        Name or number of the address.
+    what
+        What who comes could do.
+    remote
+        Whether other machines may reach it.
+
+    Raises
+    ------
+    PermissionError
+        If they could and must not.
+    OSError
+        If there is no such address.
+    """
+    *_, address = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0]
     if not (remote or ipaddress.ip_address(address[0]).is_loopback):
         raise PermissionError(
-            f"anyone who reaches {host} could draw: listen on 127.0.0.1, or add --allow-remote"
+            f"anyone who reaches {host} could {what}: listen on 127.0.0.1, or add --allow-remote"
         )
-    return socket.create_server(address[:2], family=family, backlog=1)
 
 
 def serve_tcp(wire: Wire | PacedWire, listener: socket.socket, stop: int) -> None:

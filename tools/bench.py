@@ -2,8 +2,9 @@
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
 ``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`); ``ports``
-how fast each kind of port is beside the bare pipe below it (`bench_ports`).
+beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`) and how fast
+the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare pipe below
+it (`bench_ports`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_live import bench_live
 from bench_ports import bench_ports
 from bench_view import bench_view
 
@@ -215,7 +217,13 @@ def bench_cold(repeats: int) -> None:
         print(f"cold start, {name:<18} median of {repeats}: {statistics.median(seconds):.3f} s")
 
 
-TABLES = {"curves": bench_curves, "view": bench_view, "ports": bench_ports}
+def bench_views(repeats: int, *, quick: bool) -> None:
+    """Print what pictures cost, and how fast the live view is."""
+    bench_view(repeats, quick=quick)
+    bench_live(repeats, quick=quick)
+
+
+TABLES = {"curves": bench_curves, "view": bench_views, "ports": bench_ports}
 
 
 def main() -> None:

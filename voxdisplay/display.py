@@ -28,7 +28,7 @@ from voxdisplay.errors import (
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
-from voxdisplay.link import Event, Link, PageRead, Ready, Refused, Shown
+from voxdisplay.link import Event, Link, LinkCounters, PageRead, Ready, Refused, Shown, Told
 from voxdisplay.pixel import Pixels
 from voxdisplay.probe import new_session, said_before
 from voxdisplay.reconnect import Reconnect
@@ -173,6 +173,7 @@ class Display:
         self._shown: dict[int, int | None] = {}  # ticket -> digest
         self._unwaited: dict[int, tuple[list[bytes], int]] = {}  # ticket -> payloads and digest
         self._pages: list[Page] = []
+        self._told: Told | None = None
         self._events: deque[Event] = deque()
         self._link = Link(new_session(), time.monotonic(), patience_s=timeout_s)
         self.info = self._greet()
@@ -233,6 +234,8 @@ class Display:
                 self._settle(ticket, digest)
             case Shown(ticket, digest):
                 self._shown[ticket] = digest
+            case Told():
+                self._told = event
             case PageRead(page):
                 self._pages.append(page)
             case Refused(error):
@@ -376,7 +379,28 @@ class Display:
         self.flush()
         return self._present_and_wait(self.frame(), None)
 
-    # -- reading back
+    # -- asking, and reading back
+
+    @property
+    def counters(self) -> LinkCounters:
+        """What the link has done so far."""
+        return self._link.counters
+
+    def digest(self) -> int | None:
+        """Ask what is on display now.
+
+        Returns
+        -------
+        int or None
+            The digest of the front page (protocol.md, section 8); None if the device gives none.
+
+        """
+        self._check_open()
+        self._told = None
+        self._link.ask()
+        while self._told is None:
+            self._turn()
+        return self._told.digest
 
     def read(self, *, back: bool = False, progress: Progress | None = None) -> Pixels:
         """Read a page of the device's memory.

@@ -392,3 +392,21 @@ def test_a_device_that_breaks_the_protocol(opened):
         display.clear()
     pipe.answers = lambda data: data
     display.clear()
+
+
+def test_a_display_says_what_it_shows(opened):
+    display, pipe = opened()
+    assert display.digest() == 0
+    frame = display.frame()
+    frame.draw([(1, 2, 3)])
+    display.present(frame)
+    pipe.now += 1000  # a long time in which nothing was asked
+    assert display.digest() == frame.digest() == pipe.bench.snapshot().digest
+    assert display.counters.statuses >= 2
+    pipe.bench.power_cycle()
+    assert display.digest() == 0
+
+
+def test_a_display_without_digest_says_nothing_of_what_it_shows(opened):
+    display, _ = opened(features=frozenset({"read"}))
+    assert display.digest() is None

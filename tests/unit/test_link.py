@@ -6,7 +6,7 @@ import document
 import pytest
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
-from voxdisplay.link import Link, PageRead, Ready, Refused, Restarted, Shown
+from voxdisplay.link import Link, PageRead, Ready, Refused, Restarted, Shown, Told
 from voxdisplay.link.info import check_info
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
@@ -467,3 +467,41 @@ def test_an_ack_for_what_was_never_sent_breaks_the_protocol():
     link = opened()
     with pytest.raises(RemoteProtocolError, match="next is 9"):
         told(link, ack(9, 8), 0.0)
+
+
+# -- asking what is on display
+
+
+def test_an_idle_link_may_be_asked_what_is_on_display():
+    """However long nothing was to be said; and a lost STATUS is asked again."""
+    link = opened()
+    link.ask()
+    (status,) = sent(link, 100.0)
+    assert isinstance(status, packets.Status)
+    assert sent(link, 100.001) == []
+    (again,) = sent(link, 100.0 + link.next_timeout(100.0))
+    assert again.seq != status.seq
+    answer = ack(last=again.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
+    assert told(link, answer, 101.0) == [Told(77)]
+    assert told(link, answer, 101.0) == []
+    assert link.next_timeout(101.0) is None
+
+
+def test_a_device_without_digest_is_asked_for_none():
+    link = opened(features=0)
+    link.ask()
+    (status,) = sent(link, 1.0)
+    answer = ack(last=status.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
+    assert told(link, answer, 1.0) == [Told(None)]
+
+
+def test_a_question_outlives_the_session():
+    link = opened()
+    link.ask()
+    sent(link, 1.0)
+    (restarted,) = told(link, ack(boot=BOOT + 1), 1.0)
+    assert restarted == Restarted()
+    (hello,) = sent(link, 1.0)
+    told(link, dataclasses.replace(INFO, session=hello.session, boot=BOOT + 1), 1.0)
+    (status,) = sent(link, 1.0)
+    assert isinstance(status, packets.Status)

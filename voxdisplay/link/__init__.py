@@ -1,6 +1,6 @@
 """The host's end of protocol.md, without any I/O: bytes in, events out, time is an argument."""
 
-from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown
+from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
 from voxdisplay.link.link import Link, LinkCounters
 
 __all__ = [
@@ -12,4 +12,5 @@ __all__ = [
     "Refused",
     "Restarted",
     "Shown",
+    "Told",
 ]

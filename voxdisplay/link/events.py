@@ -24,6 +24,13 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class Told:
+    """The device was asked what is on display; ``digest`` is None if it gives none."""
+
+    digest: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class PageRead:
     """Pixels came back."""
 
@@ -42,4 +49,4 @@ class Restarted:
     """The device has lost the session; a new one is being opened, and frames are sent again."""
 
 
-Event: TypeAlias = Ready | Shown | PageRead | Refused | Restarted
+Event: TypeAlias = Ready | Shown | Told | PageRead | Refused | Restarted

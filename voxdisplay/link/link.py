@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
-from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown
+from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
 from voxdisplay.link.info import check_info
 from voxdisplay.link.loss import Loss
 from voxdisplay.link.pace import Pace
@@ -109,6 +109,7 @@ class Link:
         self._starved = False  # something is to be sent, and there is no credit for it
         self._ask_at_once = False
         self._hits = 0  # damaged since the device has last taken anything
+        self._curious = False  # the caller wants an answer to a STATUS
 
     # -- what the caller wants
 
@@ -176,6 +177,10 @@ class Link:
         """Want no pixels any more that have been asked for."""
         self._requests.clear()
 
+    def ask(self) -> None:
+        """Ask what is on display now; `Told` brings it."""
+        self._curious = self._ask_at_once = True
+
     def _reopen(self, now: float) -> None:
         """Begin a new session; frames that are not shown yet are sent again, whole."""
         self._session = self._session % 0xFFFF + 1
@@ -186,7 +191,8 @@ class Link:
             frame.frame_id, frame.entered = -1, 0
         for request in self._requests:
             request.ordinal = 0
-        self._starved = self._ask_at_once = False
+        self._starved = False
+        self._ask_at_once = self._curious
         self._hits = 0
         self._silence.forget()
         self._hello_due_s = now
@@ -339,6 +345,7 @@ class Link:
         return bool(
             self._window.flights
             or self._starved
+            or (self._curious and self._silence.asking)
             or any(frame.all_entered for frame in self._frames)
             or any(request.ordinal for request in self._requests)
         )
@@ -346,7 +353,7 @@ class Link:
     def _ask(self, now: float) -> bytes:
         """Give a STATUS if it is time for one."""
         silence = self._silence
-        if not self._waiting:
+        if not (self._waiting or self._curious):
             return b""
         due = silence.ask_due_s <= now
         at_once = self._ask_at_once or (self._starved and not self._on_its_way)
@@ -437,6 +444,10 @@ class Link:
         silence = self._silence
         if ack.flags & spec.ACK_FLAG_ASKED:
             silence.answered(ack.last, now)
+            if self._curious:
+                self._curious = False
+                silence.progress(now)
+                yield Told(_digest(info, ack))
         taken = self._window.taken
         if done := self._window.acknowledge(ack):
             silence.progress(now)
@@ -471,7 +482,7 @@ class Link:
             frame.all_entered and frame.frame_id == ack.shown for frame in self._frames
         ):
             return
-        digest = ack.digest if info.has(spec.FEATURE_DIGEST) else None
+        digest = _digest(info, ack)
         self._silence.progress(now)
         self._restarts = 0
         while True:
@@ -513,3 +524,7 @@ class Link:
             )
         self._reopen(now)
         return Restarted()
+
+
+def _digest(info: packets.Info, ack: packets.Ack) -> int | None:
+    return ack.digest if info.has(spec.FEATURE_DIGEST) else None

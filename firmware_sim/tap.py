@@ -1,0 +1,187 @@
+"""The tap: lets one watcher at a time see the front page, out of band.
+
+It is no part of protocol.md: no device has it and no host may need it. It shows what *is* on
+display, as a person in front of the display would see it, whoever speaks to the device meanwhile.
+
+The tap listens on TCP, on this machine only. The watcher asks, and gets one answer:
+
+- The question is 6 bytes: which picture the watcher has, as the u16 ``boot`` and the u32 ``swaps``
+  of the answer that brought it. A watcher that has none asks with FF in all bytes.
+- The answer comes as soon as another picture than that is on display: a header, and the front page
+  as it stands in memory, that is ``nx * ny * nz`` pixels in scan order (protocol.md, section 2.1),
+  with a byte for each voxel of MONO1. Pictures in between are left out: only the newest counts.
+
+The header is 40 bytes, its integers unsigned and little-endian:
+
+====== ==== ==========================================================================
+offset size
+====== ==== ==========================================================================
+0      4    ``VXT1``
+4      2    boot: boot id of the device
+6      2    frame: frame id on display; FFFF if no frame of the open session is
+8      2, 2, 2  nx, ny, nz
+14     2    format: number of the pixel format (protocol.md, section 2.1)
+16     4    swaps since the device started, modulo 2^32
+20     4    digest of the page (protocol.md, section 8)
+24     4    packets taken since the device started, modulo 2^32
+28     4    packets refused
+32     4    damaged segments
+36     4    how many times bytes found no room in the receive ring
+====== ==== ==========================================================================
+
+A watcher that asks again before its answer has come is cut off. Being watched may not slow the
+device down: a page is copied only for a question, and the copying never takes more than about a
+twentieth of the time.
+"""
+
+import contextlib
+import select
+import socket
+import struct
+import threading
+import time
+from typing import Final, Self
+
+from firmware_sim import spec
+from firmware_sim.bench import Bench
+from firmware_sim.device import Device
+
+_HOST: Final = "127.0.0.1"
+_QUESTION: Final = struct.Struct("<HI")
+_HEADER: Final = struct.Struct("<4sHHHHHHIIIIII")
+_MAGIC: Final = b"VXT1"
+_NO_FRAME: Final = 0xFFFF
+_REST: Final = 20  # times as long as it took to copy a page, none is copied
+_U32: Final = 0xFFFFFFFF
+
+
+class Tap:
+    """Serves watchers in a thread of its own. Use it as a context manager, or `close` it.
+
+    Parameters
+    ----------
+    device
+        What is watched. Its ``on_swap`` has to call `notice`.
+
+    Attributes
+    ----------
+    address : str
+        Where it listens, as HOST:PORT.
+    """
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._bench = Bench(device)
+        self._listener = socket.create_server((_HOST, 0), backlog=1)
+        self.address = "{}:{}".format(*self._listener.getsockname())
+        self._bell, self._ringer = socket.socketpair()
+        self._ringer.setblocking(False)
+        self._connection: socket.socket | None = None
+        self._waiting = False  # for a swap
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="tap", daemon=True)
+        self._thread.start()
+
+    def notice(self) -> None:
+        """Take notice of a swap. Costs next to nothing unless a watcher waits for it."""
+        if self._waiting:
+            self._waiting = False
+            self._ring()
+
+    def close(self) -> None:
+        """Stop; the watcher is cut off. Twice is fine."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        self._ring()
+        if connection := self._connection:
+            with contextlib.suppress(OSError):  # it has just gone by itself
+                connection.shutdown(socket.SHUT_RDWR)
+        self._thread.join()
+        for one in (self._listener, self._bell, self._ringer):
+            one.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ring(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # then it rings already
+            self._ringer.send(b"\0")
+
+    # What follows runs in the thread.
+
+    def _run(self) -> None:
+        while self._readable(self._listener):
+            self._connection, _ = self._listener.accept()
+            with self._connection, contextlib.suppress(OSError):
+                self._serve(self._connection)
+            self._connection = None
+
+    def _serve(self, watcher: socket.socket) -> None:
+        """Answer a watcher until it goes.
+
+        The socket blocks: so the system takes a whole page in one call, and Python's lock changes
+        hands once. In many small calls it would do so each time, and either the device would
+        stand still or this thread.
+        """
+        while self._readable(watcher):
+            question = watcher.recv(_QUESTION.size, socket.MSG_WAITALL)
+            if len(question) < _QUESTION.size or not self._await_other(watcher, question):
+                return
+            began = time.thread_time()
+            header, page = self._look()
+            spent = time.thread_time() - began
+            watcher.sendall(header)
+            watcher.sendall(page)
+            del page
+            self._closing.wait(_REST * spent)
+
+    def _readable(self, one: socket.socket) -> bool:
+        """Wait until a socket has something; return False if the tap is closed instead."""
+        while not self._closing.is_set():
+            if one in self._wait(one):
+                return True
+        return False
+
+    def _await_other(self, watcher: socket.socket, question: bytes) -> bool:
+        """Wait for another picture than the watcher has; return whether there is one for it."""
+        self._waiting = True  # before looking, so that no swap goes unnoticed
+        while self._name() == question:
+            if self._wait(watcher) or self._closing.is_set():
+                return False
+            self._waiting = True
+        self._waiting = False
+        return True
+
+    def _wait(self, one: socket.socket) -> list[socket.socket]:
+        """Wait for a socket or the bell; return the socket if it has something."""
+        readable, _, _ = select.select([self._bell, one], [], [])
+        if self._bell in readable:
+            self._bell.recv(64)
+            readable.remove(self._bell)
+        return readable
+
+    def _name(self) -> bytes:
+        """Return the question of a watcher that has the picture which is on display."""
+        return _QUESTION.pack(self._device.boot, self._device.swaps & _U32)
+
+    def _look(self) -> tuple[bytes, bytes]:
+        shown = self._bench.snapshot()
+        device = self._device
+        header = _HEADER.pack(
+            _MAGIC,
+            shown.boot,
+            _NO_FRAME if shown.frame is None else shown.frame,
+            *shown.grid,
+            device.config.pixels.code,
+            shown.swaps & _U32,
+            shown.digest,
+            sum(device.taken.values()) & _U32,
+            sum(device.refused.values()) & _U32,
+            device.damaged & _U32,
+            device.refused.get(spec.CODE_OVERRUN, 0) & _U32,
+        )
+        return header, shown.pixels

@@ -1,0 +1,380 @@
+"""The live view without a browser: messages, sources, and what the server answers to whom."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import struct
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+import voxdisplay as vd
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+from firmware_sim.tap import Tap
+from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.view.live.address import parse_address
+from voxdisplay.view.live.message import Moment, encode
+from voxdisplay.view.live.server import open_server
+from voxdisplay.view.live.sources import DisplaySource, StillSource, TapSource
+
+WAIT = 20
+GRID = vd.Grid(3, 5, 7)
+
+
+# -- messages
+
+
+def read_back(message):
+    """Read a message by its description; give its head, and the page that it tells of."""
+    (start,) = struct.unpack_from("<I", message)
+    head = json.loads(message[4:start])
+    assert start % 8 == 0
+    nx, ny, nz = head["size"]
+    count, data = head["voxels"], message[start:]
+    if head["bitmap"]:
+        size = -(-nx * ny * nz // 8)
+        bits = np.unpackbits(np.frombuffer(data[:size], np.uint8), bitorder="little")
+        index = np.flatnonzero(bits)
+        x, y, z = index % nx, index // nx % ny, index // nx // ny
+    else:
+        kind = np.dtype("<u2" if head["wide"] else "u1")
+        size = 3 * count * kind.itemsize
+        x, y, z = np.frombuffer(data[:size], kind).reshape(3, count).astype(int)
+    assert len(x) == count
+    format_ = vd.PixelFormat(head["format"])
+    planes = np.frombuffer(data[size:], np.uint8)
+    planes = planes.reshape(0 if format_ is vd.PixelFormat.MONO1 else format_.bytes, count)
+    page = np.zeros(format_.shape((nz, ny, nx)), format_.dtype)
+    if format_ is vd.PixelFormat.MONO1:
+        assert len(planes) == 0
+        page[z, y, x] = 1
+    elif format_ is vd.PixelFormat.RGB888:
+        page[z, y, x] = planes.T
+    elif format_ is vd.PixelFormat.RGB565:
+        page[z, y, x] = planes[0] + planes[1] * np.uint16(256)
+    else:
+        page[z, y, x] = planes[0]
+    return head, page
+
+
+@given(
+    st.sampled_from(list(vd.PixelFormat)),
+    st.sampled_from([(3, 5, 7), (257, 2, 3), (1, 1, 1)]),
+    st.sampled_from([0.0, 0.01, 0.5, 1.0]),
+    st.integers(0, 1000),
+)
+def test_a_message_has_every_voxel(format_, size, density, seed):
+    grid, rng = vd.Grid(*size), np.random.default_rng(seed)
+    shape = format_.shape(grid.array_shape)
+    top = 2 if format_ is vd.PixelFormat.MONO1 else np.iinfo(format_.dtype).max + 1
+    page = rng.integers(1, top, shape).astype(format_.dtype)
+    page[rng.random(grid.array_shape) >= density] = 0
+    head, got = read_back(encode(Moment(page, grid, format_, 12, "a", 0xBEEF, {"Lost": 3})))
+    assert np.array_equal(got, page)
+    assert (head["number"], head["title"], head["digest"]) == (12, "a", "0000beef")
+    assert head["counters"] == {"Lost": 3}
+
+
+# -- sources
+
+
+def test_a_tap_is_read():
+    device = Device(Config(GRID, "rgb565", refresh=0, boot=9))
+    with Tap(device) as tap:
+        device.on_swap = tap.notice
+        source = TapSource(*parse_address(tap.address), "title")
+        _, moment = source.next()
+        assert (moment.grid, moment.format, moment.digest) == (GRID, vd.PixelFormat.RGB565, 0)
+        device.memory.back.put(17, b"\x34\x12")
+        with device.showing:
+            device.memory.swap()
+            device.swaps += 1
+        tap.notice()
+        (boot, swaps), moment = source.next()
+        assert (boot, swaps, moment.number, moment.title) == (9, 1, 1, "title")
+        assert np.flatnonzero(moment.page).tolist() == [17]
+        assert moment.page.flat[17] == 0x1234
+        source.check()
+        source.forget()
+        assert source.next()[0] == (9, 1)
+    with pytest.raises(TransportClosed, match="is gone"):
+        source.check()
+    with pytest.raises(TransportClosed, match="is gone"):
+        source.next()
+    source.close()
+    with pytest.raises(OpenError, match="cannot be reached"):
+        TapSource(*parse_address(tap.address), "")
+
+
+def test_what_is_no_tap_is_refused(tmp_path):
+    del tmp_path
+    import socket  # noqa: PLC0415
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = TapSource("127.0.0.1", listener.getsockname()[1], "")
+        peer, _ = listener.accept()
+        with peer:
+            peer.sendall(b"HTTP/1.1 400 Bad Request\r\nServer: none, and more of it")
+            with pytest.raises(TransportClosed, match="another language"):
+                source.next()
+        source.close()
+
+
+class Panel:
+    """A display that counts how often it is read."""
+
+    port = "panel"
+
+    def __init__(self, *, digest=True):
+        self.page = np.zeros((7, 5, 3), np.uint8)
+        self.reads = 0
+        self._digest = digest
+
+    def digest(self):
+        return int(self.page.sum()) if self._digest else None
+
+    def read(self):
+        self.reads += 1
+        return self.page.copy()
+
+
+@pytest.mark.parametrize("digest", [True, False])
+def test_a_display_is_read_when_it_shows_something_else(digest, monkeypatch):
+    monkeypatch.setattr("voxdisplay.view.live.sources._BLIND_POLL_S", 0.001)
+    monkeypatch.setattr("voxdisplay.view.live.sources._POLL_S", 0.001)
+    panel = Panel(digest=digest)
+    source = DisplaySource(panel, GRID, vd.PixelFormat.INDEX8, lambda: {"Bytes sent": 5})
+    key, moment = source.next()
+    assert (moment.number, moment.counters, moment.title) == (1, {"Bytes sent": 5}, "panel")
+    threading.Timer(0.05, lambda: panel.page.fill(7)).start()
+    other, moment = source.next()
+    assert other != key
+    assert moment.page.all()
+    assert panel.reads == 2 or not digest
+    source.forget()
+    assert source.next()[0] == other
+    source.close()
+    with pytest.raises(TransportClosed):
+        source.next()
+
+
+# -- the server
+
+
+@contextlib.contextmanager
+def served(source, host="127.0.0.1"):
+    """Serve a source in a thread; give the URL."""
+    ready, place = threading.Event(), {}
+
+    async def serve():
+        async with open_server(source, host, 0) as server:
+            place.update(url=server.url, end=asyncio.Event(), loop=asyncio.get_running_loop())
+            ready.set()
+            await place["end"].wait()
+
+    thread = threading.Thread(target=asyncio.run, args=(serve(),))
+    thread.start()
+    assert ready.wait(WAIT)
+    try:
+        yield place["url"]
+    finally:
+        place["loop"].call_soon_threadsafe(place["end"].set)
+        thread.join(WAIT)
+        assert not thread.is_alive()
+
+
+def still(value=7, number=1):
+    page = np.full((7, 5, 3), value, np.uint8)
+    return Moment(page, GRID, vd.PixelFormat.INDEX8, number, "still")
+
+
+class Pushed:
+    """A source that gives what the test hands it, and notes whether it is asked."""
+
+    def __init__(self):
+        self._has = threading.Semaphore(0)
+        self._number = 0
+        self._shown = 0
+        self.asked = threading.Semaphore(0)
+        self.push()
+
+    def push(self):
+        self._number += 1
+        self._has.release()
+
+    def next(self):
+        self.asked.release()
+        while self._shown == self._number:
+            self._has.acquire()
+        self._shown = self._number
+        if self._number < 0:
+            raise TransportClosed("over")
+        return self._shown, still(number=self._shown)
+
+    def forget(self):
+        self._shown = 0
+
+    def check(self):
+        pass
+
+    def close(self):
+        self._number = -1
+        self._has.release()
+
+
+def fetch(url, **headers):
+    request = urllib.request.Request(url, headers=headers)  # noqa: S310 - http, here
+    try:
+        with urllib.request.urlopen(request, timeout=WAIT) as answer:  # noqa: S310
+            return answer.status, answer.headers, answer.read()
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.headers, error.read()
+
+
+def test_what_is_served():
+    with served(StillSource(still())) as url:
+        status, headers, body = fetch(url)
+        assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
+        assert body.startswith(b"<!doctype html>")
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert "unsafe" not in headers["Content-Security-Policy"]
+        status, headers, body = fetch(url + "frame.png")
+        assert (status, body[:4]) == (200, b"\x89PNG")
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert fetch(url + "favicon.ico")[0] == 404
+
+
+def test_only_its_own_names_are_answered():
+    """A name that an attacker lets point here is none of them; a number cannot be."""
+    with served(StillSource(still())) as url:
+        for host in (
+            "evil.example",
+            "evil.example:80",
+            "",
+            "127.0.0.1.evil.example",
+            "[::1",
+            "a b",
+        ):
+            assert fetch(url, Host=host)[0] == 403, host
+        for host in ("127.0.0.1:9", "localhost:8000", "LOCALHOST", "[::1]:5", "192.168.0.7"):
+            assert fetch(url, Host=host)[0] == 200, host
+
+
+def test_pages_of_other_sites_get_no_frames():
+    with served(StillSource(still())) as url:
+        live = url.replace("http", "ws") + "live"
+        for origin in ("http://evil.example", "null", "http://127.0.0.1:1", url.rstrip("/") + "0"):
+            with pytest.raises(InvalidStatus) as refused, connect(live, origin=origin):
+                pass
+            assert refused.value.response.status_code == 403
+        with connect(live, origin=url.rstrip("/")) as browser:
+            assert read_back(browser.recv(WAIT))[0]["number"] == 1
+        with connect(live) as program:
+            assert program.recv(WAIT)
+
+
+def test_two_frames_are_under_way_at_most_and_the_next_is_the_newest():
+    source = Pushed()
+    with served(source) as url, connect(url.replace("http", "ws") + "live") as browser:
+        numbers = [read_back(browser.recv(WAIT))[0]["number"]]
+        source.push()
+        numbers.append(read_back(browser.recv(WAIT))[0]["number"])
+        for _ in range(5):
+            source.push()
+        with pytest.raises(TimeoutError):
+            browser.recv(0.05)
+        browser.send("shown")
+        numbers.append(read_back(browser.recv(WAIT))[0]["number"])
+        assert numbers == [1, 2, 7]
+
+
+def test_a_slow_browser_holds_up_nobody():
+    source = Pushed()
+    with served(source) as url:
+        live = url.replace("http", "ws") + "live"
+        with connect(live) as slow, connect(live) as quick:
+            slow.recv(WAIT)
+            for number in range(1, 20):
+                assert read_back(quick.recv(WAIT))[0]["number"] == number
+                quick.send("shown")
+                source.push()
+
+
+def test_who_says_more_than_it_has_shown_is_sent_away():
+    with served(StillSource(still())) as url:
+        with connect(url.replace("http", "ws") + "live") as browser:
+            browser.recv(WAIT)
+            for _ in range(3):
+                browser.send("shown")
+            with pytest.raises(ConnectionClosed):
+                browser.recv(WAIT)
+        assert fetch(url)[0] == 200
+
+
+def test_nobody_is_asked_while_nobody_looks():
+    source = Pushed()
+    with served(source) as url:
+        fetch(url)
+        assert not source.asked.acquire(timeout=0.05)
+        with connect(url.replace("http", "ws") + "live") as browser:
+            browser.recv(WAIT)
+        assert source.asked.acquire(timeout=WAIT)
+
+
+def test_who_comes_later_sees_nothing_old():
+    """What was on display when somebody last looked may be long gone."""
+    source = Pushed()
+    with served(source) as url:
+        live = url.replace("http", "ws") + "live"
+        for number in (1, 4, 7):
+            with connect(live) as browser:
+                assert read_back(browser.recv(WAIT))[0]["number"] == number
+            assert source.asked.acquire(timeout=WAIT)
+            for _ in range(3):  # the first may still be asked for, the others are not
+                source.push()
+                time.sleep(0.02)
+
+
+def test_the_end_of_a_source_is_the_end_of_the_view():
+    source = Pushed()
+
+    def look(url):
+        with connect(url.replace("http", "ws") + "live") as browser:
+            browser.recv(WAIT)
+            source.close()
+            with pytest.raises(ConnectionClosed):
+                browser.recv(WAIT)
+
+    async def serve():
+        async with open_server(source, "127.0.0.1", 0) as server:
+            looking = asyncio.create_task(asyncio.to_thread(look, server.url))
+            with pytest.raises(TransportClosed, match="over"):
+                await server.ended()
+        await looking
+
+    asyncio.run(asyncio.wait_for(serve(), WAIT))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "8000", "127.0.0.1", "127.0.0.1:x", "127.0.0.1:65536", "::1:5]"]
+)
+def test_a_bad_address(text):
+    with pytest.raises(ValueError, match="write HOST:PORT"):
+        parse_address(text)
+
+
+def test_addresses():
+    assert parse_address("[::1]:80") == ("::1", 80)
+    assert parse_address("localhost:0") == ("localhost", 0)

@@ -1,0 +1,46 @@
+"""The emulator's viewer: a program that ``voxdisplay-sim --view`` starts, and ends.
+
+What it is told and what it says is written in ``firmware_sim/viewer.py``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from voxdisplay.errors import MissingExtra, OpenError, TransportClosed
+from voxdisplay.view.live.address import parse_address
+
+
+def main() -> int:
+    """Show a tap; give 0 when it has ended."""
+    try:
+        from voxdisplay.view.live.run import run  # noqa: PLC0415 - the extra "view"
+        from voxdisplay.view.live.sources import TapSource  # noqa: PLC0415
+    except MissingExtra as error:
+        sys.stderr.write(f"{error}: {error.hint}\n")
+        return 2
+    parser = argparse.ArgumentParser(description="Show an emulator's tap in browsers.")
+    for option in ("--tap", "--listen"):
+        parser.add_argument(option, type=parse_address, metavar="HOST:PORT", required=True)
+    parser.add_argument("--title", default="voxdisplay-sim")
+    options = parser.parse_args()
+    try:
+        (host, port), (at_host, at_port) = options.tap, options.listen
+        run(TapSource(host, port, options.title), at_host, at_port, _announce)
+    except TransportClosed:
+        return 0
+    except (OpenError, OSError) as error:
+        sys.stderr.write(f"the live view cannot start: {error}\n")
+        return 2
+    return 0
+
+
+def _announce(url: str) -> None:
+    sys.stdout.write(json.dumps({"url": url}) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,20 @@
+"""Where a server listens, as people write it."""
+
+from __future__ import annotations
+
+import re
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """Read HOST:PORT, with an IPv6 number in brackets.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+
+    """
+    match = re.fullmatch(r"\[?([^\[\]]+?)\]?:(\d{1,5})", text)
+    if not match or int(match[2]) > 0xFFFF:
+        raise ValueError(f"{text!r} is no address: write HOST:PORT like 127.0.0.1:8000")
+    return match[1], int(match[2])

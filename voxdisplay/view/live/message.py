@@ -1,0 +1,99 @@
+"""What travels to a browser: one picture, as lit voxels and their pixel values.
+
+A message is a u32 (the offset of the data, a multiple of 8), a JSON object filled up with spaces,
+and planes of bytes, all little-endian::
+
+    bitmap       ceil(nx*ny*nz / 8) bytes in scan order, bit 0 first, if ``bitmap`` is true; else
+    x, y, z      three planes with a u8 for each lit voxel, or a u16 if ``wide`` is true
+    pixel        no plane for mono1, one for index8, two for rgb565 (low byte first), three for
+                 rgb888 (red, green, blue)
+
+Lit voxels are in scan order, so that deflate finds them easy. The JSON has ``number``, ``title``,
+``size``, ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap`` and ``wide``.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.view.voxels import lit_voxels
+
+_OFFSET = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a display shows at a moment.
+
+    Attributes
+    ----------
+    page : ndarray
+        As of `Display.read`, indexed [z, y, x].
+    grid : Grid
+    format : PixelFormat
+    number : int
+        Which picture it is, as its source counts them.
+    title : str
+        What is written over it.
+    digest : int or None
+        What the device says of the page (protocol.md, section 8).
+    counters : mapping of str to int
+        What else the source knows, by names for people.
+
+    """
+
+    page: NDArray[np.integer]
+    grid: Grid
+    format: PixelFormat
+    number: int
+    title: str
+    digest: int | None = None
+    counters: Mapping[str, int] = field(default_factory=dict)
+
+
+def encode(moment: Moment) -> bytes:
+    """Write a message."""
+    grid = moment.grid
+    voxels = lit_voxels(moment.page, grid, moment.format).positions
+    wide = max(grid) > 256
+    bitmap = grid.voxels / 8 < voxels.nbytes / (1 if wide else 2)
+    if bitmap:
+        lit = np.zeros(grid.voxels, dtype=bool)
+        lit[grid.index_of(voxels)] = True
+        places = np.packbits(lit, bitorder="little").tobytes()
+    else:
+        places = voxels.T.astype("<u2" if wide else "u1").tobytes()
+    head = json.dumps(
+        {
+            "number": moment.number,
+            "title": moment.title,
+            "size": list(grid),
+            "format": moment.format.value,
+            "voxels": len(voxels),
+            "digest": None if moment.digest is None else f"{moment.digest:08x}",
+            "counters": dict(moment.counters),
+            "bitmap": bitmap,
+            "wide": wide,
+        }
+    ).encode()
+    head += b" " * (-(len(head) + _OFFSET.size) % 8)
+    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(moment, voxels)
+
+
+def _planes(moment: Moment, voxels: NDArray[np.integer]) -> bytes:
+    """Give the pixel values of voxels, byte by byte."""
+    if moment.format is PixelFormat.MONO1:
+        return b""
+    x, y, z = voxels.T
+    values = moment.page[z, y, x].T
+    if moment.format is PixelFormat.RGB565:
+        values = np.stack((values & 0xFF, values >> 8))
+    return bytes(values.astype("u1").tobytes())

@@ -1,0 +1,278 @@
+"""Hands the newest picture to browsers: HTTP for the page, a WebSocket for the frames.
+
+A browser has at most two frames under way; it asks for another by saying that it has painted one.
+So a slow one gets fewer, a hidden one none, and neither is noticed by the others. Only browsers
+that came to this server by its own name are answered: not pages of other sites, and not names
+that an attacker lets point here.
+
+It knows no source but by `Source`, and pictures only as messages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import ipaddress
+import threading
+from collections.abc import AsyncIterator, Hashable
+from http import HTTPStatus
+from urllib.parse import urlsplit
+
+from voxdisplay.errors import MissingExtra
+from voxdisplay.view.live.message import Moment, encode
+from voxdisplay.view.live.page import page, policy
+from voxdisplay.view.live.sources import Source
+from voxdisplay.view.picture import picture
+
+try:
+    from websockets.asyncio.server import Server, ServerConnection, serve
+    from websockets.datastructures import Headers
+    from websockets.exceptions import ConnectionClosed
+    from websockets.http11 import Request, Response
+except ModuleNotFoundError as error:
+    raise MissingExtra(
+        "the live view needs websockets, which is not installed",
+        hint="pip install 'voxdisplay[view]'",
+    ) from error
+
+_UNDER_WAY = 2
+_IDLE_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
+_END_S = 2.0  # how long the source may take to end
+_LONGEST_WORD = 64  # a browser has little to say
+
+
+class _Newest:
+    """The newest picture. Those that it has replaced are forgotten."""
+
+    def __init__(self) -> None:
+        self.serial = 0
+        self.message = b""
+        self.moment: Moment | None = None
+        self.wanted = threading.Event()  # for the source's thread: somebody waits
+        self._key: Hashable = None
+        self._fresh = False  # nothing else can have been on display since
+        self._waiting = 0
+        self._changed = asyncio.Event()
+
+    async def after(self, serial: int) -> int:
+        """Wait for a picture other than one; give its serial."""
+        self._waiting += 1
+        self.wanted.set()
+        try:
+            while self.serial == serial or not self._fresh:
+                await self._changed.wait()
+        finally:
+            self._waiting -= 1
+            if not self._waiting:
+                self.wanted.clear()
+        return self.serial
+
+    def put(self, key: Hashable, moment: Moment, message: bytes) -> None:
+        """Take what is on display now."""
+        self._fresh = True
+        if key != self._key:
+            self._key, self.moment, self.message = key, moment, message
+            self.serial += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    def doubt(self) -> None:
+        """Take note that nobody looks at the display for a while."""
+        self._fresh = False
+
+
+class LiveServer:
+    """Serves one source to any number of browsers. Use it by `open_server`.
+
+    Attributes
+    ----------
+    url : str
+        Where a browser finds it.
+
+    """
+
+    def __init__(self, source: Source, name: str) -> None:
+        self.url = ""
+        self._name = name
+        self._source = source
+        self._newest = _Newest()
+        self._closing = False
+        self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._thread = threading.Thread(
+            target=self._watch, args=(asyncio.get_running_loop(),), name="source", daemon=True
+        )
+
+    async def ended(self) -> None:
+        """Wait until the source has no more pictures, and raise what it raised."""
+        await asyncio.shield(self._ended)
+
+    # -- the source, in its thread
+
+    def _watch(self, loop: asyncio.AbstractEventLoop) -> None:
+        newest, source = self._newest, self._source
+        try:
+            while not self._closing:
+                if not newest.wanted.is_set():
+                    loop.call_soon_threadsafe(newest.doubt)
+                    while not newest.wanted.wait(_IDLE_S):
+                        source.check()
+                    source.forget()
+                key, moment = source.next()
+                loop.call_soon_threadsafe(newest.put, key, moment, encode(moment))
+        except Exception as error:  # noqa: BLE001 - raised again where somebody waits for it
+            if not self._closing:
+                loop.call_soon_threadsafe(self._ended.set_exception, error)
+
+    async def _end_watch(self) -> None:
+        self._closing = True
+        self._newest.wanted.set()
+        self._source.close()
+        await asyncio.to_thread(self._thread.join, _END_S)
+
+    # -- browsers
+
+    async def _answer(self, _: ServerConnection, request: Request) -> Response | None:
+        """Answer an HTTP request; None lets it become a WebSocket."""
+        host = request.headers.get("Host", "")
+        if not _is_ours(host, self._name):
+            return _text(HTTPStatus.FORBIDDEN, f"this is no place called {host!r}\n")
+        match urlsplit(request.path).path:
+            case "/":
+                return _page()
+            case "/frame.png":
+                return await self._picture()
+            case "/live" if not _same_origin(request.headers.get("Origin"), host):
+                return _text(HTTPStatus.FORBIDDEN, "not for pages of other sites\n")
+            case "/live":
+                return None
+        return _text(HTTPStatus.NOT_FOUND, "there are / and /frame.png\n")
+
+    async def _picture(self) -> Response:
+        await self._newest.after(0)
+        moment = self._newest.moment
+        assert moment is not None  # noqa: S101 - there is a first one now
+        return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, moment))
+
+    async def _show(self, browser: ServerConnection) -> None:
+        """Send frames, as the browser has room for them."""
+        room = asyncio.BoundedSemaphore(_UNDER_WAY)
+        sending = asyncio.create_task(self._send(browser, room))
+        try:
+            async for _ in browser:
+                room.release()
+        except (ConnectionClosed, ValueError):  # it went, or says that it has painted what is not
+            pass
+        finally:
+            sending.cancel()
+            with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
+                await sending
+
+    async def _send(self, browser: ServerConnection, room: asyncio.BoundedSemaphore) -> None:
+        serial = 0
+        while True:
+            await room.acquire()
+            serial = await self._newest.after(serial)
+            await browser.send(self._newest.message)
+
+
+@contextlib.asynccontextmanager
+async def open_server(source: Source, host: str, port: int) -> AsyncIterator[LiveServer]:
+    """Serve a source.
+
+    Parameters
+    ----------
+    source : Source
+        It is closed in the end.
+    host, port
+        Where to listen; port 0 is any that is free.
+
+    Raises
+    ------
+    OSError
+        If the address cannot be had.
+
+    """
+    live = LiveServer(source, host)
+    try:
+        async with serve(
+            live._show,  # noqa: SLF001 - of this module
+            host,
+            port,
+            process_request=live._answer,  # noqa: SLF001
+            compression=None,  # it costs more than this machine's own network
+            max_size=_LONGEST_WORD,
+            close_timeout=1,
+        ) as server:
+            live.url = _url(server)
+            live._thread.start()  # noqa: SLF001
+            yield live
+    finally:
+        if live._thread.ident:  # noqa: SLF001
+            await live._end_watch()  # noqa: SLF001
+        else:
+            source.close()
+
+
+def _url(server: Server) -> str:
+    host, port = next(iter(server.sockets)).getsockname()[:2]
+    address = ipaddress.ip_address(host)
+    if address.is_unspecified:
+        host = "127.0.0.1" if address.version == 4 else "::1"
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+
+
+def _is_ours(host: str, known_as: str) -> bool:
+    """Tell whether a browser that asks for a host means this server, which has one name.
+
+    A number is fine: only a name can be made to point here by somebody else. The port is not
+    looked at, so that a tunnel (``ssh -L``) may have another one.
+    """
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return False
+    if name in ("localhost", known_as.lower()):
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _same_origin(origin: str | None, host: str) -> bool:
+    """Tell whether a page that opens a WebSocket came from here; programs send no origin."""
+    return origin is None or origin in (f"http://{host}", f"https://{host}")
+
+
+def _page() -> Response:
+    headers = {
+        "Content-Security-Policy": policy(connect="'self'") + "; frame-ancestors 'none'",
+        "Referrer-Policy": "no-referrer",
+    }
+    return _response(HTTPStatus.OK, "text/html; charset=utf-8", page().encode(), headers)
+
+
+def _text(status: HTTPStatus, text: str) -> Response:
+    return _response(status, "text/plain; charset=utf-8", text.encode())
+
+
+def _response(
+    status: HTTPStatus, kind: str, body: bytes, headers: dict[str, str] | None = None
+) -> Response:
+    common = {
+        "Content-Type": kind,
+        "Content-Length": str(len(body)),
+        "Cache-Control": "no-store",
+        "Connection": "close",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "X-Content-Type-Options": "nosniff",
+    }
+    return Response(status, status.phrase, Headers(common | (headers or {})), body)
+
+
+def _png(moment: Moment) -> bytes:
+    out = io.BytesIO()
+    picture(moment.page, moment.grid, moment.format).save(out, "PNG", compress_level=1)
+    return out.getvalue()

@@ -1,0 +1,245 @@
+"""Where pictures come from: the emulator's tap, a display that can be read back, or one that stays.
+
+A source waits, in a thread that is its own, until the display shows something else; it is asked
+only while somebody looks. Knows no browser.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+import threading
+from collections.abc import Callable, Hashable
+from typing import Protocol
+
+import numpy as np
+
+from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat, Pixels
+from voxdisplay.view.live.message import Moment
+
+_POLL_S = 0.05
+# A display that gives no digest is read as a whole to find out whether it shows something else.
+_BLIND_POLL_S = 0.5
+_CONNECT_S = 5.0
+
+
+class Source(Protocol):
+    """Brings pictures."""
+
+    def next(self) -> tuple[Hashable, Moment]:
+        """Wait for another picture than the last one; give it and what tells it from others.
+
+        Raises
+        ------
+        VoxDisplayError
+            If there will be none any more.
+
+        """
+
+    def forget(self) -> None:
+        """Let the next picture be what is on display now, even if it is the last one again."""
+
+    def check(self) -> None:
+        """Find out, without waiting, whether there can be pictures still.
+
+        Raises
+        ------
+        VoxDisplayError
+            If not.
+
+        """
+
+    def close(self) -> None:
+        """Give back what is held; from another thread, it ends a `next` that waits."""
+
+
+class TapSource:
+    """The emulator's tap; its format stands in the first paragraphs of ``firmware_sim/tap.py``.
+
+    Parameters
+    ----------
+    host, port
+        Where the tap listens.
+    title : str
+        What is written over its pictures.
+
+    Raises
+    ------
+    OpenError
+        If nothing listens there.
+
+    """
+
+    _QUESTION = struct.Struct("<HI")
+    _HEADER = struct.Struct("<4sHHHHHHIIIIII")
+    _MAGIC = b"VXT1"
+    _NOTHING = (0xFFFF, 0xFFFFFFFF)
+    _COUNTED = ("Packets", "Refused", "Damaged", "Overruns")
+
+    def __init__(self, host: str, port: int, title: str) -> None:
+        self._name = f"the emulator's tap at {host}:{port}"
+        self._title = title
+        self._has = self._NOTHING
+        try:
+            self._socket = socket.create_connection((host, port), _CONNECT_S)
+        except OSError as error:
+            raise OpenError(f"{self._name} cannot be reached: {error}", port=self._name) from error
+        self._socket.settimeout(None)
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._has = self._NOTHING
+
+    def next(self) -> tuple[Hashable, Moment]:
+        """See `Source.next`."""
+        try:
+            self._socket.sendall(self._QUESTION.pack(*self._has))
+            header = self._HEADER.unpack(self._receive(self._HEADER.size))
+            magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
+            format_ = PixelFormat.of_wire(number)
+            if magic != self._MAGIC or format_ is None:
+                raise TransportClosed(f"{self._name} speaks another language: {magic!r}")
+            grid = Grid(nx, ny, nz)
+            data = self._receive(grid.voxels * format_.bytes)
+        except OSError as error:
+            raise TransportClosed(f"{self._name} is gone: {error}") from error
+        page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
+        self._has = boot, swaps
+        return self._has, Moment(
+            page.reshape(format_.shape(grid.array_shape)),
+            grid,
+            format_,
+            swaps,
+            self._title,
+            digest,
+            dict(zip(self._COUNTED, counts, strict=True)),
+        )
+
+    def check(self) -> None:
+        """See `Source.check`: a tap says nothing unasked, so that what can be read is its end."""
+        readable, _, _ = select.select([self._socket], [], [], 0)
+        if readable:
+            raise TransportClosed(f"{self._name} is gone")
+
+    def _receive(self, size: int) -> bytearray:
+        data = bytearray(size)
+        view = memoryview(data)
+        while view:
+            got = self._socket.recv_into(view)
+            if not got:
+                raise TransportClosed(f"{self._name} is gone")
+            view = view[got:]
+        return data
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        with contextlib.suppress(OSError):  # it is gone already
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+
+class Readable(Protocol):
+    """A display, as far as it is looked at: see `Display`."""
+
+    port: str
+
+    def digest(self) -> int | None:
+        """Ask what is on display."""
+
+    def read(self) -> Pixels:
+        """Read the front page back."""
+
+
+class DisplaySource:
+    """A display that is open: asked for its digest, and read back when that has changed.
+
+    Parameters
+    ----------
+    display : Readable
+        It is the source's from now on: no other thread may use it.
+    grid : Grid
+    format : PixelFormat
+    counters : callable
+        Gives what the link has counted, by names for people.
+
+    """
+
+    def __init__(
+        self,
+        display: Readable,
+        grid: Grid,
+        format: PixelFormat,  # noqa: A002 - the word of the command line
+        counters: Callable[[], dict[str, int]] = dict,
+    ) -> None:
+        self._display = display
+        self._grid, self._format = grid, format
+        self._counters = counters
+        self._last: Moment | None = None
+        self._told = False  # whether the last picture has been given since it was asked for anew
+        self._closing = threading.Event()
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._told = False
+
+    def next(self) -> tuple[Hashable, Moment]:
+        """See `Source.next`."""
+        while True:
+            digest = self._display.digest()
+            if self._last is None or digest is None or digest != self._last.digest:
+                self._look(digest)
+            if self._last and not self._told:
+                self._told = True
+                return self._last.number, self._last
+            if self._closing.wait(_POLL_S if digest is not None else _BLIND_POLL_S):
+                raise TransportClosed(f"{self._display.port} is closed")
+
+    def _look(self, digest: int | None) -> None:
+        """Read the page back, and note it if it is another."""
+        page, last = self._display.read(), self._last
+        if last and digest is None and np.array_equal(page, last.page):
+            return
+        self._told = False
+        number = last.number + 1 if last else 1
+        self._last = Moment(
+            page, self._grid, self._format, number, self._display.port, digest, self._counters()
+        )
+
+    def check(self) -> None:
+        """See `Source.check`: a display tells only who asks, and is asked for nothing in vain."""
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self._closing.set()
+
+
+class StillSource:
+    """One picture that stays."""
+
+    def __init__(self, moment: Moment) -> None:
+        self._moment = moment
+        self._told = False
+        self._closing = threading.Event()
+
+    def forget(self) -> None:
+        """See `Source.forget`."""
+        self._told = False
+
+    def next(self) -> tuple[Hashable, Moment]:
+        """See `Source.next`."""
+        if self._told:
+            self._closing.wait()
+            raise TransportClosed(f"{self._moment.title} is closed")
+        self._told = True
+        return self._moment.number, self._moment
+
+    def check(self) -> None:
+        """See `Source.check`: it stays."""
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self._closing.set()
