@@ -1,14 +1,17 @@
-"""What payloads draw, by the emulator's decoder; and the simplest possible segmenter."""
+"""What payloads draw, by the emulator's decoder or a plain one; the simplest possible segmenter."""
 
 from __future__ import annotations
 
 import itertools
 
 import numpy as np
+from plain_decoder import Plain
 
+from firmware_sim.config import Config
 from firmware_sim.grid import Grid as DeviceGrid
 from firmware_sim.memory import FORMATS, Page
-from firmware_sim.unpack import unpack
+from firmware_sim.unpack import Unpacker
+from voxdisplay.pixel import PixelFormat
 
 HEADER = bytes(3)
 
@@ -17,8 +20,10 @@ def page_after(payloads, grid, pixel_format):
     """The emulator's page after the payloads, each in a packet of its own."""
     shape, format_ = DeviceGrid(*grid), FORMATS[pixel_format.value]
     page = Page(shape.volume, format_.size)
+    bits = Config(tuple(grid), pixel_format.value).feature_bits
+    unpacker = Unpacker(shape, format_, bits)
     for payload in payloads:
-        unpack(HEADER + payload, shape, format_, page)
+        unpacker.draw(HEADER + payload, page)
     return page
 
 
@@ -63,23 +68,38 @@ def _fewest_cuts(steps, longest):
     return best[-1]
 
 
+def plain(payloads, grid, pixel_format, base=None):
+    """A plain decoder after the payloads, each in a packet of its own, on a page of values."""
+    mono = pixel_format is PixelFormat.MONO1
+    page = None if base is None else [int(value) for value in base]
+    decoder = Plain(grid, pixel_format.bytes, pixel_format.full, mono=mono, page=page)
+    for payload in payloads:
+        decoder.draw(payload)
+    return decoder
+
+
 def chains_in(payload, grid, pixel_format):
     """Ops of a payload of chains, taken apart by hand: (op, octant, steps) each."""
     size = 1 if max(grid) <= 256 else 2
     at, found = 0, []
     while at < len(payload):
         op = payload[at]
+        at += 1
         if op == 0x01:
             found.append(("PEN", None, None))
-            at += 1 + pixel_format.bytes
+            at += pixel_format.bytes
         elif op == 0x02:
-            assert payload[at + 1 + 3 * size] == 0xA0
+            at += 3 * size
+        elif op & 0xE0 == 0x80:
+            while op & 31 == 31 and payload[at] >= 0x80:
+                at += 1
+            at += op & 31 == 31
+        elif op == 0xA0:
             found.append(("LONE", None, 0))
-            at += 2 + 3 * size
         else:
             fresh = op & 0xE0 == 0x40
             assert fresh or op & 0xE0 == 0x20
-            at += 1 + 3 * size * fresh
+            at += 3 * size * fresh
             steps = payload[at] + 1
             found.append(("FROM" if fresh else "STEP", op & 31, steps))
             at += 1 + -(-steps // 4)

@@ -15,7 +15,14 @@ import sys
 from pathlib import Path
 
 TESTS = Path(__file__).parent
-DEPEND = ("voxdisplay.wire", "voxdisplay.pixel", "voxdisplay.link", "firmware_sim", "sides")
+DEPEND = (
+    "voxdisplay.wire",
+    "voxdisplay.pixel",
+    "voxdisplay.link",
+    "firmware_sim",
+    "sides",
+    "drawing",
+)
 
 
 def purge():

@@ -117,6 +117,16 @@ class Rig:
         self._tickets[ticket] = frame
         return ticket
 
+    def present_on(self, base, frame):
+        """Present a frame as its difference from another, which is on display."""
+        most = self.device.config.max_payload
+        self._pages.add(frame.array().tobytes())
+        ticket = self.link.present_on(
+            self.link.on_display, frame.difference(base, most), lambda: frame.payloads(most)
+        )
+        self._tickets[ticket] = frame
+        return ticket
+
     def power_cycle(self):
         self.check()
         self.bench.power_cycle()

@@ -88,6 +88,25 @@ class DeviceSide:
         return sender.send(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:])
 
 
+EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "READ", "DIGEST"}
+ONLY_INDEX8 = {"DIFF", "PALETTE"}
+
+
+def features_of(vector, otherwise=None):
+    """Names of the features of a vector's device, in lower case, as the device's Config has them.
+
+    Without a line ``features``, ``otherwise``; or all that the format allows.
+    """
+    text = dict(vector.lines).get("features")
+    if text is not None:
+        names = set(text.split("|"))
+    elif otherwise is not None:
+        names = otherwise
+    else:
+        names = EVERY_FORMAT | (ONLY_INDEX8 if vector["format"] == "INDEX8" else set())
+    return frozenset(name.lower() for name in names)
+
+
 def flags_of(text, group):
     """Read flags as the document writes them: ``CLEAR|COMMIT``, or ``-``."""
     names = [] if text == "-" else text.split("|")

@@ -2,9 +2,10 @@
 
 ``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
 ``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`); ``view`` what pictures cost (`bench_view`) and how fast
-the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare pipe below
-it (`bench_ports`).
+beside other ways to do it (`bench_curves`); ``link`` what frames cost on the wire beside other
+codings, and how fast they are coded (`bench_link`); ``view`` what pictures cost (`bench_view`) and
+how fast the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare
+pipe below it (`bench_ports`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_link import bench_link
 from bench_live import bench_live
 from bench_ports import bench_ports
 from bench_view import bench_view
@@ -128,7 +130,7 @@ def push_once(data: bytes, display: vd.Display, link: Stopwatch) -> dict[str, fl
     for sequence, item in zip(sequences, items, strict=True):
         frame.draw(sequence, item.color)
     marks.append(time.perf_counter())
-    payloads = frame.payloads(display.info.max_payload_bytes)
+    payloads = frame.payloads(display.info.max_payload_bytes, display.info.features)
     marks.append(time.perf_counter())
     frame.digest()
     marks.append(time.perf_counter())
@@ -223,7 +225,7 @@ def bench_views(repeats: int, *, quick: bool) -> None:
     bench_live(repeats, quick=quick)
 
 
-TABLES = {"curves": bench_curves, "view": bench_views, "ports": bench_ports}
+TABLES = {"curves": bench_curves, "link": bench_link, "view": bench_views, "ports": bench_ports}
 
 
 def main() -> None:
@@ -231,7 +233,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=[*TABLES, "push", "cold"])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--quick", action="store_true", help="curves, view, ports: only a little")
+    parser.add_argument(
+        "--quick", action="store_true", help="curves, link, view, ports: only a little"
+    )
     options = parser.parse_args()
     if table := TABLES.get(options.what):
         table(options.repeats, quick=options.quick)

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from types import TracebackType
 from typing import Literal, Self, TextIO
 
@@ -28,7 +29,17 @@ from voxdisplay.errors import (
     TransportTimeout,
 )
 from voxdisplay.frame import Frame
-from voxdisplay.link import Event, Link, LinkCounters, PageRead, Ready, Refused, Shown, Told
+from voxdisplay.link import (
+    Event,
+    Link,
+    LinkCounters,
+    OnDisplay,
+    PageRead,
+    Ready,
+    Refused,
+    Shown,
+    Told,
+)
 from voxdisplay.pixel import Pixels
 from voxdisplay.probe import new_session, said_before
 from voxdisplay.reconnect import Reconnect
@@ -40,6 +51,9 @@ from voxdisplay.wire.spans import decode_spans
 TIMEOUT_S = 5.0
 _LONGEST_WAIT_S = 0.5
 _LAST_S = 2.0  # for a last dark picture
+# So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
+_NEXT_TO_NOTHING = 64
+_NOTHING: OnDisplay = (0, 0)  # is never on display
 Progress = Callable[[int, int], None]
 
 
@@ -166,12 +180,13 @@ class Display:
         self._transport = self._captured(transport)
         self._reconnect: Reconnect | None = None  # not before the device is known
         self._renewals = 0
-        self._on_display: tuple[list[bytes], int] | None = None  # payloads and digest
+        self._last: Frame | None = None  # that was shown
         self._timeout_s = timeout_s
         self._closed = False
         self._frames = 0
         self._shown: dict[int, int | None] = {}  # ticket -> digest
-        self._unwaited: dict[int, tuple[list[bytes], int]] = {}  # ticket -> payloads and digest
+        self._unwaited: dict[int, Frame] = {}  # ticket -> the frame, as it was
+        self._known: _Known | None = None
         self._pages: list[Page] = []
         self._told: Told | None = None
         self._events: deque[Event] = deque()
@@ -218,8 +233,10 @@ class Display:
         self.port = self._transport.port
         self._renewals += 1
         self._link.renew(time.monotonic())
-        if self._on_display and not self._link.backlog:
-            self._unwaited[self._link.present(self._on_display[0])] = self._on_display
+        if self._last and not self._link.backlog:
+            # Coded when the device is there, and its line known.
+            whole = partial(self._payloads, self._last)
+            self._unwaited[self._link.present_on(_NOTHING, [], whole)] = self._last
 
     def _captured(self, transport: Transport) -> Transport:
         return Capture(transport, self._capture) if self._capture else transport
@@ -251,9 +268,57 @@ class Display:
 
     # -- frames
 
-    def frame(self) -> Frame:
-        """Give a blank frame of the display's grid and format."""
-        return Frame(self.info.grid, self.info.format)
+    def frame(self, *, keep: bool = False, palette: NDArray[np.uint8] | None = None) -> Frame:
+        """Give a frame of the display's grid and format.
+
+        Parameters
+        ----------
+        keep : bool
+            Whether it starts as what is on display; otherwise it is blank. That is the frame
+            that this handle has shown and proved last; or, if there is none, what can be read
+            back from the device. (A palette cannot: then it is the default one.)
+        palette : (256, 3) uint8 array, optional
+            For index8 displays with the feature ``palette``: red, green and blue of each pixel
+            value. Without it, such a display shows all colours exactly, as long as a frame has no
+            more than 255 besides black.
+
+        Raises
+        ------
+        IncompatibleDevice
+            If it is not known what is on display and the device cannot be read, or if there is a
+            palette and the device has its own.
+
+        """
+        if keep:
+            self.flush()
+            frame = self._kept().copy()
+            if palette is not None:
+                raise ValueError("a frame that keeps what is on display keeps its palette, too")
+            return frame
+        own = "palette" in self.info.features
+        if palette is not None and not own:
+            raise IncompatibleDevice(
+                "this display has no palette that could be set",
+                hint="leave the palette out: colours become the nearest of its own",
+            )
+        return Frame(self.info.grid, self.info.format, palette=palette, own_palette=own)
+
+    def _kept(self) -> Frame:
+        """Give what is on display, from memory or from the device."""
+        if self._known and self._known.place == self._link.on_display:
+            return self._known.frame
+        if "read" not in self.info.features:
+            raise IncompatibleDevice(
+                "it is not known what is on display, and this device cannot be read",
+                hint="present a whole frame first: display.frame() without keep",
+            )
+        place = self._link.on_display
+        frame = self.frame()
+        frame.set(self.read())
+        # What else its palette shows, nobody can tell: then it is no base for a difference.
+        if place == self._link.on_display and "palette" not in self.info.features:
+            self._known = _Known(frame.copy(), place)
+        return frame
 
     def present(
         self, frame: Frame, *, wait: bool = True, progress: Progress | None = None
@@ -293,6 +358,11 @@ class Display:
                 f"{self.info.grid} {self.info.format.value}",
                 hint="make frames by display.frame()",
             )
+        if frame.has_own_palette and "palette" not in self.info.features:
+            raise LocalProtocolError(
+                "the frame has a palette of its own, and the display's cannot be set",
+                hint="make frames by display.frame()",
+            )
         if not wait:
             self._present_newest(frame)
             return None
@@ -302,18 +372,19 @@ class Display:
     def _present_and_wait(self, frame: Frame, progress: Progress | None) -> Receipt:
         began_s = time.monotonic()
         before = _Sent.of(self._link)
-        meant = frame.digest()
-        payloads = frame.payloads(self._link.payload_bytes)
-        digest = self._show(payloads, progress)
-        if digest is not None and digest != meant:
-            self._repair(frame, payloads, meant, digest)
-            digest = meant
-        self._on_display = payloads, meant
+        meant = frame.copy()
+        ticket = self._hand_over(meant)
+        digest = self._shown_digest(ticket, progress)
+        if digest is not None and digest != meant.digest():
+            ticket = self._repair(meant, digest)
+            digest = meant.digest()
+        self._last = meant
         self._frames += 1
+        self._know(meant, ticket, digest)
         sent = _Sent.of(self._link)
         return Receipt(
             frame=self._frames,
-            voxels=len(frame.lit()[0]),
+            voxels=len(meant.lit()[0]),
             packets=sent.packets - before.packets,
             wire_bytes=sent.wire_bytes - before.wire_bytes,
             retransmitted=sent.retransmitted - before.retransmitted,
@@ -321,46 +392,74 @@ class Display:
             digest=digest,
         )
 
-    def _show(self, payloads: list[bytes], progress: Progress | None = None) -> int | None:
-        """Send payloads as one frame that starts dark; give the digest when it is on display."""
-        ticket = self._link.present(payloads)
-        total = max(1, len(payloads))
+    def _payloads(self, frame: Frame) -> list[bytes]:
+        return frame.payloads(self._link.payload_bytes, self.info.features)
+
+    def _hand_over(self, frame: Frame) -> int:
+        """Give a frame to the link: whole, or as its difference from what is on display."""
+        known = self._known
+        whole = cache(partial(self._payloads, frame))
+        if known and known.place == self._link.on_display and not self._link.backlog:
+            lit = len(frame.lit()[0])
+            if 2 * len(frame.changed(known.frame)) < lit:
+                most, features = self._link.payload_bytes, self.info.features
+                payloads = frame.difference(known.frame, most, features)
+                size = sum(map(len, payloads))
+                # Where there is next to nothing to be sent, the whole frame need not be coded.
+                if size * _NEXT_TO_NOTHING < lit or size < sum(map(len, whole())):
+                    return self._link.present_on(known.place, payloads, whole)
+        return self._link.present(whole())
+
+    def _shown_digest(self, ticket: int, progress: Progress | None = None) -> int | None:
+        """Wait until a frame is on display; give the device's digest."""
+        total = max(1, self._link.payloads_left)
         while ticket not in self._shown:
             self._turn()
             if progress:
-                progress(total - min(total, self._link.payloads_left), total)
+                total = max(total, self._link.payloads_left)
+                progress(total - self._link.payloads_left, total)
         return self._shown.pop(ticket)
 
-    def _repair(self, frame: Frame, payloads: list[bytes], meant: int, digest: int) -> None:
-        """Find out what the display shows instead, and send the frame once more."""
+    def _know(self, frame: Frame, ticket: int, digest: int | None) -> None:
+        """Note that a frame is on display, if the device has proved it."""
+        place = self._link.counters.sessions, ticket
+        self._known = None if digest is None else _Known(frame, place)
+
+    def _repair(self, frame: Frame, digest: int) -> int:
+        """Find out what the display shows instead, and send the frame again; give its ticket."""
+        self._known = None
+        meant = frame.digest()
         what = f"the display's digest is {digest:08x}, the frame's {meant:08x}"
         if "read" in self.info.features:
             difference = _difference(frame.array(), self.read())
             what += f"; {difference or 'but its memory reads back as it was meant'}"
-        again = self._show(payloads)
+        ticket = self._link.present(self._payloads(frame))
+        again = self._shown_digest(ticket)
         if again != meant:
             raise DesyncError(
                 f"{what}; sent once more, it is {again or 0:08x}",
                 hint="the device does not draw what protocol.md says, or its memory is faulty",
             )
+        return ticket
 
     def _present_newest(self, frame: Frame) -> None:
         for ticket in list(self._unwaited):
             if self._link.withdraw(ticket):
                 del self._unwaited[ticket]
-        payloads = frame.payloads(self._link.payload_bytes)
-        self._unwaited[self._link.present(payloads)] = payloads, frame.digest()
+        meant = frame.copy()
+        self._unwaited[self._hand_over(meant)] = meant
         self.poll()
 
     def _settle(self, ticket: int, digest: int | None) -> None:
         """Note that a frame which nobody waited for is on display, and all before it are over."""
-        again = self._unwaited[ticket] is self._on_display  # after a renewal
-        self._on_display = self._unwaited[ticket]
-        meant = self._on_display[1]
-        self._unwaited = {later: d for later, d in self._unwaited.items() if later > ticket}
+        frame = self._unwaited[ticket]
+        again = frame is self._last  # after a renewal
+        self._last, self._known = frame, None
+        self._unwaited = {later: f for later, f in self._unwaited.items() if later > ticket}
         self._frames += not again
-        if digest is not None and digest != meant:
+        if digest is not None and digest != (meant := frame.digest()):
             raise DesyncError(f"the display's digest is {digest:08x}, the frame's {meant:08x}")
+        self._know(frame, ticket, digest)
 
     def poll(self) -> None:
         """Do what can be done without waiting; for callers of ``present(wait=False)``."""
@@ -377,7 +476,7 @@ class Display:
         """Make the display dark."""
         self._check_open()
         self.flush()
-        return self._present_and_wait(self.frame(), None)
+        return self._present_and_wait(Frame(self.info.grid, self.info.format), None)
 
     # -- asking, and reading back
 
@@ -516,9 +615,10 @@ class Display:
         self._timeout_s = min(self._timeout_s, _LAST_S)
         self._unwaited.clear()
         self._events.clear()
+        self._known = self._last = None
         self._link = Link(new_session(), time.monotonic(), patience_s=self._timeout_s)
         self._greet()
-        self._show([])
+        self._shown_digest(self._link.present([]))
 
     def __enter__(self) -> Self:
         return self
@@ -530,6 +630,14 @@ class Display:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A frame that is on display, as long as what the link says of the place is the same."""
+
+    frame: Frame
+    place: OnDisplay
 
 
 @dataclass(frozen=True, slots=True)
@@ -550,6 +658,8 @@ def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:
             f"the device came back as another: {now.grid} {now.format.value}, "
             f"it was {before.grid} {before.format.value}"
         )
+    if missing := set(before.features) - set(now.features):
+        raise IncompatibleDevice(f"the device came back without {', '.join(sorted(missing))}")
     if now.max_payload_bytes < before.max_payload_bytes:
         raise IncompatibleDevice("the device came back with less room for a packet")
     return now

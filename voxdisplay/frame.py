@@ -1,13 +1,14 @@
 """What is to be shown: a display list in the order of drawing, and its raster.
 
 A frame knows the display's grid and pixel format. It turns curves into voxels and colours into
-pixels, and says what was lost in that. It knows nothing of packets on their way.
+pixels, and says what was lost in that. It knows nothing of packets on their way, and leaves it to
+``wire.choice`` how it is coded.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,22 +20,15 @@ from voxdisplay.color import parse_colors
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
 from voxdisplay.grid import Grid
+from voxdisplay.palette import DEFAULT, Palette
 from voxdisplay.pixel import PixelFormat, Pixels, Values
-from voxdisplay.wire.chains import encode_chains
-from voxdisplay.wire.digest import digest
+from voxdisplay.wire import spec
+from voxdisplay.wire.choice import Content, Items, encode, join_items
+from voxdisplay.wire.colors import color_pieces
+from voxdisplay.wire.digest import digest, palette_digest
 from voxdisplay.wire.ops import Coding
-from voxdisplay.wire.spans import encode_spans
 
 Color: TypeAlias = str | Sequence[str] | NDArray[np.uint8]
-
-
-@dataclass(frozen=True, slots=True)
-class _Drawn:
-    """Voxels of one item, all on the grid, in order, and their pixel values."""
-
-    voxels: NDArray[np.integer]
-    index: NDArray[np.int64]
-    values: Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,23 +54,63 @@ class Drawing:
 class Frame:
     """One complete picture.
 
-    Made by `Display.frame`, or by hand for a display that is not there.
-
     Parameters
     ----------
-    grid : Grid or (nx, ny, nz)
-        Shape of the display.
+    grid : tuple of int
+        (nx, ny, nz) of the display.
     format : PixelFormat or str
-        ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
+        Its pixels: ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
+    palette : (256, 3) uint8 array, optional
+        For index8: red, green and blue of each pixel value. They stay as they are; what is drawn
+        takes the nearest.
+    own_palette : bool
+        For index8, if no `palette` is given: whether colours that the default palette lacks get
+        entries of their own, as far as there are any. Then what is drawn is shown in its exact
+        colours.
+
+    Only displays with the feature ``palette`` show a palette that is not the default one.
 
     """
 
-    def __init__(self, grid: tuple[int, int, int], format: PixelFormat | str = "rgb888") -> None:  # noqa: A002 - the word of the wire and of the command line
+    def __init__(
+        self,
+        grid: tuple[int, int, int],
+        format: PixelFormat | str = "rgb888",  # noqa: A002 - the word of the wire and of the command line
+        *,
+        palette: NDArray[np.uint8] | None = None,
+        own_palette: bool = False,
+    ) -> None:
         self.grid = Grid(*grid)
         self.format = PixelFormat(format)
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
-        self._items: list[_Drawn] = []
+        self._shared = False  # with a copy
+        self._items: list[Items] = []
         self._has_base = False
+        self._lit: tuple[NDArray[np.int64], Values] | None = None
+        if palette is not None and self.format is not PixelFormat.INDEX8:
+            raise ValueError(f"a {self.format.value} display has no palette: leave it out")
+        self._palette: Palette | None = None  # the default one, or none
+        if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
+            self._palette = Palette(palette, grows=palette is None)
+
+    def copy(self) -> Frame:
+        """Give another frame of the same picture; quick, until one of the two is drawn on."""
+        twin = Frame.__new__(Frame)
+        twin.__dict__.update(self.__dict__)
+        twin._items = list(self._items)  # noqa: SLF001 - of its own kind
+        if sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
+            # Most of what was drawn is covered: the picture alone is less to keep.
+            twin._items, twin._has_base = [], True  # noqa: SLF001
+        twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
+        self._shared = twin._shared = True  # noqa: SLF001
+        return twin
+
+    def _change(self) -> None:
+        """Get ready to be changed: the picture of a copy stays as it is."""
+        if self._shared:
+            self._raster = self._raster.copy()
+            self._shared = False
+        self._lit = None
 
     def draw(
         self,
@@ -100,8 +134,9 @@ class Frame:
         """
         if isinstance(what, Curve):
             what = voxelizing.voxelize(what)
-        voxels = what.voxels if isinstance(what, voxelizing.Sequence) else _as_voxels(what)
-        return self._add(voxels, _as_colors(color))
+        if isinstance(what, voxelizing.Sequence):
+            return self._add(what.voxels, _as_colors(color), _corners(what))
+        return self._add(_as_voxels(what), _as_colors(color), _NONE)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves, in order: the same as `draw` on each, but found together."""
@@ -109,20 +144,30 @@ class Frame:
         sequences = voxelizing.voxelize_many(curves)
         return [self.draw(*pair) for pair in zip(sequences, colors, strict=True)]
 
-    def _add(self, voxels: NDArray[np.integer], colors: NDArray[np.uint8]) -> Drawing:
-        rgb = _spread(colors, len(voxels))
-        values = self.format.nearest(rgb)
-        exact = np.array_equal(self.format.rgb(values), rgb)
+    def _add(
+        self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
+    ) -> Drawing:
+        self._change()
+        # One colour is looked up once.
+        rgb = colors if len(colors) == 1 else _spread(colors, len(voxels))
+        found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
+        exact = np.array_equal(self._colors_of(found), rgb)
+        values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
         inside = self.grid.inside(voxels)
-        if not inside.all():
-            voxels, values = voxels[inside], values[inside]
-        index = self.grid.index_of(voxels)
-        self._raster[index] = self.format.pixels(values)
-        self._items.append(_Drawn(voxels, index, values))
+        at_corner = np.zeros(len(voxels), dtype=np.bool_)
+        at_corner[corners] = True
+        owner = np.zeros(len(voxels), dtype=np.int64)
+        # What is outside has an index that means nothing, and leaves with it.
+        item = Items(voxels, self.grid.index_of(voxels), values, owner, at_corner).only(inside)
+        self._raster[item.index] = self.format.pixels(item.values)
+        self._items.append(item)
         return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
 
+    def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
+        return self._palette.rgb(values) if self._palette else self.format.rgb(values)
+
     def set(self, array: NDArray[np.generic]) -> None:
-        """Make the frame an array, whatever was drawn before.
+        """Make the frame an array, whatever was drawn before. The palette stays as it is.
 
         Parameters
         ----------
@@ -138,15 +183,31 @@ class Frame:
         """
         array = np.asarray(array)
         self.format.check(array, self.grid.array_shape)
+        self._change()
         self._raster[...] = array.reshape(self._raster.shape)
         self._items.clear()
         self._has_base = True
+        if self._palette:
+            self._palette.use(np.flatnonzero(np.bincount(self._raster.reshape(-1), minlength=256)))
 
     def clear(self) -> None:
         """Make the frame dark."""
+        self._change()
         self._raster[...] = 0
         self._items.clear()
         self._has_base = False
+
+    @property
+    def palette(self) -> NDArray[np.uint8] | None:
+        """Red, green and blue of each pixel value, (256, 3) uint8: a copy. None if not index8."""
+        if self.format is not PixelFormat.INDEX8:
+            return None
+        return (self._palette.colors if self._palette else DEFAULT).copy()
+
+    @property
+    def has_own_palette(self) -> bool:
+        """Whether the palette is not the default one."""
+        return self._palette is not None and len(self._palette.differs_from(DEFAULT)) > 0
 
     def array(self) -> Pixels:
         """Give the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
@@ -162,23 +223,40 @@ class Frame:
         picture(self.array(), self.grid, self.format).save(file, format="PNG")
         return file.getvalue()
 
+    def rgb(self) -> NDArray[np.uint8]:
+        """Give the colours that are seen, (nz, ny, nx, 3) uint8, whatever the format."""
+        colors = self._colors_of(self.format.values(self._raster))
+        return colors.reshape(*self.grid.array_shape, 3)
+
     def lit(self) -> tuple[NDArray[np.int64], Values]:
         """Give the lit voxels: their scan-order indices, ascending, and their pixel values."""
+        if self._lit is None:
+            self._lit = self._find_lit()
+        return self._lit
+
+    def _find_lit(self) -> tuple[NDArray[np.int64], Values]:
         if self._has_base:
-            values = self.format.values(self._raster)
-            index = np.flatnonzero(values)
-            return index, values[index]
+            lit = self._raster != 0
+            index = np.flatnonzero(lit.any(axis=1) if lit.ndim == 2 else lit)
+            return index, self._values_at(index)
         if not self._items:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
-        index = np.unique(np.concatenate([item.index for item in self._items]))
-        values = self.format.values(self._raster[index])
+        index = np.sort(np.concatenate([item.index for item in self._items]))
+        index = index[np.concatenate((index[:1] >= 0, index[1:] != index[:-1]))]
+        values = self._values_at(index)
         return index[values != 0], values[values != 0]
+
+    def _values_at(self, index: NDArray[np.int64]) -> Values:
+        return self.format.values(self._raster[index])
 
     def digest(self) -> int:
         """Give the digest that a display which shows this frame must report."""
-        return digest(*self.lit())
+        found = digest(*self.lit())
+        if self._palette and len(entries := self._palette.differs_from(DEFAULT)):
+            found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
+        return found & 0xFFFFFFFF
 
-    def payloads(self, max_payload: int) -> list[bytes]:
+    def payloads(self, max_payload: int, features: Collection[str] = ()) -> list[bytes]:
         """Give the ops that draw the frame on a dark page.
 
         No voxel gets two different pixels, so the payloads may arrive in any order.
@@ -187,25 +265,94 @@ class Frame:
         ----------
         max_payload : int
             The longest payload that the device takes.
+        features : collection of str
+            What it announced, as in `DeviceInfo.features`. Nothing else is made use of.
 
         """
-        coding = Coding(self.grid, self.format, max_payload)
-        if self._has_base:
-            return encode_spans(self.format.values(self._raster), coding)
-        # Order does not matter any more: a pen that many items share is set once.
-        items = sorted((item for item in self._items if len(item.values)), key=_first_value)
-        if not items:
-            return []
-        voxels = np.concatenate([item.voxels for item in items])
-        index = np.concatenate([item.index for item in items])
-        values = np.concatenate([item.values for item in items])
-        # The painter's order, settled here: what a later item covers is not sent at all.
-        seen = (self.format.values(self._raster[index]) == values) & (values != 0)
-        return encode_chains(voxels[seen], values[seen], coding)
+        coding = self._coding(max_payload, features)
+        items = self._seen(dark=False)
+        index = _without(self.lit()[0], items) if self._has_base else _NONE
+        return self._encode(items, index, DEFAULT, coding)
+
+    def difference(
+        self, base: Frame, max_payload: int, features: Collection[str] = ()
+    ) -> list[bytes]:
+        """Give the ops that draw the frame on a page which shows another.
+
+        Parameters
+        ----------
+        base : Frame
+            What is shown, of the same grid and format.
+        max_payload, features
+            As of `payloads`.
+
+        """
+        coding = self._coding(max_payload, features)
+        changed = self.changed(base)
+        items = self._seen(dark=True)
+        if items:  # one that has not changed at all is there
+            fresh = np.isin(items.index, changed)
+            items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
+        old = base._palette.colors if base._palette else DEFAULT
+        return self._encode(items, _without(changed, items), old, coding)
+
+    def changed(self, base: Frame) -> NDArray[np.int64]:
+        """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
+        mine, other = self._raster, base._raster
+        if mine is other:
+            return np.empty(0, dtype=np.int64)
+        if not (self._has_base or base._has_base):
+            index = np.union1d(self.lit()[0], base.lit()[0])
+            return np.asarray(index[self._values_at(index) != base._values_at(index)])
+        differs = mine != other
+        return np.flatnonzero(differs.any(axis=1) if differs.ndim == 2 else differs)
+
+    def _coding(self, max_payload: int, features: Collection[str]) -> Coding:
+        bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in set(features))
+        coding = Coding(self.grid, self.format, max_payload, bits)
+        if self.has_own_palette and not coding.has(spec.FEATURE_PALETTE):
+            raise ValueError("this frame has a palette of its own, and the device keeps its own")
+        return coding
+
+    def _seen(self, *, dark: bool) -> Items | None:
+        """Settle the painter's order: what a later item covers is not sent; nor is what is dark."""
+        if not self._items:
+            return None
+        items = join_items(self._items)
+        seen = self._values_at(items.index) == items.values
+        return items.only(seen if dark else seen & (items.values != 0))
+
+    def _encode(
+        self,
+        items: Items | None,
+        index: NDArray[np.int64],
+        old: NDArray[np.uint8],
+        coding: Coding,
+    ) -> list[bytes]:
+        first = None
+        if self._palette and len(entries := self._palette.differs_from(old)):
+            first = color_pieces(entries, self._palette.colors, coding)
+        return encode(Content(items, index, self._values_at), coding, first)
 
 
-def _first_value(item: _Drawn) -> int:
-    return int(item.values[0])
+_NONE = np.empty(0, dtype=np.int64)
+# So many drawn voxels for one that is lit, and a copy forgets how it was drawn.
+_WORN = 4
+
+
+def _corners(sequence: voxelizing.Sequence) -> NDArray[np.int64]:
+    """Give the voxels at which a curve has its corners."""
+    breaks = sequence.curve.breaks
+    if not len(breaks):
+        return _NONE
+    behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
+    before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)
+    return np.unique(behind - before)
+
+
+def _without(index: NDArray[np.int64], items: Items | None) -> NDArray[np.int64]:
+    """Give indices, ascending, without those of items."""
+    return np.setdiff1d(index, items.index) if items else index
 
 
 def _as_voxels(what: ArrayLike) -> NDArray[np.integer]:

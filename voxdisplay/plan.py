@@ -7,6 +7,7 @@ and no device but by what it announces.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -108,7 +109,9 @@ class Plan:
         return min(carried, refresh_hz) if refresh_hz else carried
 
 
-def plan(frame: Frame, max_payload: int = TYPICAL_MAX_PAYLOAD) -> Plan:
+def plan(
+    frame: Frame, max_payload: int = TYPICAL_MAX_PAYLOAD, features: Collection[str] = ()
+) -> Plan:
     """Find what it takes to show a frame.
 
     Parameters
@@ -117,9 +120,11 @@ def plan(frame: Frame, max_payload: int = TYPICAL_MAX_PAYLOAD) -> Plan:
         Of the display's grid and format.
     max_payload : int
         The longest payload that the device takes.
+    features : collection of str
+        What it announces, as in `DeviceInfo.features`.
 
     """
-    payloads = frame.payloads(max_payload) or [b""]
+    payloads = frame.payloads(max_payload, features) or [b""]
     coding = Coding(frame.grid, frame.format, max_payload)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()

@@ -163,6 +163,47 @@ def test_a_frame_on_top_of_what_is_shown():
     assert len(rig.shown) == 2
 
 
+def changed_a_little(rng, frame):
+    """A frame that differs in some voxels; some of them become dark."""
+    other = frame.copy()
+    for color in ("black", "white"):
+        other.draw([[rng.randrange(side) for side in frame.grid] for _ in range(20)], color)
+    return other
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(seeds, devices, st.sampled_from(["", "down", "up", "both", "power"]), st.integers(0, 30))
+def test_differences_on_a_bad_line(seed, device, what, when):
+    """Whatever happens, no page is seen that nobody meant, and in the end it is the last."""
+    rig = rig_of(seed, device)
+    frame = random_frame(rig.rng, device["pixel_format"], rig.rng.choice([0.02, 0.9]))
+    rig.present(frame)
+    rig.run()
+    for _ in range(3):
+        base, frame = frame, changed_a_little(rig.rng, frame)
+        if what in {"down", "both"}:
+            rig.down.faults = faults_of(rig.rng)
+        if what in {"up", "both"}:
+            rig.up.faults = faults_of(rig.rng)
+        ticket = rig.present_on(base, frame)
+        for _ in range(when):
+            rig.step()
+        if what == "power":
+            was_shown = ticket in rig.shown
+            rig.power_cycle()
+            if was_shown:
+                ticket = rig.present_on(frame, frame)
+        rig.down.faults = rig.up.faults = None
+        rig.run()
+        rig.assert_shows(frame)
+        rig.assert_told(ticket)
+    if not what:
+        data = [body for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA]
+        flags = [body[0] & spec.DATA_FLAG_CLEAR for body in data]
+        assert flags == sorted(flags, reverse=True)
+        assert not flags[-1]
+
+
 @pytest.mark.parametrize("features", [frozenset(), frozenset({"read"})])
 def test_a_device_without_digest_gives_none(features):
     rig = Rig(features=features)

@@ -35,3 +35,10 @@ def test_the_table_of_ports_runs():
     )
     for port in ports:
         assert f"\n{port} " in run.stdout
+
+
+def test_the_table_of_the_link_runs():
+    command = [sys.executable, str(BENCH), "link", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "paper R=40 w=4" in run.stdout
+    assert "framing" in run.stdout

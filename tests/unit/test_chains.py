@@ -29,8 +29,10 @@ def test_nothing_is_no_payload():
     assert encode([]) == []
 
 
-def test_one_voxel_is_a_move_and_a_run():
-    assert encode([(1, 2, 0)], grid=Grid(3, 5, 7)) == [bytes.fromhex("02 01 02 00 A0")]
+def test_one_voxel_is_a_skip_or_a_move_and_a_run():
+    assert encode([(1, 2, 0)], grid=Grid(3, 5, 7)) == [bytes.fromhex("86 A0")]
+    far = Grid(256, 256, 256)
+    assert encode([(1, 2, 200)], grid=far) == [bytes.fromhex("02 01 02 C8 A0")]
 
 
 def test_the_vector_of_two_octants():
@@ -111,7 +113,7 @@ def test_a_chain_goes_on_in_the_next_payload_where_it_was():
     assert len(payloads) > 3
     for payload in payloads:
         (first, *others) = chains_in(payload, LONG, PixelFormat.INDEX8)
-        assert first[0] == "FROM"
+        assert first[0] in {"FROM", "STEP"}  # behind a SKIP, if that is shorter
         assert {op[0] for op in others} <= {"STEP"}
 
 

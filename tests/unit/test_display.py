@@ -75,6 +75,10 @@ def random_frame(display, seed=0, density=0.3):
     return frame
 
 
+def payloads_of(display, frame):
+    return frame.payloads(display._link.payload_bytes, display.info.features)
+
+
 def assert_shows(pipe, frame):
     assert pipe.bench.snapshot().pixels == frame.array().tobytes()
 
@@ -94,17 +98,19 @@ def test_present_read_and_clear(opened, format_, refresh):
     display, pipe = opened(pixel_format=format_, refresh=refresh)
     assert display.info.grid == GRID
     assert display.info.format.value == format_
-    assert display.info.features == ("read", "digest")
+    every = {"line", "box", "dots", "oct", "arc", "read", "digest"}
+    every |= {"diff", "palette"} if format_ == "index8" else set()
+    assert set(display.info.features) == every
     for number in (1, 2):
         frame = random_frame(display, number)
-        payload = display._link.payload_bytes
+        payloads = payloads_of(display, frame)
         receipt = display.present(frame)
         assert_shows(pipe, frame)
         assert receipt.frame == number
         assert receipt.digest == frame.digest()
         assert receipt.voxels == len(frame.lit()[0])
-        assert receipt.packets == len(frame.payloads(payload))
-        assert receipt.wire_bytes > sum(map(len, frame.payloads(payload)))
+        assert receipt.packets == len(payloads)
+        assert receipt.wire_bytes > sum(map(len, payloads))
         assert receipt.retransmitted == 0
         back = display.read()
         assert back.dtype == frame.array().dtype
@@ -134,7 +140,7 @@ def test_the_text_of_a_device_cannot_steer_a_terminal(opened):
 def test_progress_is_told(opened):
     display, _ = opened()
     told = []
-    payloads = random_frame(display).payloads(display._link.payload_bytes)
+    payloads = payloads_of(display, random_frame(display))
     display.present(random_frame(display), progress=lambda *place: told.append(place))
     assert told == sorted(told)
     assert told[-1][0] == told[-1][1] == len(payloads)
@@ -205,6 +211,164 @@ def test_a_closed_display(opened):
             use()
 
 
+# -- what is on display already
+
+
+def flags_sent(pipe):
+    """A list that grows by the flags of each DATA packet."""
+    flags, write = [], pipe.write
+
+    def noting(data, timeout_s):
+        for body in document.off_wire(data.replace(b"\0\0", b"\0").lstrip(b"\0")):
+            flags.extend([body[0] & 15] if body[0] >> 4 == spec.TYPE_DATA else [])
+        write(data, timeout_s)
+
+    pipe.write = noting
+    return flags
+
+
+@pytest.mark.parametrize("format_", ["mono1", "index8", "rgb565", "rgb888"])
+def test_a_frame_that_keeps_what_is_on_display(opened, format_):
+    display, pipe = opened(pixel_format=format_)
+    before = random_frame(display)
+    whole = display.present(before)
+    flags = flags_sent(pipe)
+    frame = display.frame(keep=True)
+    assert (frame.array() == before.array()).all()
+    frame.draw([(x, 1, 2) for x in range(17)], "red")
+    frame.draw([(3, 3, 3)], "black")
+    receipt = display.present(frame)
+    assert_shows(pipe, frame)
+    assert receipt.digest == frame.digest()
+    assert receipt.wire_bytes < whole.wire_bytes / 3
+    assert flags == [spec.DATA_FLAG_COMMIT]
+
+
+def test_any_frame_that_differs_little_goes_as_its_difference(opened):
+    display, pipe = opened()
+    frame = random_frame(display)
+    display.present(frame)
+    flags = flags_sent(pipe)
+    array = frame.array()
+    array[2, 3, 4] ^= 255
+    again = display.frame()
+    again.set(array)
+    display.present(again)
+    assert_shows(pipe, again)
+    display.present(again)
+    assert flags == [spec.DATA_FLAG_COMMIT] * 2
+    for wait in (True, False):
+        display.present(random_frame(display, 1 + wait), wait=wait)
+        assert flags.pop() & spec.DATA_FLAG_CLEAR
+
+
+def test_without_waiting_too(opened):
+    display, pipe = opened()
+    frame = random_frame(display)
+    display.present(frame, wait=False)
+    kept = display.frame(keep=True)
+    assert (kept.array() == frame.array()).all()
+    flags = flags_sent(pipe)
+    kept.draw([(3, 3, 3)], "lime")
+    display.present(kept, wait=False)
+    kept.draw([(4, 4, 4)], "lime")  # what was handed over stays as it was
+    display.flush()
+    kept.draw([(4, 4, 4)], "black")
+    assert flags == [spec.DATA_FLAG_COMMIT]
+    assert pipe.bench.snapshot().digest != frame.digest()
+
+
+def test_a_device_that_restarts_is_not_asked_to_keep_anything(opened):
+    display, pipe = opened()
+    display.present(random_frame(display))
+    frame = display.frame(keep=True)
+    frame.draw([(3, 3, 3)], "lime")
+    pipe.bench.power_cycle()
+    display.present(frame)
+    assert_shows(pipe, frame)
+    pipe.bench.power_cycle()
+    display.present(frame, wait=False)
+    display.flush()
+    assert_shows(pipe, frame)
+
+
+def test_what_another_has_shown_is_read_back(opened):
+    first, pipe = opened()
+    shown = random_frame(first)
+    first.present(shown)
+    display, _ = opened(pipe)
+    frame = display.frame(keep=True)
+    assert (frame.array() == shown.array()).all()
+    frame.draw([(3, 3, 3)], "lime")
+    flags = flags_sent(pipe)
+    display.present(frame)
+    assert_shows(pipe, frame)
+    assert flags == [spec.DATA_FLAG_COMMIT]
+
+
+@pytest.mark.parametrize("features", [frozenset(), frozenset({"digest"}), frozenset({"read"})])
+def test_what_is_not_known_is_not_made_up(opened, features):
+    display, pipe = opened(features=features)
+    if "read" not in features:
+        with pytest.raises(vd.IncompatibleDevice, match="not known what is on display") as caught:
+            display.frame(keep=True)
+        assert "whole frame first" in caught.value.hint
+    frame = random_frame(display)
+    display.present(frame)
+    if features:
+        assert (display.frame(keep=True).array() == frame.array()).all()
+    else:
+        with pytest.raises(vd.IncompatibleDevice, match="not known"):
+            display.frame(keep=True)
+    display.present(frame)
+    assert_shows(pipe, frame)
+
+
+def test_a_difference_that_does_not_take_is_mended_by_the_whole(opened):
+    display, pipe = opened()
+    display.present(random_frame(display))
+    pipe.device.memory.front.put(7, b"\x01\x02\x03")  # and nobody has noticed
+    frame = display.frame(keep=True)
+    frame.draw([(3, 3, 3)], "lime")
+    display.present(frame)
+    assert_shows(pipe, frame)
+    assert display.present(frame).digest == frame.digest()
+
+
+def test_a_palette_needs_a_device_that_takes_one(opened):
+    display, _ = opened(pixel_format="index8", features=frozenset({"diff", "digest"}))
+    palette = display.frame().palette
+    with pytest.raises(vd.IncompatibleDevice, match="no palette"):
+        display.frame(palette=palette)
+    display.present(display.frame())
+    palette[1] = 77
+    with pytest.raises(vd.LocalProtocolError, match="palette of its own"):
+        display.present(vd.Frame(GRID, "index8", palette=palette))
+    with pytest.raises(ValueError, match="keeps its palette"):
+        display.frame(keep=True, palette=palette)
+
+
+def test_a_palette_of_its_own(opened):
+    features = frozenset({"palette", "read", "digest"})
+    display, pipe = opened(pixel_format="index8", features=features)
+    frame = display.frame()
+    assert frame.draw([(x, 1, 2) for x in range(17)], ["#123456", "#abcdef"]).exact_color
+    display.present(frame)
+    assert_shows(pipe, frame)
+    flags = flags_sent(pipe)
+    kept = display.frame(keep=True)
+    assert (kept.rgb() == frame.rgb()).all()
+    assert kept.draw([(3, 4, 1)], "#777777").exact_color
+    assert display.present(kept).digest == kept.digest()
+    assert flags == [spec.DATA_FLAG_COMMIT]
+    given = display.frame(palette=kept.palette)
+    given.set(kept.array())
+    display.present(given)
+    other, _ = opened(pipe)
+    assert other.frame(keep=True).draw([(0, 0, 0)], "#010203").exact_color
+    assert other.clear().digest == 0
+
+
 # -- what is not shown as it was meant
 
 
@@ -260,7 +424,7 @@ def test_a_refused_packet_and_then_another(opened):
     display, pipe = opened()
     for _ in range(6):
         frame = random_frame(display)
-        frame.payloads = lambda _longest: [b"\xe0\x00"]
+        frame.payloads = lambda *_device: [b"\xe0\x00"]
         with pytest.raises(vd.DeviceError, match=r"OP \(7\) at byte 3: op E0") as caught:
             display.present(frame)
         assert caught.value.code == spec.CODE_OP
@@ -334,6 +498,7 @@ def test_a_device_that_restarts_gets_its_picture_again(opened):
         ({"grid": (3, 5, 7)}, "another: 3x5x7 rgb888, it was 17x9x5 rgb888"),
         ({"pixel_format": "index8"}, "another: 17x9x5 index8"),
         ({"max_payload": 127}, "less room"),
+        ({"features": frozenset({"read"})}, "came back without .*digest"),
     ],
 )
 def test_a_device_that_comes_back_as_another(opened, config, what):

@@ -505,3 +505,64 @@ def test_a_question_outlives_the_session():
     told(link, dataclasses.replace(INFO, session=hello.session, boot=BOOT + 1), 1.0)
     (status,) = sent(link, 1.0)
     assert isinstance(status, packets.Status)
+
+
+# -- frames as differences
+
+
+def on_display(link, number=0, now=0.0):
+    """Show a frame of one packet, the first of a session; give what stands for it."""
+    ticket = link.present([b"\xa0"])
+    sent(link, now)
+    assert told(link, ack(1, 0, frame=number, flags=1), now) == [Shown(ticket, 0)]
+    return link.on_display
+
+
+def test_a_difference_is_sent_on_what_is_on_display():
+    """6: "without it, as a copy of the front page"."""
+    link = opened()
+    base = on_display(link)
+    ticket = link.present_on(base, [b"\x80\xa0", b"\xa1"], lambda: [b"\xa7"])
+    first, last = sent(link, 0.1)
+    assert [first.ops, last.ops] == [b"\x80\xa0", b"\xa1"]
+    assert [first.flags, last.flags] == [0, spec.DATA_FLAG_COMMIT]
+    assert told(link, ack(3, 2, frame=1, flags=1), 0.2) == [Shown(ticket, 0)]
+    assert link.on_display not in (base, None)
+    link.present_on(link.on_display, [], lambda: [b"\xa7"])
+    (nothing,) = sent(link, 0.3)
+    assert (nothing.ops, nothing.flags) == (b"", spec.DATA_FLAG_COMMIT)
+
+
+@pytest.mark.parametrize("why", ["another", "on its way", "behind another", "no session"])
+def test_a_difference_from_what_is_not_on_display_goes_whole(why):
+    link = opened()
+    base = on_display(link)
+    if why == "another":
+        link.present([b"\xa2"])
+        sent(link, 0.1)
+        told(link, ack(2, 1, frame=1, flags=1), 0.1)
+    elif why == "on its way":
+        link.present([b"\xa2"])
+        sent(link, 0.1)
+    elif why == "behind another":
+        link.present([b"\xa2"])
+    else:
+        link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.1)
+        (hello,) = sent(link, 0.1)
+        told(link, dataclasses.replace(INFO, session=hello.session), 0.1)
+    link.present_on(base, [b"\x80\xa0"], lambda: [b"\xa7"])
+    packet = [packet for packet in sent(link, 0.2) if isinstance(packet, packets.Data)][-1]
+    assert (packet.ops, packet.flags) == (b"\xa7", spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT)
+
+
+def test_a_difference_goes_whole_when_the_session_ends_before_it_is_shown():
+    link = opened()
+    link.present_on(on_display(link), [b"\x80\xa0"], lambda: [b"\xa7", b"\xa8"])
+    (packet,) = sent(link, 0.1)
+    assert packet.ops == b"\x80\xa0"
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.2)
+    (hello,) = sent(link, 0.2)
+    told(link, dataclasses.replace(INFO, session=hello.session), 0.3)
+    again = sent(link, 0.3)
+    assert [packet.ops for packet in again] == [b"\xa7", b"\xa8"]
+    assert {packet.flags & spec.DATA_FLAG_CLEAR for packet in again} == {spec.DATA_FLAG_CLEAR}

@@ -41,7 +41,8 @@ def test_the_ops_are_all_that_is_in_a_payload(grid, format_, density):
     frame = curves(grid, format_) if density is None else memory(grid, format_, density)
     for longest in (64, 1024):
         coding = Coding(frame.grid, frame.format, longest)
-        for payload in frame.payloads(longest):
+        every = {"line", "box", "dots", "oct"} | ({"diff"} if format_ == "index8" else set())
+        for payload in frame.payloads(longest) + frame.payloads(longest, every):
             ops = list(list_ops(payload, coding))
             assert sum(size for _, size in ops) == len(payload)
             assert {name for name, _ in ops} <= set(plan_names())
@@ -58,6 +59,11 @@ def plan_names():
         ("01 34 12 02 01 02 03 A3 81 C2 78 56 BC 9A F0 DE A0",
          [("PEN", 3), ("MOVE", 4), ("RUN", 1), ("SKIP", 1), ("LIT", 7), ("RUN", 1)]),
         ("9F 01 BF 80 01 DF 00", [("SKIP", 2), ("RUN", 3), ("?", 2)]),
+        ("03 01 02 03 04 01 02 03 05 01 01 02 03 01 02 04",
+         [("LINE", 4), ("BOX", 4), ("DOTS", 8)]),
+        ("64 00 00 00 01 01 81 FF 01 60 01 02 03 61 01 02 03 00 E2 11 01",
+         [("OCT", 9), ("OCT", 4), ("OCT", 5), ("DIFF", 3)]),
+        ("06 02 01 0A 0B 0C 0D 0E 0F 58 01 02", [("COLORS", 9), ("ARC", 3)]),
         ("4A 03 3C 07 04 E4 01 31 01 0B", [("FROM", 7), ("STEP", 3)]),
         ("A0 00 00 00", [("RUN", 1), ("END", 3)]),
         ("A0 60 01 02", [("RUN", 1), ("?", 3)]),
@@ -83,7 +89,7 @@ def test_it_is_what_it_then_costs(density):
         frame = display.frame()
         frame = curves(frame.grid, "index8") if density is None else memory(
             frame.grid, "index8", density)  # fmt: skip
-        cost = plan(frame, display.info.max_payload_bytes)
+        cost = plan(frame, display._link.payload_bytes, display.info.features)
         receipt = display.present(frame)
     assert receipt.retransmitted == 0
     assert (cost.packets, cost.wire_bytes) == (receipt.packets, receipt.wire_bytes)

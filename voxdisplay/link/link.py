@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
@@ -30,6 +31,9 @@ MOST_RESTARTS = 8  # without a frame shown
 _MODULUS = 256
 _PACKETS_IN_BUFFER = 4  # so many must fit the device's buffer for the pipe to stay full
 
+OnDisplay: TypeAlias = tuple[int, int]
+"""Which picture is on display: how many sessions there were, and the ticket of its frame or 0."""
+
 
 @dataclass(slots=True)
 class LinkCounters:
@@ -45,11 +49,16 @@ class LinkCounters:
 
 @dataclass(slots=True)
 class _Frame:
-    """A frame that is to be shown: its payloads, and how many are in the window already."""
+    """A frame that is to be shown: its payloads, and how many are in the window already.
+
+    With a ``base`` they are but the difference from what that stands for, and ``whole`` gives all.
+    """
 
     ticket: int
     payloads: list[bytes]
     clear: bool
+    base: OnDisplay | None = None
+    whole: Callable[[], list[bytes]] = list
     frame_id: int = -1
     entered: int = 0
 
@@ -101,6 +110,7 @@ class Link:
         self._requests: deque[_Request] = deque()
         self._tag = 0
         self._tickets = 0
+        self._shown_ticket = 0  # in this session
         self._restarts = 0
         self._hello_due_s = now
         self._hellos = 0  # of this session
@@ -146,6 +156,11 @@ class Link:
         wanted = min(self._loss.best_payload, room - packets.wire_size(spec.LIMIT_OVERHEAD))
         return min(max(wanted, spec.LIMIT_MIN_PAYLOAD), self.info.max_payload)
 
+    @property
+    def on_display(self) -> OnDisplay:
+        """What stands for the picture on display: it changes whenever that may have changed."""
+        return self.counters.sessions, self._shown_ticket
+
     def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
         """Queue a frame; give its ticket, which comes back in `Shown`.
 
@@ -159,6 +174,28 @@ class Link:
         """
         self._tickets += 1
         self._frames.append(_Frame(self._tickets, payloads or [b""], clear))
+        return self._tickets
+
+    def present_on(
+        self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
+    ) -> int:
+        """Queue a frame as its difference from a picture on display; give its ticket.
+
+        Parameters
+        ----------
+        base : OnDisplay
+            The picture.
+        payloads : list of bytes
+            Ops that make the frame of it.
+        whole : callable
+            Gives the payloads that draw the frame from the dark. They are sent if the picture is
+            not on display any more when the frame's turn comes, or something is on its way, or the
+            session ends before the frame is shown.
+
+        """
+        self._tickets += 1
+        frame = _Frame(self._tickets, payloads or [b""], clear=False, base=base, whole=whole)
+        self._frames.append(frame)
         return self._tickets
 
     def withdraw(self, ticket: int) -> bool:
@@ -184,6 +221,7 @@ class Link:
     def _reopen(self, now: float) -> None:
         """Begin a new session; frames that are not shown yet are sent again, whole."""
         self._session = self._session % 0xFFFF + 1
+        self._shown_ticket = 0
         self.info = None
         self._window = Window(0)
         self._next_frame_id = 0
@@ -274,6 +312,8 @@ class Link:
 
     def _new_packets(self, now: float) -> Iterator[bytes]:
         for frame in self._frames:
+            if not frame.begun:
+                self._check_base(frame)
             while not frame.all_entered:
                 size = self._wire_bound(frame)
                 if not self._window.has_room or self._too_much(size) or self._starves(size):
@@ -307,6 +347,12 @@ class Link:
 
     def _wire_bound(self, frame: _Frame) -> int:
         return packets.wire_size(len(frame.payloads[frame.entered]) + spec.LIMIT_OVERHEAD)
+
+    def _check_base(self, frame: _Frame) -> None:
+        """Make a difference the whole frame if it cannot be sent as such."""
+        fits = frame.base == self.on_display and frame is self._frames[0]
+        if frame.base is not None and (not fits or self._window.flights):
+            frame.payloads, frame.clear, frame.base = frame.whole() or [b""], True, None
 
     def _enter(self, frame: _Frame) -> int:
         """Put the next packet of a frame into the window."""
@@ -488,6 +534,7 @@ class Link:
         while True:
             frame = self._frames.popleft()
             if frame.frame_id == ack.shown:
+                self._shown_ticket = frame.ticket
                 yield Shown(frame.ticket, digest)
                 return
 

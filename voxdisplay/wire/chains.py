@@ -1,27 +1,47 @@
-"""Ordered voxels -> FROM, STEP, PEN and MOVE + RUN (protocol.md, section 7.1), vectorised.
+"""Ordered voxels -> STEP and LINE (protocol.md, sections 7.1 and 7.3), vectorised.
 
-A sequence is cut into *segments* whose steps all fit one octant; each costs two bits a step. What
-the voxels mean, and whether they are hidden by others, was settled before.
+A sequence is cut into *segments* whose steps all fit one octant; each costs two bits a step, or
+nothing if it is the very line that LINE draws between its ends. What the voxels mean, and whether
+they are hidden by others, was settled before.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import Bytes, Coding, Ints, fill, little_endian
+from voxdisplay.wire.ops import Bools, Bytes, Coding, Ints, places, ranges
+from voxdisplay.wire.pieces import Layout, Pieces
 
+Steps = NDArray[np.int32]
 _STEPS_PER_BYTE = 4
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Pieces, and the voxels that they draw.
+
+    Attributes
+    ----------
+    pieces : Pieces
+    begin, count : (n,) int64 arrays
+        The first voxel of each, and how many steps follow. A piece that goes on from another
+        begins with the other's last voxel.
+
+    """
+
+    pieces: Pieces
+    begin: Ints
+    count: Ints
 
 
 def encode_chains(
     voxels: NDArray[np.integer], pens: NDArray[np.integer], coding: Coding
 ) -> list[bytes]:
     """Give the payloads that draw voxels, in their order.
-
-    Voxels that follow each other as 26-neighbours with the same pen are chained; others cost a
-    MOVE. Each payload stands for itself: it sets its own pen and says where it begins.
 
     Parameters
     ----------
@@ -37,137 +57,190 @@ def encode_chains(
         At most ``coding.max_payload`` bytes each.
 
     """
-    if len(voxels) == 0:
-        return []
-    places = voxels.astype(np.int64)
-    steps = places[1:] - places[:-1]
-    jump = (np.abs(steps).max(axis=1) != 1) | (np.diff(pens.astype(np.int64)) != 0)
+    return Layout(chain(voxels, pens, coding).pieces, coding).payloads
+
+
+def chain(
+    voxels: NDArray[np.integer],
+    pens: NDArray[np.integer],
+    coding: Coding,
+    corners: Bools | None = None,
+) -> Chains:
+    """Chain voxels that follow each other as 26-neighbours with the same pen.
+
+    Parameters
+    ----------
+    voxels, pens, coding
+        As of `encode_chains`.
+    corners : (n,) bool array, optional
+        Where a straight line may end and another begin.
+
+    """
+    n = len(voxels)
+    spots = np.ascontiguousarray(voxels.T, dtype=np.int32)  # axis first: numpy likes long rows
+    steps = spots[:, 1:] - spots[:, :-1]
+    value = pens.astype(np.int64)
+    jump = np.abs(steps).max(axis=0, initial=0) != 1
+    jump |= value[1:] != value[:-1]
     ends, mains, falls = _octant_runs(steps, jump)
-    # The longest op must fit a payload together with the PEN before it.
-    room = coding.max_payload - coding.pen_bytes - coding.move_bytes - 2
-    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * room)
-    begin, count, fresh = _segments(ends, jump, longest)
+    if corners is not None and coding.has(spec.FEATURE_LINE) and corners.any():
+        ends = _broken(ends, np.flatnonzero(corners))
+    begin, count = _segments(ends, jump, n)
+    lines = _lines(spots, begin, count, coding)
+    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * (coding.room - 2))
+    begin, count, lines = _cut(begin, count, lines, longest)
 
-    at = np.minimum(begin, len(steps) - 1)  # a lone last voxel has no step; its octant is unused
-    mains, falls = (mains[at], falls[at]) if len(steps) else (np.zeros(1, int), np.zeros(1, int))
-    return _assemble(voxels, pens, steps, begin, count, fresh, 8 * mains + falls, coding)
+    at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step; its octant is unused
+    octant = 8 * mains[at] + falls[at] if n > 1 else np.zeros(n, dtype=np.int64)
+    body, size = _bodies(spots, steps, begin, count, octant, lines, coding)
+    index = coding.grid.index_of(voxels)
+    lone = count == 0
+    pen = value[begin]
+    pieces = Pieces(body, size, pen, index[begin], pen, index[begin + count] + lone, ~lone & ~lines)
+    return Chains(pieces, begin, count)
 
 
-def _octant_runs(steps: Ints, jump: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints]:
+def _octant_runs(steps: Steps, jump: Bools) -> tuple[Ints, Ints, Ints]:
     """For each step: the end of the longest segment that begins there, and its octant.
 
     A run of steps fits an octant if some axis moves in all of them and no axis moves both ways.
     Both stay true for any shorter run, so taking the longest each time gives the fewest segments.
     """
-    m = len(steps)
-    none = np.full((m, 3), m)
-    index = np.arange(m)[:, None]
+    m = steps.shape[-1]
+    index = np.arange(m, dtype=np.int32)
 
-    def next_where(condition: NDArray[np.bool_]) -> Ints:
-        found = np.where(condition, index[:, : condition.shape[1]], none[:, : condition.shape[1]])
-        return np.minimum.accumulate(found[::-1])[::-1]
+    def next_where(condition: Bools) -> Steps:
+        found = np.where(condition, index, np.int32(m))
+        return np.minimum.accumulate(found[..., ::-1], axis=-1)[..., ::-1]
 
     still = next_where(steps == 0)
     rise, fall = next_where(steps > 0), next_where(steps < 0)
-    ends = np.minimum(np.maximum(rise, fall).min(axis=1), next_where(jump[:, None])[:, 0])
-    ends = np.minimum(ends, still.max(axis=1))
-    falls = ((fall < ends[:, None]) * np.array([1, 2, 4])).sum(axis=1)
-    return ends, still.argmax(axis=1), falls
+    ends = np.minimum(np.maximum(rise, fall).min(axis=0), next_where(jump))
+    longest = np.maximum(np.maximum(still[0], still[1]), still[2])
+    ends = np.minimum(ends, longest)
+    main = np.where(still[0] == longest, 0, np.where(still[1] == longest, 1, 2))
+    falls = (fall[0] < ends) + 2 * (fall[1] < ends) + 4 * (fall[2] < ends)
+    return ends, main, falls
 
 
-def _segments(
-    ends: Ints, jump: NDArray[np.bool_], longest: int
-) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Follow the runs: first voxel, number of steps and "begins a chain" of each segment."""
+def _broken(ends: Ints, corners: Ints) -> Ints:
+    """End segments also at the next corner behind their first voxel."""
+    behind = np.append(corners, len(ends))[np.searchsorted(corners, np.arange(len(ends)), "right")]
+    return np.asarray(np.minimum(ends, behind))
+
+
+def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
+    """Follow the runs: first voxel and number of steps of each segment; a lone voxel has none."""
     begin: list[int] = []
     count: list[int] = []
-    fresh: list[bool] = []
     end_of, is_jump, m = ends.tolist(), jump.tolist(), len(jump)
     at, new = 0, True
     while at < m:
         if is_jump[at]:
-            if new:  # nothing leads here or away: a lone voxel
+            if new:  # nothing leads here or away
                 begin.append(at)
                 count.append(0)
-                fresh.append(True)
             new = True
             at += 1
             continue
         end = end_of[at]
-        while at < end:
-            piece = min(end - at, longest)
-            begin.append(at)
-            count.append(piece)
-            fresh.append(new)
-            at, new = at + piece, False
-    if new:
+        # The last, partly filled byte of crumbs may be the next segment's business.
+        left = (end - at) % _STEPS_PER_BYTE
+        if left and end < m and not is_jump[end] and end - left > at:
+            behind = end_of[end]
+            rest = (behind - end) % _STEPS_PER_BYTE
+            if rest and rest + left <= _STEPS_PER_BYTE and end_of[end - left] == behind:
+                end -= left
+        begin.append(at)
+        count.append(end - at)
+        at, new = end, False
+    if new and n:
         begin.append(m)
         count.append(0)
-        fresh.append(True)
-    return np.array(begin), np.array(count), np.array(fresh)
+    return np.array(begin, dtype=np.int64), np.array(count, dtype=np.int64)
 
 
-def _crumbs(steps: Ints, begin: Ints, count: Ints, octant: Ints) -> tuple[Bytes, Ints]:
-    """Give the crumb bytes of all segments, one after another, and how many each has."""
+def _lines(spots: Steps, begin: Ints, count: Ints, coding: Coding) -> Bools:
+    """Find the segments that LINE draws in fewer bytes: all their voxels are where it has them."""
+    found = np.zeros(len(begin), dtype=np.bool_)
+    if not coding.has(spec.FEATURE_LINE):
+        return found
+    line_bytes = 1 + coding.move_bytes
+    maybe = np.flatnonzero(2 + -(-count // _STEPS_PER_BYTE) > line_bytes)
+    # Most segments of a curve are already elsewhere in their middle.
+    for part in (2, 4):
+        k = count[maybe] // part
+        maybe = maybe[~_off_line(spots, begin, count, maybe, k)]
+    if len(maybe):
+        owner = np.repeat(maybe, count[maybe])
+        k = ranges(np.zeros(len(maybe), dtype=np.int64), count[maybe])
+        off = _off_line(spots, begin, count, owner, k)
+        starts = np.cumsum(count[maybe]) - count[maybe]
+        found[maybe[~np.logical_or.reduceat(off, starts)]] = True
+    return found
+
+
+def _off_line(spots: Steps, begin: Ints, count: Ints, which: Ints, k: Ints) -> Bools:
+    """Tell where voxel k of a segment is not that of the LINE between its ends."""
+    first, length = begin[which], count[which]
+    off = np.zeros(len(which), dtype=np.bool_)
+    for axis in spots:
+        start = axis[first]
+        way = axis[first + length] - start
+        off |= axis[first + k] != start + (2 * k * way + length) // (2 * length)
+    return off
+
+
+def _cut(begin: Ints, count: Ints, lines: Bools, longest: int) -> tuple[Ints, Ints, Bools]:
+    """Cut segments that no op holds."""
+    parts = np.where(lines, 1, np.maximum(1, -(-count // longest)))
+    if parts.max(initial=0) <= 1:
+        return begin, count, lines
+    owner = np.repeat(np.arange(len(begin)), parts)
+    done = ranges(np.zeros(len(begin), dtype=np.int64), parts) * longest
+    left = count[owner] - done
+    return (
+        begin[owner] + done,
+        np.where(lines[owner], left, np.minimum(left, longest)),
+        lines[owner],
+    )
+
+
+def _bodies(
+    spots: Steps,
+    steps: Steps,
+    begin: Ints,
+    count: Ints,
+    octant: Ints,
+    lines: Bools,
+    coding: Coding,
+) -> tuple[Bytes, Ints]:
+    """Give the ops of all segments, and how many bytes each has."""
+    lone = count == 0
+    stepped = np.flatnonzero(~lone & ~lines)
+    crumbs, crumb_bytes = _crumbs(steps, begin[stepped], count[stepped], octant[stepped])
+    size = np.where(lone, 1, 1 + coding.move_bytes)
+    size[stepped] = 2 + crumb_bytes
+    at = np.cumsum(size) - size
+    body = np.empty(int(size.sum()), dtype=np.uint8)
+    body[at] = np.where(lone, spec.OP_RUN, np.where(lines, spec.OP_LINE, spec.OP_STEP + octant))
+    body[at[stepped] + 1] = count[stepped] - 1
+    body[ranges(at[stepped] + 2, crumb_bytes)] = crumbs
+    ends = places(spots[:, (begin + count)[lines]].T, coding)
+    body[at[lines, None] + 1 + np.arange(coding.move_bytes)] = ends
+    return body, size
+
+
+def _crumbs(steps: Steps, begin: Ints, count: Ints, octant: Ints) -> tuple[Bytes, Ints]:
+    """Give the crumb bytes of segments, one after another, and how many each has."""
     sizes = -(-count // _STEPS_PER_BYTE)
     starts = np.cumsum(sizes) - sizes
     owner = np.repeat(np.arange(len(count)), count)
-    inner = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    moved = steps[begin[owner] + inner] != 0
-    main = octant[owner] // 8
-    rows = np.arange(len(owner))
-    crumb = moved[rows, (main + 1) % 3] | moved[rows, (main + 2) % 3] << 1
+    inner = ranges(np.zeros(len(count), dtype=np.int64), count)
+    moved = steps != 0
+    # By the main axis: which steps move on the next axis, and on the one behind it.
+    crumb_of = np.stack([moved[(main + 1) % 3] | moved[(main + 2) % 3] << 1 for main in range(3)])
+    crumb = crumb_of[octant[owner] // 8, begin[owner] + inner]
     padded = np.zeros((int(sizes.sum()), _STEPS_PER_BYTE), dtype=np.uint8)
     padded.reshape(-1)[starts[owner] * _STEPS_PER_BYTE + inner] = crumb
     return padded @ np.array([1, 4, 16, 64], dtype=np.uint8), sizes
-
-
-def _assemble(
-    voxels: NDArray[np.integer],
-    pens: NDArray[np.integer],
-    steps: Ints,
-    begin: Ints,
-    count: Ints,
-    fresh: NDArray[np.bool_],
-    octant: Ints,
-    coding: Coding,
-) -> list[bytes]:
-    """Lay the segments out in bytes, and cut them into payloads."""
-    crumbs, crumb_size = _crumbs(steps, begin, count, octant)
-    pen = pens[begin].astype(np.int64)
-    new_pen = np.diff(pen, prepend=coding.format.full) != 0
-    lone = count == 0
-
-    def sizes(new_pen: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> Ints:
-        # PEN; op byte; xyz; n - 1 of a chain, or RUN of a lone voxel; crumbs
-        return new_pen * coding.pen_bytes + 2 + fresh * coding.move_bytes + crumb_size
-
-    not_full = pen != coding.format.full
-    first = sizes(not_full, np.ones_like(fresh))
-    payloads = fill(first, sizes(new_pen, fresh), coding.max_payload)
-    heads = np.array([head for head, _ in payloads])
-    new_pen[heads], fresh[heads] = not_full[heads], True
-
-    size = sizes(new_pen, fresh)
-    offset = np.cumsum(size) - size
-    out = np.zeros(int(size.sum()), dtype=np.uint8)
-
-    at = offset[new_pen]
-    out[at] = spec.OP_PEN
-    out[at[:, None] + 1 + np.arange(coding.format.bytes)] = little_endian(
-        pen[new_pen], coding.format.bytes
-    )
-    op = offset + new_pen * coding.pen_bytes
-    out[op] = np.where(lone, spec.OP_MOVE, np.where(fresh, spec.OP_FROM, spec.OP_STEP) + octant)
-    place = little_endian(voxels[begin[fresh]].reshape(-1), coding.coordinate_bytes)
-    out[op[fresh][:, None] + 1 + np.arange(coding.move_bytes)] = place.reshape(
-        -1, coding.move_bytes
-    )
-    behind = op + 1 + fresh * coding.move_bytes
-    out[behind] = np.where(lone, spec.OP_RUN, count - 1)
-    inner = np.arange(len(crumbs)) - np.repeat(np.cumsum(crumb_size) - crumb_size, crumb_size)
-    out[np.repeat(behind + 1, crumb_size) + inner] = crumbs
-
-    data = out.tobytes()
-    bounds = np.append(offset, len(data))
-    return [data[bounds[head] : bounds[end]] for head, end in payloads]

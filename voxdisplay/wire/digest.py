@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
 
+# What sets the value of a colour apart from that of a pixel.
+_COLOR = 0x1000000
+
 
 def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
-    """Give the digest of a page.
+    """Give the digest of a page with the default palette.
 
     Parameters
     ----------
@@ -34,3 +37,20 @@ def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
     h *= np.uint32(spec.DIGEST_MUL_2)
     h ^= h >> np.uint32(spec.DIGEST_SHIFT_3)
     return int(h[lit].sum(dtype=np.uint64)) & 0xFFFFFFFF
+
+
+def palette_digest(voxels: int, entries: NDArray[np.integer], colors: NDArray[np.integer]) -> int:
+    """Give what a palette adds to the digest of its page.
+
+    Parameters
+    ----------
+    voxels : int
+        Voxels of the page.
+    entries : (n,) integer array
+        The entries that are not those of the default palette.
+    colors : (n, 3) integer array
+        Their red, green and blue.
+
+    """
+    red, green, blue = np.asarray(colors, dtype=np.int64).reshape(-1, 3).T
+    return digest(np.asarray(entries) + voxels, _COLOR + red + (green << 8) + (blue << 16))

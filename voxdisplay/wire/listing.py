@@ -76,6 +76,22 @@ def _count(payload: bytes, at: int) -> tuple[int, int]:
     return SHORT_COUNT + 1 + rest, end + 1 - at
 
 
+def _brick(payload: bytes, at: int, coding: Coding) -> int:
+    """Go through the masks of an OCT, level by level."""
+    size = 1 + coding.move_bytes
+    nodes = 1
+    for _ in range(payload[at] & 0x1F):
+        masks = payload[at + size : at + size + nodes]
+        size += nodes
+        nodes = sum(mask.bit_count() for mask in masks)
+    return size
+
+
+def _differences(payload: bytes, at: int, _coding: Coding) -> int:
+    count, size = _count(payload, at)
+    return size + (count + 1) // 2
+
+
 def _counted(payload: bytes, at: int, _coding: Coding) -> int:
     return _count(payload, at)[1]
 
@@ -92,9 +108,20 @@ _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, Coding], int]]]] = {
     "END": (spec.OP_END, 0xFF, _rest),
     "PEN": (spec.OP_PEN, 0xFF, lambda _payload, _at, coding: coding.pen_bytes),
     "MOVE": (spec.OP_MOVE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "LINE": (spec.OP_LINE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "BOX": (spec.OP_BOX, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "DOTS": (
+        spec.OP_DOTS,
+        0xFF,
+        lambda payload, at, coding: 2 + (payload[at + 1] + 1) * coding.move_bytes,
+    ),
+    "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _coding: 3 + 3 * (payload[at + 2] + 1)),
     "STEP": (spec.OP_STEP, 0xE0, _chain),
+    "ARC": (spec.OP_ARC, 0xFF, _rest),
     "FROM": (spec.OP_FROM, 0xE0, _chain),
+    "OCT": (spec.OP_OCT, 0xE0, _brick),
     "SKIP": (spec.OP_SKIP, 0xE0, _counted),
     "RUN": (spec.OP_RUN, 0xE0, _counted),
     "LIT": (spec.OP_LIT, 0xE0, _literal),
+    "DIFF": (spec.OP_DIFF, 0xE0, _differences),
 }

@@ -1,12 +1,12 @@
-"""Pixels in scan order <-> SKIP, RUN, LIT and PEN (protocol.md, section 7.2).
+"""Pixels in scan order <-> SKIP, RUN, LIT, DIFF and PEN (protocol.md, sections 7.2 and 7.5).
 
-The encoder cuts lit pixels into *spans*: RUN where one pixel repeats, LIT elsewhere, and nothing at
-all where it is dark. The decoder reads what a PAGE brings. Neither knows what the pixels show.
+The encoder finds runs of equal pixels, lets `parse` choose how each is drawn, and makes the bytes.
+The decoder reads what a PAGE brings. Neither knows what the pixels show.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +14,26 @@ from numpy.typing import NDArray
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.pixel import PixelFormat, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import SHORT_COUNT, Coding, Ints, count_op
+from voxdisplay.wire.ops import (
+    SHORT_COUNT,
+    Bools,
+    Bytes,
+    Coding,
+    Ints,
+    count_bytes,
+    count_ops,
+    little_endian,
+    ranges,
+)
+from voxdisplay.wire.parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
+from voxdisplay.wire.pieces import ANY, Layout, Pieces, no_pieces
 
-# A dark gap of at most this many pixel bytes inside a LIT is cheaper than SKIP and a new LIT.
-_GAP_BYTES = 2
+Look = Callable[[Ints], NDArray[np.integer]]
+
+# Pixels of a gap that may be cheaper to write again than to skip.
+_NARROW = 64
 # Where the ops of a PAGE begin in its packet.
 _PAGE_OPS = 12
-
-
-@dataclass(frozen=True)
-class _Spans:
-    """Spans of pixels, in order: where they begin, how long they are, and whether they are RUNs."""
-
-    start: Ints
-    length: Ints
-    is_run: NDArray[np.bool_]
 
 
 def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
@@ -46,164 +51,168 @@ def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
         At most ``coding.max_payload`` bytes each; empty if all is dark.
 
     """
-    mono = coding.format is PixelFormat.MONO1
-    spans = _mono_spans(values) if mono else _pixel_spans(values, coding.format.bytes)
-    return _Payloads(values, coding).of(spans)
+    return Layout(span(page_runs(values), coding), coding).payloads
 
 
-def _runs(values: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Give starts and lengths of the runs of equal values."""
-    if len(values) == 0:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    start = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
-    return start, np.diff(start, append=len(values))
+def page_runs(values: NDArray[np.integer]) -> Runs:
+    """Give the runs of a page; what is dark may be skipped."""
+    edges = np.flatnonzero(values[1:] != values[:-1]) + 1
+    start = np.concatenate(([0], edges)) if len(values) else edges
+    length = np.diff(start, append=len(values))
+    value = values[start].astype(np.int64)
+    # What is dark at the beginning and at the end needs no op.
+    lit = slice(int(value[:1].sum() == 0), len(value) - int(value[-1:].sum() == 0))
+    start, length, value = start[lit], length[lit], value[lit]
+    dark = value == 0
+    return Runs(start, length, value, dark, ~dark | (length <= _NARROW))
 
 
-def _pixel_spans(values: NDArray[np.integer], pixel_bytes: int) -> _Spans:
-    """Choose LIT or RUN for each run of equal pixels of a byte or more."""
-    start, length = _runs(values)
-    dark = values[start] == 0
-    # A RUN behind a LIT repeats the LIT's last pixel: one pixel, its own op, and the next LIT's.
-    repeats = ~dark & ((length - 1) * pixel_bytes > 2 + (length > SHORT_COUNT))
-    edge = np.concatenate(([True], dark[:-1] | repeats[:-1]))
-    bridge = dark & (length * pixel_bytes <= _GAP_BYTES) & ~edge
-    bridge[:-1] &= ~(dark | repeats)[1:]
-    if len(bridge):
-        bridge[-1] = False
-    literal = (~dark & ~repeats) | bridge
-    # Runs that a LIT holds follow each other; the first of each group gives the LIT its place.
-    first = literal & ~np.concatenate(([False], literal[:-1]))
-    group = np.cumsum(first)[literal] - 1
-    sizes = np.bincount(group, weights=length[literal]).astype(np.int64)
-    # A repeat right behind a LIT lends it its first pixel, which sets the pen.
-    lends = repeats & np.concatenate(([False], literal[:-1]))
-    if lends.any():
-        sizes[np.cumsum(first)[lends] - 1] += 1
-    begin = np.concatenate((start[first], start[repeats] + lends[repeats]))
-    size = np.concatenate((sizes, length[repeats] - lends[repeats]))
-    is_run = np.repeat([False, True], [len(sizes), int(repeats.sum())])
-    order = np.argsort(begin, kind="stable")
-    return _Spans(begin[order], size[order], is_run[order])
+def set_runs(index: Ints, values: NDArray[np.integer], look: Look) -> Runs:
+    """Give the runs of some voxels, and of the gaps between them, which may be skipped.
+
+    Parameters
+    ----------
+    index : (n,) int64 array
+        Scan-order indices, ascending, each once, n >= 1.
+    values : (n,) integer array
+        Their pixel values.
+    look : Look
+        Gives the pixel values of voxels by their indices, as they are to be in the end.
+
+    """
+    apart = np.diff(index) != 1
+    first = np.flatnonzero(np.concatenate(([True], apart | (values[1:] != values[:-1]))))
+    length = np.diff(first, append=len(index))
+    start, value = index[first], values[first].astype(np.int64)
+    behind = start[:-1] + length[:-1]
+    gap = start[1:] - behind
+    gaps = np.flatnonzero(gap)
+    behind, gap = behind[gaps], gap[gaps]
+    looked_at = np.where(gap <= _NARROW, gap, 1)
+    begins = np.cumsum(looked_at) - looked_at
+    pixels = look(ranges(behind, looked_at)).astype(np.int64)
+    uniform = gap <= _NARROW
+    if len(gap):
+        same = pixels == np.repeat(pixels[begins], looked_at)
+        uniform &= np.logical_and.reduceat(same, begins)
+    order = np.argsort(np.concatenate((start, behind)), kind="stable")
+    return Runs(
+        np.concatenate((start, behind))[order],
+        np.concatenate((length, gap))[order],
+        np.concatenate((value, pixels[begins]))[order],
+        (np.arange(len(order)) >= len(start))[order],
+        np.concatenate((np.ones(len(start), dtype=np.bool_), uniform))[order],
+    )
 
 
-def _mono_spans(values: NDArray[np.integer]) -> _Spans:
-    """Choose RUNs of lit pixels, or LIT over a busy stretch: there a pixel is but a bit."""
-    start, length = _runs(values)
-    lit = values[start] != 0
-    start, length = start[lit], length[lit]
-    if len(start) == 0:
-        return _Spans(start, length, np.zeros(0, dtype=np.bool_))
-    end = start + length
-    gap = start[1:] - end[:-1]
-    # SKIP and RUN cost about 16 bits a lit run; where the runs come closer than that, bits win.
-    near = gap + length[1:] < 16
-    group = np.concatenate(([0], np.cumsum(~near)))
-    runs = np.bincount(group)
-    first = np.flatnonzero(np.concatenate(([True], ~near)))
-    last = np.concatenate((first[1:] - 1, [len(start) - 1]))
-    extent = end[last] - start[first]
-    busy = 3 + -(-extent // 8) < 2 * runs
-    alone = ~busy[group]
-    begin = np.concatenate((start[alone], start[first][busy]))
-    size = np.concatenate((length[alone], extent[busy]))
-    is_run = np.repeat([True, False], [int(alone.sum()), int(busy.sum())])
-    order = np.argsort(begin, kind="stable")
-    return _Spans(begin[order], size[order], is_run[order])
+def least_bytes(index: Ints, coding: Coding) -> int:
+    """Give a lower bound of the bytes for voxels, (n,) ascending, n >= 1, quickly.
+
+    Each gap is skipped, and a new op follows; or it is drawn, and a voxel behind it.
+    """
+    gap = np.diff(index) - 1
+    gap = gap[gap > 0]
+    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
+    if coding.has(spec.FEATURE_DIFF):
+        bits = 4
+    drawn = (gap + 1) * bits // 8
+    skipped = np.minimum(count_bytes(gap), 1 + coding.move_bytes) + 1
+    return 1 + int(np.minimum(skipped, drawn).sum())
 
 
-class _Payloads:
-    """Lays spans out in payloads, each as full as it goes; a LIT is cut where a payload ends."""
+def span(runs: Runs, coding: Coding) -> Pieces:
+    """Give the pieces that draw runs."""
+    ops = WAYS[cheapest(runs, coding)]
+    split = (ops[:, 1] != 0)[:, None]
+    count = np.where(split, np.stack((np.ones_like(runs.length), runs.length - 1), axis=1), 0)
+    count[:, 0] = np.where(split[:, 0], 1, runs.length)
+    start = np.stack((runs.start, runs.start + 1), axis=1)
+    value = np.repeat(runs.value, 2)
+    ops, count, start = ops.reshape(-1), count.reshape(-1), start.reshape(-1)
+    drawn = (count > 0) & (ops != SKIP)
+    if not drawn.any():
+        return no_pieces()
+    return _pieces(ops[drawn], start[drawn], count[drawn], value[drawn], coding)
 
-    def __init__(self, values: NDArray[np.integer], coding: Coding) -> None:
-        self._values = values
-        self._coding = coding
-        self._done: list[bytes] = []
-        self._open = bytearray()
-        self._cursor = 0
-        self._pen = coding.format.full
-        pixels = coding.format.pixels(values)
-        self._pixels = pixels if coding.format is PixelFormat.MONO1 else pixels.tobytes()
 
-    def of(self, spans: _Spans) -> list[bytes]:
-        """Give the payloads of spans."""
-        for start, length, is_run in zip(
-            spans.start.tolist(), spans.length.tolist(), spans.is_run.tolist(), strict=True
-        ):
-            if is_run:
-                self._add_run(start, length)
-            else:
-                self._add_literal(start, length)
-        if self._open:
-            self._close()
-        return self._done
+def _pieces(op: Ints, start: Ints, count: Ints, value: Ints, coding: Coding) -> Pieces:
+    """Make pieces of stretches of equal pixels: those of one LIT, or one DIFF, are joined."""
+    goes_on = np.zeros(len(op), dtype=np.bool_)
+    goes_on[1:] = (op[1:] == op[:-1]) & (op[1:] != RUN) & (start[1:] == (start + count)[:-1])
+    first = np.flatnonzero(~goes_on)
+    pixels = np.add.reduceat(count, first)
+    # All pixels of LIT and DIFF, and what the pen is before each.
+    written = np.where(op == RUN, 1, count)
+    pixel = np.repeat(value, written)
+    pen = np.concatenate(([coding.format.full], pixel[:-1]))
+    at_pixel = (np.cumsum(written) - written)[first]
 
-    def _close(self) -> None:
-        self._done.append(bytes(self._open))
-        self._open.clear()
-        self._cursor = 0
-        self._pen = self._coding.format.full
+    op, start = op[first], start[first]
+    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
+    most_literal = _most(coding.room + coding.pen_bytes, bits)  # it needs no pen
+    most = [most_literal, _most(coding.room, 4)]
+    limit = np.select([op == LIT, op == DIFF], most, 1 << 62)
+    parts = -(-pixels // limit)
+    owner = np.repeat(np.arange(len(op)), parts)
+    done = ranges(np.zeros(len(op), dtype=np.int64), parts) * limit[owner]
+    op, start = op[owner], start[owner] + done
+    pixels = np.minimum(pixels[owner] - done, limit[owner])
+    at_pixel = at_pixel[owner] + done
+    last = pixel[at_pixel + np.where(op == RUN, 1, pixels) - 1]
+    needs = np.where(op == LIT, ANY, np.where(op == RUN, last, pen[at_pixel]))
+    body, size = _bodies(op, pixels, at_pixel, pixel, pen, coding)
+    none = np.zeros(len(op), dtype=np.bool_)
+    return Pieces(body, size, needs, start, last, start + pixels, none)
 
-    def _goto(self, start: int) -> bytes:
-        """Bring the cursor to an index, by SKIP or MOVE, whichever is shorter."""
-        if start == self._cursor:
-            return b""
-        skip = count_op(spec.OP_SKIP, start - self._cursor)
-        if len(skip) <= 1 + self._coding.move_bytes:
-            return skip
-        size = self._coding.coordinate_bytes
-        place = self._coding.grid.voxels_at(np.array([start]))[0].tolist()
-        return bytes((spec.OP_MOVE,)) + b"".join(c.to_bytes(size, "little") for c in place)
 
-    def _add_run(self, start: int, length: int) -> None:
-        op = self._run(start, length)
-        if len(self._open) + len(op) > self._coding.max_payload:
-            self._close()
-            op = self._run(start, length)
-        self._open += op
-        self._cursor = start + length
-        self._pen = int(self._values[start])
+def _most(room: int, bits: int) -> int:
+    """Give the most pixels of so many bits that one op with its count holds in so many bytes."""
+    overhead = 1
+    while True:
+        count = (room - overhead) * 8 // bits
+        if int(count_bytes(np.array(count))) <= overhead:
+            return count
+        overhead += 1
 
-    def _run(self, start: int, length: int) -> bytes:
-        """Give what draws a RUN from where cursor and pen are now."""
-        value = int(self._values[start])
-        op = self._goto(start)
-        if value != self._pen:
-            op += bytes((spec.OP_PEN,)) + value.to_bytes(self._coding.format.bytes, "little")
-        return op + count_op(spec.OP_RUN, length)
 
-    def _add_literal(self, start: int, length: int) -> None:
-        end = start + length
-        while start < end:
-            goto = self._goto(start)
-            room = self._coding.max_payload - len(self._open) - len(goto)
-            count = min(end - start, self._most_pixels(room))
-            if count <= 0:
-                self._close()
-                continue
-            self._open += goto + count_op(spec.OP_LIT, count) + self._pixel_run(start, count)
-            start += count
-            self._cursor = start
-            self._pen = int(self._values[start - 1])
+def _bodies(
+    op: Ints, count: Ints, at_pixel: Ints, pixel: Ints, pen: Ints, coding: Coding
+) -> tuple[Bytes, Ints]:
+    """Give all ops with their operands, and the bytes of each."""
+    ops, op_bytes = count_ops(op, count)
+    size = op_bytes.copy()
+    operands: list[tuple[Bools, Bytes, Ints]] = []
+    if (which := op == LIT).any():
+        picked = pixel[ranges(at_pixel[which], count[which])]
+        operands.append((which, *_literals(picked, count[which], coding)))
+    if (which := op == DIFF).any():
+        places = ranges(at_pixel[which], count[which])
+        nibbles = ((pixel[places] - pen[places]) & 15).astype(np.uint8)
+        operands.append((which, *_packed(nibbles, count[which], 2)))
+    for which, _, bytes_of in operands:
+        size[which] += bytes_of
+    at = np.cumsum(size) - size
+    body = np.empty(int(size.sum()), dtype=np.uint8)
+    body[ranges(at, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
+    for which, data, bytes_of in operands:
+        body[ranges((at + op_bytes)[which], bytes_of)] = data
+    return body, size
 
-    def _most_pixels(self, room: int) -> int:
-        """Pixels of the longest LIT in ``room`` bytes."""
-        overhead = 1
-        while (count := self._pixels_in(room - overhead)) > 0:
-            if len(count_op(spec.OP_LIT, count)) <= overhead:
-                break
-            overhead += 1
-        return count
 
-    def _pixels_in(self, room: int) -> int:
-        if self._coding.format is PixelFormat.MONO1:
-            return 8 * room
-        return room // self._coding.format.bytes
+def _literals(pixel: Ints, count: Ints, coding: Coding) -> tuple[Bytes, Ints]:
+    """Give the pixel runs (section 2.1) of LIT ops."""
+    if coding.format is PixelFormat.MONO1:
+        return _packed(pixel.astype(np.uint8), count, 8)
+    return little_endian(pixel, coding.format.bytes).reshape(-1), count * coding.format.bytes
 
-    def _pixel_run(self, start: int, count: int) -> bytes:
-        if isinstance(self._pixels, bytes):
-            size = self._coding.format.bytes
-            return self._pixels[start * size : (start + count) * size]
-        return np.packbits(self._pixels[start : start + count], bitorder="little").tobytes()
+
+def _packed(parts: Bytes, count: Ints, per_byte: int) -> tuple[Bytes, Ints]:
+    """Pack parts of bytes, the first lowest; each stretch of ``count`` begins a new byte."""
+    size = -(-count // per_byte)
+    padded = np.zeros((int(size.sum()), per_byte), dtype=np.uint8)
+    padded.reshape(-1)[ranges((np.cumsum(size) - size) * per_byte, count)] = parts
+    weights = (1 << np.arange(per_byte) * (8 // per_byte)).astype(np.uint8)
+    return padded @ weights, size
 
 
 def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:

@@ -77,11 +77,35 @@ DATA_FLAG_COMMIT: Final = 4
 OP_END: Final = 0x00
 OP_PEN: Final = 0x01
 OP_MOVE: Final = 0x02
+OP_LINE: Final = 0x03
+OP_BOX: Final = 0x04
+OP_DOTS: Final = 0x05
+OP_COLORS: Final = 0x06
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
+OP_ARC: Final = 0x58
+OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
 OP_RUN: Final = 0xA0
 OP_LIT: Final = 0xC0
+OP_DIFF: Final = 0xE0
+
+# Section 7.7: range-coded chains
+ARC_MORE: Final = 0
+ARC_JUMP: Final = 1
+ARC_INK: Final = 2
+ARC_COUNT: Final = 3
+ARC_LONE: Final = 18
+ARC_TURN: Final = 26
+ARC_MAIN: Final = 42
+ARC_HISTORY: Final = 74
+ARC_RUNS: Final = 138
+ARC_MODELS: Final = 266
+ARC_HALF: Final = 2048
+ARC_ENOUGH: Final = 6
+ARC_BEHIND: Final = 3
+ARC_MAX_K: Final = 15
+ARC_MAX_RUN: Final = 255
 
 # Section 8: the digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1
@@ -138,6 +162,9 @@ LIMIT_MAX_SIDE: Final = 65535
 LIMIT_MAX_VOXELS: Final = 0x7FFFFFFF
 LIMIT_MAX_STEPS: Final = 256
 LIMIT_MAX_OCTANT: Final = 23
+LIMIT_MAX_DOTS: Final = 256
+LIMIT_MAX_LEVEL: Final = 4
+LIMIT_MAX_COLORS: Final = 256
 LIMIT_MAX_STATUS: Final = 4
 LIMIT_MAX_SILENT: Final = 8
 

@@ -1,0 +1,216 @@
+"""What a frame is coded as: what was meant, with what there is, in no more bytes than need be."""
+
+import numpy as np
+import pytest
+from drawing import plain
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import voxdisplay as vd
+from voxdisplay.frame import Frame
+from voxdisplay.grid import Grid
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.wire.bricks import encode_bricks
+from voxdisplay.wire.chains import encode_chains
+from voxdisplay.wire.ops import Coding
+from voxdisplay.wire.spans import encode_spans
+
+GRIDS = [Grid(17, 12, 20), Grid(3, 5, 7), Grid(300, 4, 3), Grid(1, 1, 1)]
+# What a feature adds to the ops that every device has.
+BASE = {"END", "PEN", "MOVE", "STEP", "FROM", "SKIP", "RUN", "LIT"}
+OPS_OF = {"line": "LINE", "box": "BOX", "dots": "DOTS", "oct": "OCT", "diff": "DIFF",
+          "palette": "COLORS", "read": "READ", "digest": "DIGEST"}  # fmt: skip
+COLORS = ["red", "#123456", "black", "white", ["red", "lime", "blue"], ["#101010", "white"]]
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def devices(draw):
+    """A grid, a format, a longest payload, and features that the format allows."""
+    format_ = draw(st.sampled_from(PixelFormat))
+    index8 = format_ is PixelFormat.INDEX8
+    allowed = [name for name in OPS_OF if index8 or name not in {"diff", "palette"}]
+    features = draw(st.sets(st.sampled_from(allowed)))
+    most = draw(st.sampled_from([64, 65, 100, 1024]))
+    return draw(st.sampled_from(GRIDS)), format_, most, frozenset(features)
+
+
+def line(start, end):
+    """The digital straight line of protocol.md, 7.3."""
+    way = end - start
+    length = int(np.abs(way).max())
+    k = np.arange(length + 1)[:, None]
+    return start + (2 * k * way + length) // (2 * max(1, length))
+
+
+def draw_something(rng, frame, times):
+    """Draw what people draw: curves, lines, solids, dots, noise; some of it off the grid."""
+    grid = np.array(frame.grid)
+    for _ in range(times):
+        color = COLORS[rng.integers(len(COLORS))]
+        start = rng.integers(-2, grid + 2)
+        kind = rng.integers(6)
+        if kind == 0:
+            count = rng.integers(1, 200)
+            steps = np.repeat(rng.integers(-1, 2, (20, 3)), rng.integers(1, 20, 20), axis=0)
+            frame.draw(start + np.cumsum(steps, axis=0)[:count], color)
+        elif kind == 1:
+            frame.draw(line(start, rng.integers(-2, grid + 2)), color)
+        elif kind == 2:
+            frame.draw(start + np.argwhere(np.ones(rng.integers(1, 9, 3))), color)
+        elif kind == 3:
+            frame.draw(rng.integers(0, grid, (rng.integers(1, 40), 3)), color)
+        elif kind == 4:
+            frame.clear()
+        else:
+            array = frame.array()
+            smooth = np.cumsum(rng.integers(-1, 2, array.shape), axis=2)
+            array[...] = smooth % 2 if frame.format.value == "mono1" else smooth % 256
+            array[rng.random(array.shape[:3]) < rng.choice([0.5, 0.99])] = 0
+            frame.set(array)
+
+
+def some_frame(rng, device):
+    grid, format_, _, features = device
+    frame = Frame(grid, format_, own_palette="palette" in features)
+    draw_something(rng, frame, rng.integers(0, 4))
+    return frame
+
+
+def assert_draws(payloads, frame, base=None):
+    """Drawn in any order, on what was there, the payloads make the frame; and nothing twice."""
+    *_, most, features = frame.device
+    assert all(0 < len(payload) <= most for payload in payloads)
+    shuffled = [payloads[k] for k in np.random.default_rng(0).permutation(len(payloads))]
+    values = None if base is None else base.format.values(base.array())
+    drawn = plain(shuffled, frame.grid, frame.format, values)
+    assert drawn.page == frame.format.values(frame.array()).tolist()
+    assert not drawn.two_pixels
+    assert set(drawn.ops) <= BASE | {OPS_OF[name] for name in features}
+    palette = Frame(frame.grid, "index8").palette if base is None else base.palette
+    if "palette" in features and palette is not None:
+        for entry, color in drawn.palette.items():
+            palette[entry] = color
+        assert (palette == frame.palette).all()
+    return drawn.ops
+
+
+@settings(max_examples=250, deadline=None, derandomize=True)
+@given(devices(), seeds)
+def test_a_frame_is_drawn_with_what_was_announced(device, seed):
+    """5: "A host MUST NOT send what the device has not announced"."""
+    frame = some_frame(np.random.default_rng(seed), device)
+    frame.device = device
+    assert_draws(frame.payloads(*device[2:]), frame)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(devices(), seeds)
+def test_a_difference_makes_one_frame_of_another(device, seed):
+    rng = np.random.default_rng(seed)
+    base = some_frame(rng, device)
+    frame = base.copy() if rng.random() < 0.7 else some_frame(rng, device)
+    before = base.array()
+    draw_something(rng, frame, rng.integers(0, 3))
+    assert (base.array() == before).all(), "a copy is drawn on for itself"
+    frame.device = device
+    assert_draws(frame.difference(base, *device[2:]), frame, base)
+    changed = frame.changed(base)
+    differs = frame.format.values(frame.array()) != base.format.values(before)
+    assert changed.tolist() == np.flatnonzero(differs).tolist()
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(devices(), seeds)
+def test_no_coder_alone_takes_fewer_bytes(device, seed):
+    grid, format_, most, features = device
+    rng = np.random.default_rng(seed)
+    features = features - {"palette"}
+    frame = some_frame(rng, (grid, format_, most, features))
+    size = sum(map(len, frame.payloads(most, features)))
+    coding = frame._coding(most, features)
+    values = format_.values(frame.array())
+    assert size <= sum(map(len, encode_spans(values, coding)))
+    items = frame._seen(dark=False)
+    if not frame._has_base and items:
+        plain_coding = Coding(grid, format_, most)
+        for each in (coding, plain_coding):
+            chains = encode_chains(items.voxels, items.values, each)
+            assert size <= sum(map(len, chains))
+
+
+@pytest.mark.parametrize("format_", PixelFormat)
+@pytest.mark.parametrize(
+    ("what", "features", "least"),
+    [
+        ("line", {"line"}, {"LINE"}),
+        ("corner", {"line"}, {"LINE"}),
+        ("solid", {"oct", "dots", "box"}, {"BOX"}),
+        ("ball", {"oct", "dots", "box"}, {"OCT"}),
+        ("ball", set(), {"RUN"}),
+        ("dots", {"oct", "dots"}, {"DOTS"}),
+        ("curve", {"line", "oct", "dots", "box"}, {"FROM"}),
+    ],
+)
+def test_what_is_taken_for_what(format_, what, features, least):
+    frame = Frame((40, 33, 50), format_)
+    place = np.argwhere(np.ones((40, 33, 50)))
+    drawn = {
+        "line": line(np.array([1, 2, 3]), np.array([30, 9, 47])),
+        "corner": np.concatenate(
+            (line(np.array([1, 2, 3]), np.array([38, 9, 20])),
+             line(np.array([38, 10, 21]), np.array([39, 30, 48])))
+        ),
+        "solid": place[((place > (4, 3, 2)) & (place < (30, 30, 30))).all(axis=1)],
+        "ball": place[np.linalg.norm(place - (19, 16, 25), axis=1) < 13],
+        "dots": place[::1999],
+        "curve": vd.voxelize(vd.Helix((20, 16, 3), 12, 20, 2)).voxels,
+    }  # fmt: skip
+    frame.draw(drawn[what], "red")
+    frame.device = ((40, 33, 50), format_, 1024, features)
+    ops = assert_draws(frame.payloads(1024, features), frame)
+    assert least <= set(ops)
+
+
+def test_a_polyline_is_cut_where_its_corners_are():
+    """Two lines of one octant, which together are none."""
+    frame = Frame((128, 128, 128), "mono1")
+    frame.draw(vd.Polyline([(0.5, 0.5, 0.5), (60.5, 10.5, 0.5), (70.5, 70.5, 60.5)]))
+    frame.device = (frame.grid, frame.format, 1024, {"line"})
+    ops = assert_draws(frame.payloads(1024, {"line"}), frame)
+    assert ops.count("LINE") >= 1
+
+
+def test_erasing_is_drawing_the_dark():
+    frame = Frame((17, 12, 20), "rgb565")
+    frame.draw(np.argwhere(np.ones((17, 12, 20))), "red")
+    base = frame.copy()
+    frame.draw([(3, 4, 5)], "black")
+    (payload,) = frame.difference(base, 1024)
+    assert len(payload) <= 9
+    assert plain([payload], frame.grid, frame.format, base.format.values(base.array())).page == (
+        frame.format.values(frame.array()).tolist()
+    )
+    assert base.difference(base, 1024) == []
+
+
+def test_bricks_alone_are_not_better_for_a_surface():
+    place = np.argwhere(np.ones((40, 33, 50)))
+    shell = place[np.abs(np.linalg.norm(place - (19, 16, 25), axis=1) - 13) < 0.5]
+    frame = Frame((40, 33, 50), "mono1")
+    frame.draw(shell)
+    features = {"oct", "dots", "line"}
+    size = sum(map(len, frame.payloads(1024, features)))
+    coding = frame._coding(1024, features)
+    index = np.sort(frame.grid.index_of(shell))
+    assert size <= sum(map(len, encode_bricks(index, np.ones(len(index), dtype=int), coding)))
+
+
+@pytest.mark.slow
+@settings(max_examples=3000, deadline=None, derandomize=True)
+@given(devices(), seeds)
+def test_many_more_frames(device, seed):
+    test_a_frame_is_drawn_with_what_was_announced.hypothesis.inner_test(device, seed)
+    test_a_difference_makes_one_frame_of_another.hypothesis.inner_test(device, seed)
+    test_no_coder_alone_takes_fewer_bytes.hypothesis.inner_test(device, seed)

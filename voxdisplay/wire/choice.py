@@ -1,0 +1,236 @@
+"""Which coder draws what in the fewest bytes: counted before anything is sent.
+
+Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as spans in scan order;
+what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
+saves the trouble. A coder that takes long belongs here too: one that is tried only when the link
+is so slow that it pays. Painter's order was settled before: no voxel has two pixels, so pieces may
+come in any order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.wire import bricks, spans
+from voxdisplay.wire.chains import Chains, chain
+from voxdisplay.wire.ops import Bools, Coding, Ints, ranges
+from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
+
+# Of many colours, voxels that mostly have other neighbours in their row make no bricks.
+_MANY_COLORS = 16
+
+
+@dataclass(frozen=True)
+class Items:
+    """Voxels in an order, all on the grid: those of one item, or of several, one after another.
+
+    Attributes
+    ----------
+    voxels : (n, 3) integer array
+        Columns x, y, z.
+    index : (n,) int64 array
+        Their scan-order indices.
+    values : (n,) integer array
+        Their pixel values.
+    owner : (n,) int64 array
+        Number of the item that each belongs to, ascending.
+    corners : (n,) bool array
+        Where a straight line may end and another begin.
+
+    """
+
+    voxels: NDArray[np.integer]
+    index: Ints
+    values: NDArray[np.integer]
+    owner: Ints
+    corners: Bools
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def only(self, kept: Bools) -> Items:
+        """Give some of the voxels."""
+        if kept.all():
+            return self
+        return Items(*(getattr(self, field.name)[kept] for field in fields(self)))
+
+
+def join_items(parts: Sequence[Items]) -> Items:
+    """Give the items of all parts, n >= 1, one part after another, and number them anew."""
+    if len(parts) == 1:
+        return parts[0]
+    voxels, index, values, _, corners = (
+        np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Items)
+    )
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    return Items(voxels, index, values, owner, corners)
+
+
+@dataclass(frozen=True)
+class Content:
+    """All that is to be drawn.
+
+    Attributes
+    ----------
+    items : Items or None
+    index : (n,) int64 array
+        Voxels without an order, besides: scan-order indices, ascending, each once.
+    look : Look
+        Gives the pixel values of voxels as they are to be in the end, by their indices.
+
+    """
+
+    items: Items | None
+    index: Ints
+    look: spans.Look
+
+
+def encode(content: Content, coding: Coding, first: Pieces | None = None) -> list[bytes]:
+    """Give the payloads that draw the content, in whatever order they arrive.
+
+    Parameters
+    ----------
+    content : Content
+    coding : Coding
+    first : Pieces, optional
+        What is to be sent besides.
+
+    Returns
+    -------
+    list of bytes
+        At most ``coding.max_payload`` bytes each, none of them empty.
+
+    """
+    best = _Cheapest(coding, first or no_pieces())
+    items, look = content.items, content.look
+    if items is None or not len(items):
+        if len(content.index):
+            _offer_sets(best, no_pieces(), content.index, look)
+        return best.payloads
+    # A voxel that follows itself would end a chain.
+    items = items.only(np.concatenate(([True], items.index[1:] != items.index[:-1])))
+    chains = chain(items.voxels, items.values, coding, items.corners)
+    if not len(content.index):
+        best.offer(chains.pieces)
+        if (items.values != items.values[0]).any():
+            best.offer(_by_pen(chains.pieces))
+    apart = _cheaper_as_set(chains, items, look, coding)
+    if apart.any() or len(content.index):
+        index = _united(items.index[_voxels_of(chains, apart)], content.index)
+        kept = _by_pen(chains.pieces.take(np.flatnonzero(~apart)))
+        _offer_sets(best, kept, index, look)
+    index = _united(items.index, content.index)
+    if spans.least_bytes(index, coding) < best.total:
+        best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
+    return best.payloads
+
+
+def _united(index: Ints, others: Ints) -> Ints:
+    """Give the indices of both, ascending, each once."""
+    together = np.sort(np.concatenate((index, others)) if len(others) else index)
+    return together[np.concatenate(([True], together[1:] != together[:-1]))]
+
+
+class _Cheapest:
+    """The layout of the fewest bytes among those that were offered."""
+
+    def __init__(self, coding: Coding, first: Pieces) -> None:
+        self.coding = coding
+        self._first = first
+        self._layout: Layout | None = None
+
+    @property
+    def total(self) -> float:
+        """Its bytes; without any, more than there can be."""
+        return self._layout.total if self._layout else np.inf
+
+    @property
+    def payloads(self) -> list[bytes]:
+        """Its payloads."""
+        if self._layout is None:
+            self.offer(no_pieces())
+        return self._layout.payloads if self._layout else []
+
+    def offer(self, *parts: Pieces) -> None:
+        """Take pieces, if they take fewer bytes."""
+        pieces = join([self._first, *parts]) if len(self._first) else join(parts)
+        layout = Layout(pieces, self.coding)
+        if layout.total < self.total:
+            self._layout = layout
+
+
+def _by_pen(pieces: Pieces) -> Pieces:
+    """Order pieces so that a pen is set once; pieces that go on from another stay behind it."""
+    if len(pieces) == 0 or (pieces.pen == pieces.pen[0]).all():
+        return pieces
+    return pieces.take(np.argsort(pieces.pen, kind="stable"))
+
+
+def _voxels_of(chains: Chains, which: Bools) -> Ints:
+    """Give the places of the voxels of some pieces, one piece after another."""
+    return ranges(chains.begin[which], chains.count[which] + 1)
+
+
+def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Coding) -> Bools:
+    """Tell which pieces of chains better go as a set of their voxels: (pieces,).
+
+    An item does if a lower bound does not speak against it, and if all such pieces of its pen
+    together take fewer bytes. A lone voxel always does.
+    """
+    pieces = chains.pieces
+    apart: Bools = chains.count == 0
+    if not bricks.can_code(coding):
+        return apart
+    goes = np.concatenate(([True], pieces.at[1:] != pieces.at_after[:-1]))
+    cost = pieces.size + goes * (coding.move_bytes + ~pieces.is_chain)
+    item = items.owner[chains.begin]
+    as_chain = np.bincount(item, weights=cost)
+    least = bricks.least_bytes(items.index, items.owner, len(as_chain), coding)
+    maybe = (least < as_chain)[item]
+    if not maybe.any():
+        return apart
+    voxels = _united(items.index[_voxels_of(chains, maybe)], items.index[:0])
+    made = bricks.brick(voxels, look(voxels), coding)
+    rank = np.searchsorted(made.values, pieces.pen[maybe])
+    as_chains = np.bincount(rank, weights=cost[maybe], minlength=len(made.values))
+    apart[maybe] |= (made.bytes_of < as_chains)[rank]
+    return apart
+
+
+def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> None:
+    """Offer pieces together with a set of voxels, n >= 1, coded in each way."""
+    coding, values = best.coding, look(index)
+    if bricks.can_code(coding) and not _is_noise(index, values):
+        made = bricks.brick(index, values, coding)
+        best.offer(kept, made.pieces)
+        in_spans = _cheaper_as_spans(index, values, made, coding)
+        if in_spans.any() and not in_spans.all():
+            there = in_spans[np.searchsorted(made.values, values)]
+            brick_pieces = np.searchsorted(made.values, made.pieces.pen)
+            best.offer(
+                kept,
+                made.pieces.take(np.flatnonzero(~in_spans[brick_pieces])),
+                spans.span(spans.set_runs(index[there], values[there], look), coding),
+            )
+    if spans.least_bytes(index, coding) < best.total - int(kept.size.sum()):
+        best.offer(kept, spans.span(spans.set_runs(index, values, look), coding))
+
+
+def _is_noise(index: Ints, values: NDArray[np.integer]) -> bool:
+    """Tell whether bricks cannot be worth trying: many colours, and few voxels like the next."""
+    alike = (np.diff(index) == 1) & (values[1:] == values[:-1])
+    return bool(2 * int(alike.sum()) < len(index)) and len(np.unique(values)) > _MANY_COLORS
+
+
+def _cheaper_as_spans(
+    index: Ints, values: NDArray[np.integer], made: bricks.Bricks, coding: Coding
+) -> Bools:
+    """Guess which pixels take fewer bytes in scan order than as bricks: (pixels,)."""
+    row = np.concatenate(([True], (np.diff(index) != 1) | (values[1:] != values[:-1])))
+    rows = np.bincount(np.searchsorted(made.values, values[row]), minlength=len(made.values))
+    # SKIP with a count of two bytes, and LIT of one pixel.
+    return rows * (3 + coding.format.bytes) < made.bytes_of + coding.pen_bytes
