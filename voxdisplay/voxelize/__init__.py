@@ -1,7 +1,8 @@
 """From curves to voxels: ordered, connected sequences along parametric space curves.
 
 ``voxelize(curve)`` gives a `Sequence`; `measure` judges any list of voxels. This package knows
-curves only by their positions, and neither displays nor colours nor the wire. It needs numpy.
+curves only by their positions, and neither displays nor colours nor the wire. It needs numpy; with
+the extra `fast`, much work is done compiled, and gives the same voxels (`voxdisplay.compiled`).
 
 The package is callable: as ``voxdisplay.voxelize`` it is both the home of these modules and the
 function users type.
