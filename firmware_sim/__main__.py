@@ -89,7 +89,9 @@ def _parser() -> argparse.ArgumentParser:
         help="be found on a TCP port, one connection at a time; port 0 is any that is free",
     )
     parser.add_argument(
-        "--allow-remote", action="store_true", help="let other machines reach the TCP port"
+        "--allow-remote",
+        action="store_true",
+        help="let other machines reach the TCP port, and the page of --view",
     )
     parser.add_argument(
         "--link", metavar="PATH", type=Path, help="keep a symbolic link to the pseudo-terminal"
