@@ -128,7 +128,9 @@ def _parser() -> argparse.ArgumentParser:
         help="with --usbip: the protocol's own interface (the default), or a serial port",
     )
     parser.add_argument(
-        "--allow-remote", action="store_true", help="let other machines reach the port"
+        "--allow-remote",
+        action="store_true",
+        help="let other machines reach the port, and the page of --view",
     )
     parser.add_argument(
         "--link", metavar="PATH", type=Path, help="keep a symbolic link to the pseudo-terminal"

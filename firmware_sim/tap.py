@@ -11,23 +11,17 @@ The tap listens on TCP, on this machine only. The watcher asks, and gets one ans
   as it stands in memory, that is ``nx * ny * nz`` pixels in scan order (protocol.md, section 2.1),
   with a byte for each voxel of MONO1. Pictures in between are left out: only the newest counts.
 
-The header is 40 bytes, its integers unsigned and little-endian:
+The header is 40 bytes, its integers unsigned and little-endian, one behind the other:
 
-====== ==== ==========================================================================
-offset size
-====== ==== ==========================================================================
-0      4    ``VXT1``
-4      2    boot: boot id of the device
-6      2    frame: frame id on display; FFFF if no frame of the open session is
-8      2, 2, 2  nx, ny, nz
-14     2    format: number of the pixel format (protocol.md, section 2.1)
-16     4    swaps since the device started, modulo 2^32
-20     4    digest of the page (protocol.md, section 8)
-24     4    packets taken since the device started, modulo 2^32
-28     4    packets refused
-32     4    damaged segments
-36     4    how many times bytes found no room in the receive ring
-====== ==== ==========================================================================
+- ``VXT1``, 4 bytes
+- u16 boot: boot id of the device
+- u16 frame: frame id on display; FFFF if no frame of the open session is
+- u16 nx, u16 ny, u16 nz
+- u16 format: number of the pixel format (protocol.md, section 2.1)
+- u32 swaps since the device started
+- u32 digest of the page (protocol.md, section 8)
+- u32 packets taken, u32 packets refused, u32 damaged segments, and u32 how many times bytes found
+  no room in the receive ring; all since the device started, modulo 2^32 like the swaps
 
 A watcher that asks again before its answer has come is cut off. Being watched may not slow the
 device down: a page is copied only for a question, and the copying never takes more than about a
