@@ -41,8 +41,8 @@ class Bits:
 
     def _split(self, bound: int) -> int:
         """Return a bit, which is 0 if the code is below a bound."""
+        bit = 0
         if self._code < bound:
-            bit = 0
             self._range = bound
         else:
             bit = 1
@@ -58,24 +58,27 @@ class Bits:
 
     def bit(self, model: int) -> int:
         """Return a bit by one model."""
-        bit = self._split((self._range >> _SHIFT) * 2 * self._chances[model])
-        self._learn(model, bit)
+        chance = self._chances[model]
+        bit = self._split((self._range >> _SHIFT) * 2 * chance)
+        self._learn(model, chance, bit)
         return bit
 
     def mixed(self, one: int, other: int) -> int:
         """Return a bit by two models."""
-        chances = self._chances
-        bit = self._split((self._range >> _SHIFT) * (chances[one] + chances[other]))
-        self._learn(one, bit)
-        self._learn(other, bit)
+        chance, second = self._chances[one], self._chances[other]
+        bit = self._split((self._range >> _SHIFT) * (chance + second))
+        self._learn(one, chance, bit)
+        self._learn(other, second, bit)
         return bit
 
-    def _learn(self, model: int, bit: int) -> None:
+    def _learn(self, model: int, chance: int, bit: int) -> None:
         seen = self._seen[model]
-        chance = self._chances[model]
         shift = 1 + (seen >> 1)
-        self._chances[model] += -(chance >> shift) if bit else (_ONE - chance) >> shift
-        self._seen[model] = min(seen + 1, spec.ARC_ENOUGH)
+        self._chances[model] = (
+            chance - (chance >> shift) if bit else chance + (_ONE - chance >> shift)
+        )
+        if seen < spec.ARC_ENOUGH:
+            self._seen[model] = seen + 1
 
     def plain(self, count: int) -> int:
         """Return a number of so many bits without models, the highest first."""

@@ -8,6 +8,7 @@ depends on the times that it is given, and on no clock.
 import math
 import random
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from enum import Enum, auto
 from typing import Final, NamedTuple, Protocol
@@ -100,7 +101,7 @@ class Once:
         return hits
 
 
-class Fault:
+class Fault(ABC):
     """One kind of fault, on one direction of a line.
 
     Parameters
@@ -119,9 +120,10 @@ class Fault:
         self._rng = rng
         self.connect()
 
-    def connect(self) -> None:
+    def connect(self) -> None:  # noqa: B027 - most remember nothing
         """Begin a connection: nothing of the one before is on its way."""
 
+    @abstractmethod
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield what becomes of the next bytes of the stream.
 
@@ -132,7 +134,6 @@ class Fault:
         data
             The bytes.
         """
-        raise NotImplementedError
 
 
 class Flip(Fault):

@@ -118,7 +118,7 @@ class InProcessPort:
             self._check_open()
             while not self._wire.takes():
                 if not self._wait(deadline):
-                    raise TimeoutError("the line stands still: none of these bytes were taken")
+                    raise TimeoutError("the line is full: none of these bytes were taken")
                 self._check_open()
             self._wire.receive(bytes(data))
             self._changed.notify_all()

@@ -60,7 +60,7 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
                 if wire.takes():
                     readers.append(line)
             writers = [line] if out else []
-            readable, writable, _ = select.select(readers, writers, [], wire.until_tick())
+            readable, writable, _ = select.select(readers, writers, [], _pause(wire, out))
             if stop in readable:
                 return True
             if writable:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_sim import spec
+from firmware_sim.bits import Bits
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, Page
@@ -202,21 +203,33 @@ def test_what_a_host_codes_is_drawn(name: str, sides: tuple[int, int, int]) -> N
         pen = 1 if name == "mono1" else rng.randrange(256 ** FORMATS[name].size)
         before = b"\1" + pen.to_bytes(FORMATS[name].size, "little")
         ops = before + b"\x58" + code(pieces, sides, name)
-        assert unpack(ops, sides, name).pixels == drawn(pieces, sides, name, pen)
+        page = unpack(ops, sides, name)
+        expected = Page(page.volume, page.pixel_size)
+        expected.put(0, drawn(pieces, sides, name, pen))
+        assert (page.pixels, page.digest) == (expected.pixels, expected.digest)
         with pytest.raises(Refusal) as refusal:
             unpack(ops + b"\0", sides, name)
         assert (refusal.value.code, refusal.value.offset) == (PADDING, 3 + len(before))
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 254, 255, 256, 257, 16_383, 32_766, 32_767, 65_534])
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 254, 255, 257, 32_767])
 def test_numbers_of_every_length(count: int) -> None:
-    """From 0 to 65534; a run is remembered as 255 at most."""
+    """A run is remembered as 255 at most."""
     sides = (300, 2, 1)
     steps = [(1, 0, 0)] * min(count, 299)
     steps += [(0, 1 if k % 2 == 0 else -1, 0) for k in range(count - len(steps))]
     pieces = [Piece(steps, (0, 0, 0)), Piece([], None, 1), Piece([], (299, 1, 0))]
     ops = b"\x58" + code(pieces, sides, "mono1")
     assert unpack(ops, sides, "mono1").pixels == drawn(pieces, sides, "mono1", 1)
+
+
+def test_the_longest_number() -> None:
+    coder = Coder()
+    for value in (65_534, 0, 32_766, 32_767, 1):
+        coder.number(value)
+    bits = Bits(coder.end(), AssertionError)
+    assert [bits.number() for _ in range(5)] == [65_534, 0, 32_766, 32_767, 1]
+    assert bits.done
 
 
 def test_long_runs_are_remembered_as_255() -> None:
@@ -239,7 +252,7 @@ def test_what_is_cut_off_is_refused() -> None:
     seen = set()
     for _ in range(10):
         ops = code(curve(rng, sides, "rgb565"), sides, "rgb565")
-        for size in range(max(0, len(ops) - 40), len(ops)):
+        for size in range(max(0, len(ops) - 20), len(ops)):
             with pytest.raises(Refusal) as refusal:
                 unpack(b"\x58" + ops[:size], sides, "rgb565")
             assert refusal.value.offset == 3

@@ -7,7 +7,20 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simwire import ACK, BOOT, CLEAR, COMMIT, INFO, PENDING, SHOWN, answers, data, hello, status
+from simwire import (
+    ACK,
+    ASKED,
+    BOOT,
+    CLEAR,
+    COMMIT,
+    INFO,
+    PENDING,
+    SHOWN,
+    answers,
+    data,
+    hello,
+    status,
+)
 
 from firmware_sim.config import Config
 from firmware_sim.device import Device
@@ -251,6 +264,12 @@ def test_packets_are_late_and_keep_their_order() -> None:
     assert history(line) == [(10.5, b"abc\0"), (10.75, b"d"), (12, b"e\0")]
 
 
+def test_what_happens_keeps_its_place_between_late_bytes() -> None:
+    line = Line(parse_faults("reboot@3,delay=5@1"), 1, "down")
+    line.send(0, b"abcd")
+    assert history(line) == [(5, b"abc"), (5, Event.REBOOT), (5, b"d")]
+
+
 def test_short_pieces_come_one_by_one() -> None:
     line = Line(parse_faults("short=0.2"), 1, "down")
     line.send(0, STREAM)
@@ -351,20 +370,16 @@ def test_short_reads() -> None:
 def test_what_is_late_comes_in_the_order_of_its_time() -> None:
     """A tick between two packets that are held back swaps between them, whenever one looks."""
     wire, clock = wire_of("down.delay=0.25@1")
-    for number in range(3):
+    for number, packet in enumerate((hello(), data(0, 0, DOT, CLEAR | COMMIT), status(9))):
         clock.now = 1000 + 0.1 * number
-        wire.receive(hello() if not number else data(number - 1, number - 1, DOT, CLEAR | COMMIT))
+        wire.receive(packet)
     assert wire.transmit() == b""
     assert wire.until_tick() == pytest.approx(0.05)
     clock.now = 1009
     told = answers(wire.transmit())
-    assert [a.kind for a in told] == [INFO, ACK, ACK, ACK, ACK]
-    assert [(a.frame, a.flags) for a in told[1:]] == [
-        (0, PENDING),  # at 0.35
-        (0, SHOWN),  # at 0.4
-        (0, SHOWN | PENDING),  # at 0.45
-        (1, SHOWN),  # at 0.5
-    ]
+    assert [a.kind for a in told] == [INFO, ACK, ACK, ACK]
+    # At 0.35 the frame, at 0.4 the tick, at 0.45 the question.
+    assert [a.flags for a in told[1:]] == [PENDING, SHOWN, SHOWN | ASKED]
 
 
 def test_answers_may_be_late() -> None:

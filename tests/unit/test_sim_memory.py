@@ -148,7 +148,10 @@ def test_pages_are_cleared_copied_and_exchanged() -> None:
     memory.begin(dark=False)
     assert memory.back.palette == memory.front.palette != DEFAULT_PALETTE
     assert memory.back.digest == memory.front.digest
-    memory.begin(dark=True)
+    for dark in (False, True):  # of a frame that is given up nothing stays
+        memory.back.put(9, b"\x33\x44")
+        memory.begin(dark=dark)
+        assert memory.back.digest == (0 if dark else memory.front.digest)
     assert not any(memory.back.pixels)
     assert memory.back.palette == DEFAULT_PALETTE
     assert memory.back.digest == 0
