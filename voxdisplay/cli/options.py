@@ -6,14 +6,16 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, TextIO, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias, TypeVar
 
 import click
-from click.shell_completion import CompletionItem
 
 import voxdisplay as vd
 from voxdisplay.baud import RATES
 from voxdisplay.transport.discovery import all_ports
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 _C = TypeVar("_C", bound=Callable[..., Any])
 DEFAULT_PORT = "sim:"
@@ -43,6 +45,8 @@ class BaudType(click.ParamType[Baud]):
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Offer what is common."""
+        from click.shell_completion import CompletionItem  # noqa: PLC0415 - only for this
+
         del ctx, param
         rates = ["auto", *map(str, RATES)]
         return [CompletionItem(rate) for rate in rates if rate.startswith(incomplete)]
