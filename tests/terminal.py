@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import fcntl
 import os
 import pty
@@ -28,6 +29,7 @@ class Terminal:
         self.resize(20, 60)
         self.mode = termios.tcgetattr(self._slave)
         self.text = ""
+        self._decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
         command = ["-c", code] if code else ["-m", "voxdisplay"]
         variables = {**os.environ, "TERM": "xterm-256color", "COLORTERM": "truecolor"}
         variables.pop("NO_COLOR", None)
@@ -60,7 +62,7 @@ class Terminal:
 
     def _read(self):
         try:
-            data = os.read(self.screen, 65536).decode(errors="replace")
+            data = self._decoder.decode(os.read(self.screen, 65536))  # a character may come in two
         except OSError:  # nobody has the slave any more
             data = ""
         self.text += data
