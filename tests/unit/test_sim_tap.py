@@ -144,6 +144,7 @@ def test_closing_ends_it_whatever_it_waits_for(asked: bytes) -> None:
         else:
             until(lambda: tap._connection is not None and (tap._waiting or not asked))
         tap.close()
+        tap.close()
         assert watcher.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):
         watch(tap)
