@@ -50,6 +50,8 @@ from voxdisplay.wire.spans import decode_spans
 
 TIMEOUT_S = 5.0
 _LONGEST_WAIT_S = 0.5
+# Range coding saves about a bit a voxel and takes some 5 us for it: it pays below this.
+_SLOW_BYTES_PER_S = 25_000
 _LAST_S = 2.0  # for a last dark picture
 # So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
 _NEXT_TO_NOTHING = 64
@@ -393,7 +395,15 @@ class Display:
         )
 
     def _payloads(self, frame: Frame) -> list[bytes]:
-        return frame.payloads(self._link.payload_bytes, self.info.features)
+        return frame.payloads(self._link.payload_bytes, self._worth_using)
+
+    @property
+    def _worth_using(self) -> tuple[str, ...]:
+        """What the device announced, but for ARC on a line that is faster than its coder."""
+        rate = self._link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+        if rate is not None and rate < _SLOW_BYTES_PER_S:
+            return self.info.features
+        return tuple(name for name in self.info.features if name != "arc")
 
     def _hand_over(self, frame: Frame) -> int:
         """Give a frame to the link: whole, or as its difference from what is on display."""
@@ -402,7 +412,7 @@ class Display:
         if known and known.place == self._link.on_display and not self._link.backlog:
             lit = len(frame.lit()[0])
             if 2 * len(frame.changed(known.frame)) < lit:
-                most, features = self._link.payload_bytes, self.info.features
+                most, features = self._link.payload_bytes, self._worth_using
                 payloads = frame.difference(known.frame, most, features)
                 size = sum(map(len, payloads))
                 # Where there is next to nothing to be sent, the whole frame need not be coded.

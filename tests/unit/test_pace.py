@@ -88,3 +88,11 @@ def test_damage_of_others_counts_once_and_the_count_wraps_around():
     assert loss.note_damage(65_535) == 65_035
     assert loss.note_damage(2) == 3
     assert Loss().note_damage(0) == 0
+
+
+def test_the_rate_is_told_once_the_line_was_busy():
+    pace = Pace()
+    deliver(pace, 3, 200, at_once=1, trip_s=0.02)
+    assert pace.bytes_per_s is None
+    deliver(pace, 10, 1000, at_once=5, trip_s=0.5)
+    assert pace.bytes_per_s == pytest.approx(10_000, rel=0.2)

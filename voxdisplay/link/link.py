@@ -145,6 +145,11 @@ class Link:
         return waiting + len(self._window.flights)
 
     @property
+    def bytes_per_s(self) -> float | None:
+        """What the line has been seen to carry while it was busy; None if it was not yet."""
+        return self._pace.bytes_per_s
+
+    @property
     def payload_bytes(self) -> int:
         """How long payloads should be now: what suits the line's losses and the device's buffer.
 

@@ -29,9 +29,9 @@ class Pace:
     def __init__(self) -> None:
         self.delivered = 0
         self._rate = 0.0  # bytes per second
-        self._round_trip_s = (
-            math.inf
-        )  # the shortest: what waited in a queue says nothing of the line
+        # The shortest: what waited in a queue says nothing of the line.
+        self._round_trip_s = math.inf
+        self._was_busy = False
 
     def deliver(self, size: int, before: int, seconds: float) -> None:
         """Count a packet that has arrived.
@@ -48,8 +48,15 @@ class Pace:
         """
         self.delivered += size
         seconds = max(seconds, 1e-6)
-        self._rate = max((self.delivered - before) / seconds, self._rate * (1 - _FADE))
+        meanwhile = self.delivered - before
+        self._was_busy |= meanwhile >= LEAST_BYTES
+        self._rate = max(meanwhile / seconds, self._rate * (1 - _FADE))
         self._round_trip_s = min(seconds, self._round_trip_s)
+
+    @property
+    def bytes_per_s(self) -> float | None:
+        """What the line carries; None if it has not had enough to do yet to tell."""
+        return self._rate if self._was_busy else None
 
     def allows(self, packets: int, size: int) -> bool:
         """Tell whether so many packets of so many bytes in all may be on their way."""

@@ -66,6 +66,11 @@ class SerialTransport:
         self._descriptor = _descriptor(self._serial)
 
     @property
+    def bytes_per_s(self) -> float | None:
+        """What the line can carry, a start and a stop bit a byte; None if it has no rate."""
+        return self.baud / 10 if self.is_rated else None
+
+    @property
     def is_rated(self) -> bool:
         """Whether there is a line behind the port that has a rate: ptys and sockets have none."""
         if not isinstance(self._serial, serial.Serial):

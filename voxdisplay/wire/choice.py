@@ -2,9 +2,8 @@
 
 Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as spans in scan order;
 what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
-saves the trouble. A coder that takes long belongs here too: one that is tried only when the link
-is so slow that it pays. Painter's order was settled before: no voxel has two pixels, so pieces may
-come in any order.
+saves the trouble. Range coding takes long: whoever has a fast link leaves ARC out of the features.
+Painter's order was settled before: no voxel has two pixels, so pieces may come in any order.
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.wire import bricks, spans
+from voxdisplay.wire import bricks, spans, spec
+from voxdisplay.wire.arcs import encode_arcs
 from voxdisplay.wire.chains import Chains, chain
 from voxdisplay.wire.ops import Bools, Coding, Ints, ranges
 from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
@@ -126,6 +126,8 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> lis
     index = _united(items.index, content.index)
     if spans.least_bytes(index, coding) < best.total:
         best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
+    if coding.has(spec.FEATURE_ARC) and not len(content.index):
+        best.offer_payloads(encode_arcs(items.voxels, items.values, coding))
     return best.payloads
 
 
@@ -142,25 +144,33 @@ class _Cheapest:
         self.coding = coding
         self._first = first
         self._layout: Layout | None = None
+        self._others: list[bytes] = []
 
     @property
     def total(self) -> float:
         """Its bytes; without any, more than there can be."""
-        return self._layout.total if self._layout else np.inf
+        others = sum(map(len, self._others))
+        return self._layout.total + others if self._layout else np.inf
 
     @property
     def payloads(self) -> list[bytes]:
         """Its payloads."""
         if self._layout is None:
             self.offer(no_pieces())
-        return self._layout.payloads if self._layout else []
+        return self._layout.payloads + self._others if self._layout else []
 
     def offer(self, *parts: Pieces) -> None:
         """Take pieces, if they take fewer bytes."""
         pieces = join([self._first, *parts]) if len(self._first) else join(parts)
         layout = Layout(pieces, self.coding)
         if layout.total < self.total:
-            self._layout = layout
+            self._layout, self._others = layout, []
+
+    def offer_payloads(self, payloads: list[bytes]) -> None:
+        """Take what is payloads already, if with what comes first they take fewer bytes."""
+        first = Layout(self._first, self.coding)
+        if first.total + sum(map(len, payloads)) < self.total:
+            self._layout, self._others = first, payloads
 
 
 def _by_pen(pieces: Pieces) -> Pieces:
