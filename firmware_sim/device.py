@@ -97,6 +97,11 @@ class Device:
         return self.session is not None and self.session.state is State.PENDING
 
     @property
+    def room(self) -> int:
+        """How many bytes the receive ring has room for: what a carrier may hand over."""
+        return self.config.rx_buffer - self._waiting_size - len(self._ring)
+
+    @property
     def _stopped(self) -> bool:
         """Whether the device takes no packet for now.
 
@@ -169,7 +174,7 @@ class Device:
         # A 00 behind a 00 says nothing and needs no room: section 9.2 lets the host send it.
         ends = self._ring.endswith(b"\0") if self._ring else True
         data = re.sub(rb"\0+", b"\0", data.lstrip(b"\0") if ends else data)
-        room = self.config.rx_buffer - self._waiting_size - len(self._ring)
+        room = self.room
         self._ring += data[:room]
         if len(data) <= room:
             return

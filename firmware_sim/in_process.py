@@ -6,7 +6,8 @@ It moves bytes and lets time pass; it knows nothing of packets.
 import difflib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
@@ -164,23 +165,47 @@ def open_in_process(url: str) -> InProcessPort:
     b''
     >>> port.close()
     """
-    fields = _parse_url(url)
+    fields = parse_url(url, "sim:")
     faults = fields.pop("faults", ())
     seed = fields.pop("seed", 0)
     baud = fields.pop("baud", 0)
     return InProcessPort(paced(Wire(Device(Config(**fields)), faults, seed), baud))
 
 
-def _parse_url(url: str) -> dict[str, Any]:
+def parse_url(
+    url: str, kind: str, more: Mapping[str, tuple[str, Callable[[str], Any]]] = MappingProxyType({})
+) -> dict[str, Any]:
+    """Read the name of a port of an emulator in this process.
+
+    Parameters
+    ----------
+    url
+        ``KIND``, or ``KIND?KEY=VALUE&KEY=VALUE...``.
+    kind
+        Such as ``sim:``.
+    more
+        Keys of this kind: what they set, and how to read their values.
+
+    Returns
+    -------
+    dict
+        What the keys set.
+
+    Raises
+    ------
+    ValueError
+        If a key is not known or a value cannot be; the message names it.
+    """
+    keys = {**_KEYS, **more}
     scheme, mark, query = url.partition("?")
-    if scheme != "sim:" or (mark and not query):
-        raise ValueError(f"port {url!r}: write sim: or sim:?KEY=VALUE&KEY=VALUE...")
+    if scheme != kind or (mark and not query):
+        raise ValueError(f"port {url!r}: write {kind} or {kind}?KEY=VALUE&KEY=VALUE...")
     fields: dict[str, Any] = {}
     for key, text in parse_qsl(query, keep_blank_values=True):
-        if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, n=1, cutoff=0)
+        if key not in keys:
+            near = difflib.get_close_matches(key, keys, n=1, cutoff=0)
             raise ValueError(f"key {key!r} in {url!r} is not known: did you mean {near[0]!r}?")
-        name, parse = _KEYS[key]
+        name, parse = keys[key]
         if name in fields:
             raise ValueError(f"key {key!r} in {url!r} stands there twice: write it once")
         try:

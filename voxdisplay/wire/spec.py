@@ -144,3 +144,10 @@ LIMIT_MAX_SILENT: Final = 8
 # Section 15: versions
 VERSION_MAJOR: Final = 1
 VERSION_MINOR: Final = 0
+
+# Section 16.1: USB
+USB_CLASS: Final = 0xFF
+USB_SUBCLASS: Final = 0x56
+USB_PROTOCOL: Final = 0x58
+USB_TEST_VENDOR: Final = 0x1209
+USB_TEST_PRODUCT: Final = 0x0001

@@ -1,0 +1,276 @@
+"""A backend of pyusb, so that programs written for it talk to an emulated device unchanged.
+
+It is what a system's kernel and libusb are for a real device: descriptors, claims, time limits and
+the errors of both, as Linux gives them. pyusb is looked at for its exceptions alone.
+"""
+
+import errno
+import os
+import struct
+from typing import Any, Final
+
+from firmware_sim.usb import descriptors, device
+from firmware_sim.usb.device import Request, Urb
+from firmware_sim.usb.host import HIGH_SPEED, Connection, Host, Plugged
+
+# What libusb calls these errors.
+_LIBUSB: Final = {
+    errno.EIO: -1,
+    errno.EACCES: -3,
+    errno.ENODEV: -4,
+    errno.ENOENT: -5,
+    errno.EBUSY: -6,
+    errno.ETIMEDOUT: -7,
+    errno.EOVERFLOW: -8,
+    errno.EPIPE: -9,
+}
+_FAILED: Final = {
+    device.EPIPE: errno.EPIPE,
+    device.EOVERFLOW: errno.EOVERFLOW,
+    device.ESHUTDOWN: errno.EIO,
+}
+_CONTROL_S: Final = 1.0
+
+
+class _Node:
+    """A device that is plugged in, as all who use this backend share it."""
+
+    def __init__(self, plugged: Plugged) -> None:
+        self.plugged = plugged
+        self.claims: dict[int, _Handle] = {}
+        self._connection: Connection | None = None
+        self._opened = 0
+        self._said: tuple[Any, Any] | None = None
+
+    def open(self) -> None:
+        if not self._opened:
+            try:
+                self._connection = self.plugged.connect()
+            except OSError as error:
+                raise _error(error.errno or errno.ENODEV) from error
+        self._opened += 1
+
+    def close(self) -> None:
+        self._opened -= 1
+        if not self._opened and self._connection:
+            self._connection.close()
+            self._connection = None
+
+    def transfer(self, urb: Urb, timeout_s: float | None) -> int:
+        assert self._connection is not None  # noqa: S101 - it is open
+        try:
+            self._connection.transfer(urb, timeout_s)
+        except ConnectionError as error:
+            raise _error(errno.ENODEV) from error
+        if urb.status == device.ECONNRESET and not urb.actual:
+            raise _error(errno.ETIMEDOUT)
+        if urb.status in _FAILED:
+            raise _error(_FAILED[urb.status])
+        return urb.actual
+
+    def control(
+        self, kind: int, request: int, value: int = 0, index: int = 0, length: int = 0
+    ) -> bytes:
+        """Do a control transfer without data to the device."""
+        setup = struct.pack("<BBHHH", kind, request, value, index, length)
+        urb = Urb(0, length=length, setup=setup)
+        self.transfer(urb, _CONTROL_S)
+        return bytes(urb.got)
+
+    @property
+    def said(self) -> tuple[Any, Any]:
+        """What the device says of itself: device and configuration."""
+        if self._said is None:
+            self.open()
+            try:
+                get = Request.GET_DESCRIPTOR
+                raw = self.control(0x80, get, descriptors.DEVICE << 8, length=18)
+                head = self.control(0x80, get, descriptors.CONFIGURATION << 8, length=9)
+                total = int.from_bytes(head[2:4], "little")
+                rest = self.control(0x80, get, descriptors.CONFIGURATION << 8, length=total)
+                about = descriptors.read_device(raw)
+                self._said = about, descriptors.read_configuration(rest)
+            except ValueError as error:
+                raise _error(errno.EIO) from error
+            finally:
+                self.close()
+            place = {"bus": self.plugged.bus, "address": self.plugged.number}
+            ports = {"port_number": 1, "port_numbers": (1,), "speed": HIGH_SPEED}
+            about.__dict__.update(place | ports)
+        return self._said
+
+
+class _Handle:
+    """A device as somebody has opened it."""
+
+    def __init__(self, node: _Node) -> None:
+        self.node = node
+
+
+class Backend:
+    """What pyusb wants of a backend: see ``usb.backend.IBackend`` for each method.
+
+    Parameters
+    ----------
+    host
+        Where devices are plugged in.
+
+    Attributes
+    ----------
+    host : Host
+        The same.
+    """
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self._nodes: dict[Plugged, _Node] = {}
+
+    # Devices
+
+    def enumerate_devices(self) -> list[_Node]:
+        """List the devices that are plugged in."""
+        try:
+            plugged = self.host.plugged()
+        except OSError as error:
+            raise _error(error.errno or errno.ENODEV) from error
+        self._nodes = {each: self._nodes.get(each) or _Node(each) for each in plugged}
+        return list(self._nodes.values())
+
+    def get_parent(self, dev: _Node) -> None:
+        """Give the hub of a device: there is none."""
+
+    def get_device_descriptor(self, dev: _Node) -> Any:
+        """Give the device descriptor."""
+        return dev.said[0]
+
+    def get_configuration_descriptor(self, dev: _Node, config: int) -> Any:
+        """Give a configuration; there is one."""
+        return [dev.said[1][0]][config]
+
+    def get_interface_descriptor(self, dev: _Node, intf: int, alt: int, config: int) -> Any:
+        """Give an interface; none has alternate settings."""
+        self.get_configuration_descriptor(dev, config)
+        return [dev.said[1][1][intf][0]][alt]
+
+    def get_endpoint_descriptor(
+        self, dev: _Node, ep: int, intf: int, alt: int, config: int
+    ) -> Any:
+        """Give an endpoint of an interface."""
+        self.get_interface_descriptor(dev, intf, alt, config)
+        return dev.said[1][1][intf][1][ep]
+
+    # Handles
+
+    def open_device(self, dev: _Node) -> _Handle:
+        """Open a device; more than one may have it open."""
+        dev.open()
+        return _Handle(dev)
+
+    def close_device(self, dev_handle: _Handle) -> None:
+        """Close a device, and give back what was claimed."""
+        node = dev_handle.node
+        node.claims = {n: owner for n, owner in node.claims.items() if owner is not dev_handle}
+        node.close()
+
+    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
+        """Give the device a configuration: its endpoints begin anew."""
+        dev_handle.node.control(0x00, Request.SET_CONFIGURATION, config_value)
+
+    def get_configuration(self, dev_handle: _Handle) -> int:
+        """Ask for the value of its configuration."""
+        return dev_handle.node.control(0x80, Request.GET_CONFIGURATION, length=1)[0]
+
+    def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:
+        """Choose an alternate setting."""
+        dev_handle.node.control(0x01, Request.SET_INTERFACE, altsetting, intf)
+
+    def reset_device(self, dev_handle: _Handle) -> None:
+        """Reset the device; it keeps its configuration."""
+        self.set_configuration(dev_handle, 1)
+
+    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """Claim an interface, unless somebody else has it."""
+        node = dev_handle.node
+        if intf not in {interface.bInterfaceNumber for interface, _ in node.said[1][1]}:
+            raise _error(errno.ENOENT)
+        if intf in node.plugged.drivers or node.claims.get(intf, dev_handle) is not dev_handle:
+            raise _error(errno.EBUSY)
+        node.claims[intf] = dev_handle
+
+    def release_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """Give back an interface."""
+        if dev_handle.node.claims.get(intf) is not dev_handle:
+            raise _error(errno.ENOENT)
+        del dev_handle.node.claims[intf]
+
+    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
+        """Tell whether a driver of the system has an interface."""
+        return intf in dev_handle.node.plugged.drivers
+
+    def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
+        """Take an interface from the system's driver."""
+        if intf not in dev_handle.node.plugged.drivers:
+            raise _error(errno.ENOENT)
+        dev_handle.node.plugged.drivers.remove(intf)
+
+    def attach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
+        """Let the system's driver have an interface, if nobody claims it."""
+        if intf in dev_handle.node.claims:
+            raise _error(errno.EBUSY)
+        dev_handle.node.plugged.drivers.add(intf)
+
+    def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
+        """End the stall of an endpoint."""
+        dev_handle.node.control(0x02, Request.CLEAR_FEATURE, 0, ep)
+
+    # Transfers: data and buffers are arrays of bytes, timeouts milliseconds, 0 for ever
+
+    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
+        """Write to an endpoint; give how many bytes the device took."""
+        del intf
+        return dev_handle.node.transfer(Urb(ep, data.tobytes()), _seconds(timeout))
+
+    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        """Read from an endpoint into a buffer; give how many bytes came."""
+        del intf
+        urb = Urb(ep, length=len(buff) * buff.itemsize)
+        count = dev_handle.node.transfer(urb, _seconds(timeout))
+        memoryview(buff).cast("B")[:count] = urb.got
+        return count
+
+    intr_write = iso_write = bulk_write  # which one, the endpoint's descriptor says
+    intr_read = iso_read = bulk_read
+
+    def ctrl_transfer(
+        self,
+        dev_handle: _Handle,
+        bmRequestType: int,  # noqa: N803 - pyusb's names
+        bRequest: int,  # noqa: N803
+        wValue: int,  # noqa: N803
+        wIndex: int,  # noqa: N803
+        data: Any,
+        timeout: int,
+    ) -> int:
+        """Do a control transfer; give how many bytes it moved."""
+        size = len(data) * data.itemsize
+        setup = struct.pack("<BBHHH", bmRequestType, bRequest, wValue, wIndex, size)
+        if bmRequestType & descriptors.IN:
+            urb = Urb(0, length=size, setup=setup)
+        else:
+            urb = Urb(0, data.tobytes(), setup=setup)
+        count = dev_handle.node.transfer(urb, _seconds(timeout))
+        memoryview(data).cast("B")[: len(urb.got)] = urb.got
+        return count
+
+
+def _seconds(timeout_ms: int) -> float | None:
+    return timeout_ms / 1000 if timeout_ms else None
+
+
+def _error(number: int) -> Exception:
+    """Make pyusb's exception of an error number."""
+    import usb.core  # noqa: PLC0415 - whoever gets here has loaded it
+
+    kind = usb.core.USBTimeoutError if number == errno.ETIMEDOUT else usb.core.USBError
+    made: Exception = kind(os.strerror(number), _LIBUSB.get(number, -99), number)
+    return made

@@ -1,0 +1,275 @@
+"""A device behind USB/IP: a Linux kernel attaches it like one that is plugged in.
+
+One host has the device at a time; others may ask what there is. It moves messages and transfers;
+it knows nothing of what is transferred. A transfer that the device lets wait is answered when it
+is done, which is how a device holds its host back.
+"""
+
+import contextlib
+import select
+import socket
+from typing import Final
+
+from firmware_sim.usb import usbip
+from firmware_sim.usb.descriptors import IN
+from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, UsbDevice, Urb
+
+_CHUNK: Final = 1 << 18
+# What a host may have under way, as Linux limits it for programs; and what it may leave unread.
+MOST_BYTES: Final = 16 << 20
+_CLOGGED: Final = 1 << 20
+_MOST_CONNECTIONS: Final = 16
+
+
+class Connection:
+    """One connection from a host: bytes in, bytes out, no socket.
+
+    Parameters
+    ----------
+    server
+        Whose device it is about.
+
+    Attributes
+    ----------
+    out : bytearray
+        What is to be sent.
+    over : bool
+        Whether the host broke the protocol, or has had its answer: close when `out` is sent.
+    """
+
+    def __init__(self, server: "Server") -> None:
+        self.out = bytearray()
+        self.over = False
+        self._server = server
+        self._in = bytearray()
+        self._urbs: dict[int, Urb] = {}
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host."""
+        self._in += data
+        while not self.over and (self._message() if self.imported else self._operation()):
+            pass
+
+    @property
+    def imported(self) -> bool:
+        """Whether this host has the device."""
+        return self._server.owner is self
+
+    # Before the import
+
+    def _operation(self) -> bool:
+        if len(self._in) < usbip.OPERATION.size:
+            return False
+        version, code, _ = usbip.OPERATION.unpack_from(self._in)
+        if version != usbip.VERSION:
+            self.over = True
+        elif code == usbip.REQUEST_LIST:
+            del self._in[: usbip.OPERATION.size]
+            self._list()
+        elif code == usbip.REQUEST_IMPORT:
+            end = usbip.OPERATION.size + usbip.BUS_ID_FIELD.size
+            if len(self._in) < end:
+                return False
+            (name,) = usbip.BUS_ID_FIELD.unpack_from(self._in, usbip.OPERATION.size)
+            del self._in[:end]
+            self._import(name.rstrip(b"\0"))
+        else:
+            self.over = True
+        return True
+
+    def _list(self) -> None:
+        device = self._server.device
+        about = device.function.descriptors
+        self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_LIST, usbip.OK)
+        self.out += usbip.COUNT.pack(device.plugged)
+        if device.plugged:
+            self.out += usbip.describe(about, self._server.number, device.configuration)
+            for interface in about.interfaces:
+                self.out += usbip.INTERFACE.pack(*interface.triple)
+        self.over = True
+
+    def _import(self, name: bytes) -> None:
+        server = self._server
+        device = server.device
+        status = usbip.OK
+        if name != usbip.BUS_ID.encode() or not device.plugged:
+            status = usbip.NOT_AVAILABLE
+        elif server.owner:
+            status = usbip.BUSY
+        self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_IMPORT, status)
+        if status == usbip.OK:
+            about = device.function.descriptors
+            self.out += usbip.describe(about, server.number, device.configuration)
+            server.owner = self
+        else:
+            self.over = True
+
+    # After it
+
+    def _message(self) -> bool:
+        if len(self._in) < usbip.MESSAGE_BYTES:
+            return False
+        try:
+            message = usbip.parse(bytes(self._in[: usbip.MESSAGE_BYTES]))
+        except ValueError:
+            self.over = True
+            return False
+        if isinstance(message, usbip.Submit):
+            return self._submit(message)
+        del self._in[: usbip.MESSAGE_BYTES]
+        if isinstance(message, usbip.Unlink):
+            self._unlink(message)
+        else:
+            self.over = True
+        return True
+
+    def _submit(self, message: usbip.Submit) -> bool:
+        under_way = sum(max(len(urb.data), urb.length) for urb in self._urbs.values())
+        if not 0 <= message.length <= MOST_BYTES - under_way:
+            self.over = True
+            return False
+        end = usbip.MESSAGE_BYTES + (0 if message.is_in else message.length)
+        if len(self._in) < end:
+            return False
+        data = bytes(self._in[usbip.MESSAGE_BYTES : end])
+        del self._in[:end]
+        address = message.endpoint | (IN if message.is_in and message.endpoint else 0)
+        urb = Urb(address, data, message.length if message.is_in else 0, message.setup)
+        self._urbs[message.seqnum] = urb
+        if message.packets not in {0, usbip.NOT_ISOCHRONOUS}:
+            urb.status = EPIPE  # isochronous: there is no such endpoint
+        else:
+            self._server.device.submit(urb)
+        self.complete()
+        return True
+
+    def _unlink(self, message: usbip.Unlink) -> None:
+        """Give a transfer up. If some of it was moved, it ends as a short one: nothing is lost."""
+        urb = self._urbs.get(message.target)
+        status = DONE
+        if urb:
+            self._server.device.unlink(urb)
+            if not urb.actual:
+                del self._urbs[message.target]
+                status = ECONNRESET
+        self.complete()
+        self.out += usbip.Unlinked(message.seqnum, -status).pack()
+
+    def complete(self) -> None:
+        """Answer the transfers that are done."""
+        for seqnum, urb in list(self._urbs.items()):
+            if urb.status is not None:
+                del self._urbs[seqnum]
+                status = DONE if urb.status == ECONNRESET else urb.status
+                self.out += usbip.Returned(seqnum, -status, urb.actual).pack() + urb.got
+
+
+class Server:
+    """Serves one device.
+
+    Parameters
+    ----------
+    device
+        The device.
+
+    Attributes
+    ----------
+    device : UsbDevice
+        The same.
+    owner : Connection or None
+        Who has imported it.
+    number : int
+        Its number on the bus, another one each time it is plugged in.
+    """
+
+    def __init__(self, device: UsbDevice) -> None:
+        self.device = device
+        self.owner: Connection | None = None
+        self.number = 1
+        self._connections: dict[socket.socket, Connection] = {}
+
+    def serve(self, listener: socket.socket, stop: int) -> None:
+        """Serve until something tells it to stop.
+
+        Parameters
+        ----------
+        listener
+            A listening socket.
+        stop
+            File descriptor that becomes readable when it is time to stop.
+        """
+        with contextlib.ExitStack() as stack:
+            stack.callback(self._close_all)
+            while True:
+                taking = [s for s, c in self._connections.items() if len(c.out) < _CLOGGED]
+                sending = [s for s, c in self._connections.items() if c.out]
+                readers = [listener, stop, *taking]
+                ready, writable, _ = select.select(readers, sending, [], self.device.until_due())
+                if stop in ready:
+                    return
+                if listener in ready:
+                    self._accept(listener)
+                for sock in set(ready).intersection(taking):
+                    self._read(sock)
+                self.device.advance()
+                if self.owner:
+                    self.owner.complete()
+                    if not self.device.plugged:
+                        self.owner.over = True
+                for sock in {*writable, *self._connections}:
+                    self._write(sock)
+
+    def _accept(self, listener: socket.socket) -> None:
+        sock, _ = listener.accept()
+        if len(self._connections) >= _MOST_CONNECTIONS:
+            sock.close()
+            return
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._connections[sock] = Connection(self)
+
+    def _read(self, sock: socket.socket) -> None:
+        try:
+            data = sock.recv(_CHUNK)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._connections[sock].receive(data)
+        else:
+            self._close(sock)
+
+    def _write(self, sock: socket.socket) -> None:
+        connection = self._connections.get(sock)
+        if not connection:
+            return
+        try:
+            if connection.out:
+                del connection.out[: sock.send(connection.out)]
+        except BlockingIOError:
+            return
+        except OSError:
+            connection.over = True
+            connection.out.clear()
+        if connection.over and not connection.out:
+            self._close(sock)
+
+    def _close(self, sock: socket.socket) -> None:
+        """Close a connection; who had the device has unplugged it."""
+        connection = self._connections.pop(sock)
+        sock.close()
+        if self.owner is connection:
+            self.owner = None
+            self.number += 1
+            if self.device.plugged:
+                self.device.plug()
+
+    def _close_all(self) -> None:
+        for sock in list(self._connections):
+            self._close(sock)
+
+
+def serve_usbip(device: UsbDevice, listener: socket.socket, stop: int) -> None:
+    """Serve a device; see `Server.serve`."""
+    Server(device).serve(listener, stop)
