@@ -1,4 +1,4 @@
-"""The program ``voxdisplay-sim``: a device on a pseudo-terminal or a TCP port.
+"""The program ``voxdisplay-sim``: a device on a pseudo-terminal, a TCP port, or on USB/IP.
 
 Its first line on stdout is a JSON object that says where the device is; all else goes to stderr.
 """
@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import socket
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +23,9 @@ from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
 from firmware_sim.pace import PacedWire, paced
 from firmware_sim.serve import linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.usb.device import UsbDevice
+from firmware_sim.usb.function import DisplayFunction, SerialFunction
+from firmware_sim.usb.usbip_server import serve_usbip
 from firmware_sim.wire import Wire
 
 _EPILOG = """\
@@ -34,6 +38,9 @@ examples:
       a smaller one on TCP that swaps at once
   voxdisplay-sim --baud 115200
       at the pace of a serial line, to see how many frames a second it carries
+  voxdisplay-sim --usbip 127.0.0.1:3240
+      on USB: push to usbip://127.0.0.1:3240, or attach it to a Linux kernel with
+      usbip attach -r 127.0.0.1 -b 1-1 and push to usb:
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
 """
@@ -54,8 +61,10 @@ def main(argv: list[str] | None = None) -> int:
     """
     parser = _parser()
     options = parser.parse_args(argv)
-    if options.link and options.tcp:
-        parser.error("--link is a name for a pseudo-terminal: leave out --tcp")
+    if options.link and (options.tcp or options.usbip):
+        parser.error("--link is a name for a pseudo-terminal: leave out --tcp and --usbip")
+    if options.usb_class and not options.usbip:
+        parser.error("--usb-class is for --usbip")
     try:
         config = Config(options.size, options.format, options.refresh, options.rx_buffer)
         device = Device(config)
@@ -88,8 +97,19 @@ def _parser() -> argparse.ArgumentParser:
         type=_argument(_parse_address),
         help="be found on a TCP port, one connection at a time; port 0 is any that is free",
     )
+    place.add_argument(
+        "--usbip",
+        metavar="HOST:PORT",
+        type=_argument(_parse_address),
+        help="be found on USB, exported by USB/IP as device 1-1; its usual port is 3240",
+    )
     parser.add_argument(
-        "--allow-remote", action="store_true", help="let other machines reach the TCP port"
+        "--usb-class",
+        choices=("vendor", "cdc-acm"),
+        help="with --usbip: the protocol's own interface (the default), or a serial port",
+    )
+    parser.add_argument(
+        "--allow-remote", action="store_true", help="let other machines reach the port"
     )
     parser.add_argument(
         "--link", metavar="PATH", type=Path, help="keep a symbolic link to the pseudo-terminal"
@@ -202,9 +222,14 @@ def _signals() -> Iterator[int]:
 def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> None:
     if options.tcp:
         with listen(*options.tcp, remote=options.allow_remote) as listener:
-            host, port = listener.getsockname()[:2]
-            _announce(wire, f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
+            _announce(wire, f"tcp://{_address_of(listener)}")
             serve_tcp(wire, listener, stop)
+        return
+    if options.usbip:
+        kind = SerialFunction if options.usb_class == "cdc-acm" else DisplayFunction
+        with listen(*options.usbip, remote=options.allow_remote) as listener:
+            _announce(wire, f"usbip://{_address_of(listener)}")
+            serve_usbip(UsbDevice(kind(wire)), listener, stop)
         return
     with contextlib.ExitStack() as stack:
         line, name = stack.enter_context(open_pty())
@@ -212,6 +237,11 @@ def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> No
             stack.enter_context(linked(options.link, name))
         _announce(wire, name)
         serve_wire(wire, line, stop)
+
+
+def _address_of(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _announce(wire: Wire | PacedWire, port: str) -> None:

@@ -4,6 +4,7 @@ A port is ``kind:rest``: ``sim:``, ``tcp://127.0.0.1:5000``; anything else is py
 kinds come as entry points of the group ``voxdisplay.transport``: callables that take the whole name
 and give an object with ``read``, ``write`` and ``close`` as of `Transport`. They raise `ValueError`
 for a name that is wrong and `OSError` for a pipe that fails, and need nothing of this package.
+Those of the group ``voxdisplay.usb`` give a backend of pyusb instead: see `transport.usb`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from voxdisplay.transport.base import Transport
 __all__ = ["Transport", "open_transport"]
 
 _GROUP = "voxdisplay.transport"
+_USB_GROUP = "voxdisplay.usb"
 
 
 def open_transport(port: str, *, baud: int = 115200) -> Transport:
@@ -25,8 +27,8 @@ def open_transport(port: str, *, baud: int = 115200) -> Transport:
     Parameters
     ----------
     port : str
-        ``sim:``, ``tcp://host:port``, a serial device such as ``/dev/ttyUSB0`` or ``COM3``, or any
-        URL of pyserial.
+        ``sim:``, ``tcp://host:port``, ``usb:``, ``usb:VID:PID[:SERIAL]``, a serial device such as
+        ``/dev/ttyUSB0`` or ``COM3``, or any URL of pyserial.
     baud : int
         Bits per second of a serial line.
 
@@ -36,16 +38,23 @@ def open_transport(port: str, *, baud: int = 115200) -> Transport:
         If it cannot be opened; the message says why, ``hint`` what to do.
 
     """
-    kind = match[1] if (match := re.match(r"([a-z][a-z0-9+]+):", port)) else ""
+    kind = match[1] if (match := re.match(r"([a-z][a-z0-9+-]+):", port)) else ""
     if kind == "tcp":
         from voxdisplay.transport.tcp import TcpTransport  # noqa: PLC0415 - only what is needed
 
         return TcpTransport(port)
-    for entry in entry_points(group=_GROUP):
-        if entry.name == kind:
-            from voxdisplay.transport.plugin import PluginTransport  # noqa: PLC0415
+    if kind == "usb":
+        from voxdisplay.transport.usb import UsbTransport  # noqa: PLC0415
 
-            return PluginTransport(port, entry.load())
+        return UsbTransport(port)
+    for entry in entry_points(group=_GROUP, name=kind):
+        from voxdisplay.transport.plugin import PluginTransport  # noqa: PLC0415
+
+        return PluginTransport(port, entry.load())
+    for entry in entry_points(group=_USB_GROUP, name=kind):
+        from voxdisplay.transport.plugin import open_usb  # noqa: PLC0415
+
+        return open_usb(port, entry.load())
     if not port.strip():
         raise OpenError("no port was named", port=port, hint="try sim: for the built-in emulator")
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415

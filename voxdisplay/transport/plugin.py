@@ -6,6 +6,23 @@ from collections.abc import Callable
 from typing import Any
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+from voxdisplay.transport.base import Transport
+
+
+def open_usb(port: str, opener: Callable[[str], Any]) -> Transport:
+    """Open a display on a USB that an entry point of the group ``voxdisplay.usb`` knows."""
+    from voxdisplay.transport.usb import UsbTransport  # noqa: PLC0415 - loads pyusb
+
+    return UsbTransport(port, backend=_opened(port, opener))
+
+
+def _opened(port: str, opener: Callable[[str], Any]) -> Any:
+    try:
+        return opener(port)
+    except ValueError as error:
+        raise OpenError(f"{port}: {error}", port=port) from error
+    except OSError as error:
+        raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
 
 
 class PluginTransport:
@@ -13,12 +30,7 @@ class PluginTransport:
 
     def __init__(self, port: str, opener: Callable[[str], Any]) -> None:
         self.port = port
-        try:
-            self._pipe = opener(port)
-        except ValueError as error:
-            raise OpenError(f"{port}: {error}", port=port) from error
-        except OSError as error:
-            raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
+        self._pipe = _opened(port, opener)
 
     @property
     def pipe(self) -> Any:

@@ -1,0 +1,324 @@
+"""``usb:``, ``usb:VID:PID``, ``usb:VID:PID:SERIAL``: a display on USB, through pyusb.
+
+A display is known by the class of its interface (protocol.md, section 16.1), and its endpoints by
+their kind and direction. Further kinds of port whose devices are on some USB come as entry points
+of the group ``voxdisplay.usb``: callables that take the whole name and give a backend of pyusb.
+This knows USB; it knows no packet of the protocol.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import re
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import usb.core
+import usb.util
+
+from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+from voxdisplay.transport.discovery import FoundPort
+from voxdisplay.transport.usb_access import busy, find_backend, forbidden
+from voxdisplay.wire import spec
+
+_READ_BYTES = 16384  # a multiple of every packet size there is, so that no packet is too long
+_WRITE_BYTES = 65536
+_SHORTEST_S = 0.001  # libusb counts in milliseconds, and takes 0 for ever
+_MOST_FAULTS = 8  # stalls and packets that are too long, in a row
+_SHOWN = 10  # devices named in an error
+
+_GONE = (errno.EIO, errno.ENODEV, errno.ENOENT, errno.ESHUTDOWN)
+
+
+class UsbTransport:
+    """A pipe over the bulk endpoints of a display's interface.
+
+    Parameters
+    ----------
+    port : str
+        ``usb:``, ``usb:VID:PID`` or ``usb:VID:PID:SERIAL``, in hex; with a backend, any name.
+    backend : object, optional
+        A backend of pyusb; libusb if left out.
+
+    Raises
+    ------
+    OpenError
+        If there is no such device, or more than one, or it may not or cannot be used now.
+
+    """
+
+    def __init__(self, port: str, *, backend: Any = None) -> None:
+        self.port = port
+        wanted = _Wanted("usb:" if backend is not None else port)
+        self.backend = find_backend(port) if backend is None else backend
+        self._detached = False
+        self._closed = False
+        self._faults = 0
+        self._device = _choose(port, wanted, self.backend)
+        try:
+            self._claim()
+        except BaseException:
+            self.close()
+            raise
+
+    def _claim(self) -> None:
+        """Open the device and take its interface."""
+        device = self._device
+        with _explained(self.port, device):
+            configuration, interface = next(_display_interfaces(device))
+            self._number = interface.bInterfaceNumber
+            if _active_configuration(device) != configuration.bConfigurationValue:
+                # Only then: it would reset the endpoints, and end what others have begun.
+                configuration.set()
+            with contextlib.suppress(NotImplementedError):  # not on every system
+                if device.is_kernel_driver_active(self._number):
+                    device.detach_kernel_driver(self._number)
+                    self._detached = True
+            usb.util.claim_interface(device, self._number)
+        self._out, self._in = _endpoint(interface, "OUT"), _endpoint(interface, "IN")
+        if self._out is None or self._in is None:
+            raise OpenError(
+                f"{self.port}: the device's interface has no bulk endpoint each way",
+                port=self.port,
+                hint="its firmware does not follow protocol.md, section 16.1",
+            )
+
+    def read(self, timeout_s: float) -> bytes:
+        """See `Transport.read`."""
+        deadline_s = time.monotonic() + timeout_s
+        packet_bytes = self._in.wMaxPacketSize
+        while True:
+            # A transfer ends with a packet that is not full, and a device need not send one. So
+            # the first packet is waited for by itself, and the rest only as long as it flows.
+            data = self._receive(packet_bytes, deadline_s - time.monotonic())
+            if len(data) == packet_bytes:
+                data += self._receive(_READ_BYTES, _SHORTEST_S)
+            if data or time.monotonic() >= deadline_s:
+                return data
+
+    def _receive(self, size: int, timeout_s: float) -> bytes:
+        """Do a transfer; give nothing if nothing came, or an empty packet, or a damaged one."""
+        try:
+            data = self._in.read(size, _milliseconds(timeout_s)).tobytes()
+        except usb.core.USBTimeoutError:
+            data = b""
+        except usb.core.USBError as error:
+            self._mend(error, self._in)
+            return b""
+        self._faults = 0
+        return bytes(data)
+
+    def write(self, data: bytes, timeout_s: float) -> None:
+        """See `Transport.write`."""
+        deadline_s = time.monotonic() + timeout_s
+        view = memoryview(data)
+        while view:
+            view = view[self._send(view[:_WRITE_BYTES], deadline_s, len(data) - len(view)) :]
+        if data and len(data) % self._out.wMaxPacketSize == 0:
+            # The device may be waiting for more in a transfer of its own: tell it that this is all.
+            self._send(b"", deadline_s, len(data))
+
+    def _send(self, data: memoryview | bytes, deadline_s: float, before: int) -> int:
+        """Do a transfer; give how many bytes the device took, which may be a part."""
+        left_s = deadline_s - time.monotonic()
+        try:
+            sent: int = self._out.write(data, _milliseconds(left_s))
+        except usb.core.USBTimeoutError as error:
+            raise TransportTimeout(
+                f"{self.port} takes no more bytes: {before} were sent before",
+                hint="is its firmware still running?",
+            ) from error
+        except usb.core.USBError as error:
+            self._mend(error, self._out)
+            return 0
+        if left_s <= 0 and sent < len(data):
+            raise TransportTimeout(f"{self.port} takes its bytes too slowly")
+        self._faults = 0
+        return sent
+
+    def _mend(self, error: usb.core.USBError, endpoint: Any) -> None:
+        """Clear a stall, or let a packet go that was too long; raise what is past mending.
+
+        What was under way is lost or comes twice: the protocol finds out, and repeats it.
+        """
+        self._faults += 1
+        if error.errno not in {errno.EPIPE, errno.EOVERFLOW} or self._faults > _MOST_FAULTS:
+            raise self._lost(error) from error
+        if error.errno == errno.EPIPE:
+            try:
+                endpoint.clear_halt()
+            except usb.core.USBError as worse:
+                raise self._lost(worse) from worse
+
+    def _lost(self, error: usb.core.USBError) -> TransportClosed:
+        if error.errno in _GONE:
+            return TransportClosed(f"{self.port} is gone: it was unplugged, or has restarted")
+        return TransportClosed(f"{self.port} does not work any more: {error}")
+
+    def close(self) -> None:
+        """See `Transport.close`."""
+        if self._closed:
+            return
+        self._closed = True
+        with contextlib.suppress(usb.core.USBError, NotImplementedError):  # it may be gone
+            usb.util.release_interface(self._device, self._number)
+            if self._detached:
+                self._device.attach_kernel_driver(self._number)
+        usb.util.dispose_resources(self._device)
+
+
+def found() -> list[FoundPort]:
+    """List the displays on USB. Without libusb there are none to be seen."""
+    try:
+        backend = find_backend("usb:")
+        return [
+            FoundPort(_name(device), _text(device, "product") or "display", *_ids(device))
+            for device in _displays(backend)
+        ]
+    except (OpenError, usb.core.USBError):
+        return []
+
+
+class _Wanted:
+    """What a name asks for."""
+
+    def __init__(self, port: str) -> None:
+        match = re.fullmatch(r"usb:(?:([0-9a-fA-F]{1,4}):([0-9a-fA-F]{1,4})(?::(.+))?)?", port)
+        if not match:
+            raise OpenError(
+                f"{port} is not a USB port",
+                port=port,
+                hint="write usb:, usb:VID:PID or usb:VID:PID:SERIAL, like usb:1209:0001",
+            )
+        self._ids = (int(match[1], 16), int(match[2], 16)) if match[1] else None
+        self._serial = match[3]
+
+    def __call__(self, device: usb.core.Device) -> bool:
+        if self._ids and (device.idVendor, device.idProduct) != self._ids:
+            return False
+        return not self._serial or _text(device, "serial_number", always=True) == self._serial
+
+
+def _choose(port: str, wanted: _Wanted, backend: Any) -> usb.core.Device:
+    """Give the only display that is wanted."""
+    displays: list[usb.core.Device] = []
+    with _explained(port):
+        displays = list(_displays(backend))
+    chosen = []
+    for device in displays:
+        with _explained(port, device):
+            if wanted(device):
+                chosen.append(device)
+    if len(chosen) == 1:
+        return chosen[0]
+    named = ", ".join(_name(device) for device in (chosen or displays)[:_SHOWN])
+    if chosen:
+        raise OpenError(
+            f"{port}: there are {len(chosen)} displays", port=port, hint=f"choose one of {named}"
+        )
+    raise OpenError(
+        f"{port}: there is no such display on USB",
+        port=port,
+        hint=f"there is {named}" if named else "is it plugged in, and switched on?",
+    )
+
+
+def _displays(backend: Any) -> Iterator[usb.core.Device]:
+    """Find the devices with an interface of the protocol's class.
+
+    One that cannot be looked at counts only if no other is a display: then it may be the one.
+    """
+    unseen: usb.core.USBError | None = None
+    any_display = False
+    for device in usb.core.find(find_all=True, backend=backend):
+        try:
+            is_display = any(True for _ in _display_interfaces(device))
+        except usb.core.USBError as error:
+            unseen = error
+            continue
+        except NotImplementedError:  # on some systems, a device of the system's own
+            continue
+        if is_display:
+            any_display = True
+            yield device
+    if unseen and not any_display and unseen.errno == errno.EBUSY:
+        raise unseen
+
+
+def _display_interfaces(
+    device: usb.core.Device,
+) -> Iterator[tuple[usb.core.Configuration, usb.core.Interface]]:
+    for configuration in device:
+        for interface in configuration:
+            triple = (
+                interface.bInterfaceClass,
+                interface.bInterfaceSubClass,
+                interface.bInterfaceProtocol,
+            )
+            if triple == (spec.USB_CLASS, spec.USB_SUBCLASS, spec.USB_PROTOCOL) and (
+                interface.bAlternateSetting == 0
+            ):
+                yield configuration, interface
+
+
+def _endpoint(interface: usb.core.Interface, direction: str) -> Any:
+    """Find the bulk endpoint of a direction."""
+    bit = usb.util.ENDPOINT_IN if direction == "IN" else usb.util.ENDPOINT_OUT
+
+    def matches(endpoint: usb.core.Endpoint) -> bool:
+        kind = usb.util.endpoint_type(endpoint.bmAttributes)
+        way = usb.util.endpoint_direction(endpoint.bEndpointAddress)
+        return (kind, way) == (usb.util.ENDPOINT_TYPE_BULK, bit)
+
+    return usb.util.find_descriptor(interface, custom_match=matches)
+
+
+def _active_configuration(device: usb.core.Device) -> int:
+    """Give the value of the configuration; 0 if there is none."""
+    try:
+        return int(device.get_active_configuration().bConfigurationValue)
+    except usb.core.USBError as error:
+        if error.errno is None:  # pyusb's own word for it
+            return 0
+        raise
+
+
+def _text(device: usb.core.Device, name: str, *, always: bool = False) -> str | None:
+    """Give a text of the device, for which it must be opened; None if it has none to give."""
+    try:
+        text: str | None = getattr(device, name)
+    except (usb.core.USBError, ValueError, NotImplementedError):
+        if always:
+            raise
+        return None
+    return text
+
+
+def _ids(device: usb.core.Device) -> tuple[int, int, str | None]:
+    return device.idVendor, device.idProduct, _text(device, "serial_number")
+
+
+def _name(device: usb.core.Device) -> str:
+    vid, pid, serial = _ids(device)
+    return f"usb:{vid:04x}:{pid:04x}" + (f":{serial}" if serial else "")
+
+
+def _milliseconds(seconds: float) -> int:
+    return max(1, round(max(seconds, _SHORTEST_S) * 1000))
+
+
+@contextlib.contextmanager
+def _explained(port: str, device: usb.core.Device | None = None) -> Iterator[None]:
+    """Turn what USB says on opening into what a person can do."""
+    try:
+        yield
+    except usb.core.USBError as error:
+        if error.errno == errno.EACCES:
+            raise forbidden(port, device) from error
+        if error.errno == errno.EBUSY:
+            raise busy(port, device) from error
+        raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
+    except (ValueError, NotImplementedError) as error:
+        raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
