@@ -128,6 +128,8 @@ class UsbDevice:
         Addresses of the endpoints that stall.
     plugged : bool
         Whether it is there.
+    number : int
+        Its number on the bus, another one each time it is plugged in.
     packets : int
         How many packets its endpoints have moved, all but control's.
     unplug_at : int or None
@@ -139,6 +141,7 @@ class UsbDevice:
         self.configuration = 0
         self.halted: set[int] = set()
         self.plugged = True
+        self.number = 1
         self.packets = 0
         self.unplug_at: int | None = None
         self._endpoints = function.descriptors.endpoints
@@ -179,7 +182,12 @@ class UsbDevice:
 
     def plug(self) -> None:
         """Come back, as after power on."""
+        self.number += 1
         self.plugged = True
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget configuration, halts and what was under way."""
         self.configuration = 0
         self._shut_down()
 

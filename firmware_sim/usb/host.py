@@ -83,14 +83,13 @@ class Bus:
         self.drivers: set[int] = set()
         self.forbidden = False
         self._changed = threading.Condition()
-        self._number = 0
-        self.plug()
+        self._configure()
 
     def plugged(self) -> list[Plugged]:
         """See `Host.plugged`."""
         if not self.device.plugged:
             return []
-        number = self._number
+        number = self.device.number
         return [Plugged(1, number, lambda: self._connect(number), self.drivers)]
 
     def unplug(self) -> None:
@@ -102,9 +101,11 @@ class Bus:
     def plug(self) -> None:
         """Plug the device in, as after power on."""
         with self._changed:
-            self._number += 1
             self.device.plug()
-            self.device.submit(Urb(0, setup=SET_CONFIGURATION))
+            self._configure()
+
+    def _configure(self) -> None:
+        self.device.submit(Urb(0, setup=SET_CONFIGURATION))
 
     def _connect(self, number: int) -> "_OnBus":
         if self.forbidden:
@@ -116,7 +117,7 @@ class Bus:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         device = self.device
         with self._changed:
-            if number != self._number or not device.plugged:
+            if number != device.number or not device.plugged:
                 raise ConnectionError("it is not plugged in")
             device.submit(urb)
             self._changed.notify_all()  # it may have finished what another thread waits for

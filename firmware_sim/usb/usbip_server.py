@@ -83,7 +83,7 @@ class Connection:
         self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_LIST, usbip.OK)
         self.out += usbip.COUNT.pack(device.plugged)
         if device.plugged:
-            self.out += usbip.describe(about, self._server.number, device.configuration)
+            self.out += usbip.describe(about, device.number, device.configuration)
             for interface in about.interfaces:
                 self.out += usbip.INTERFACE.pack(*interface.triple)
         self.over = True
@@ -99,7 +99,7 @@ class Connection:
         self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_IMPORT, status)
         if status == usbip.OK:
             about = device.function.descriptors
-            self.out += usbip.describe(about, server.number, device.configuration)
+            self.out += usbip.describe(about, device.number, device.configuration)
             server.owner = self
         else:
             self.over = True
@@ -178,14 +178,11 @@ class Server:
         The same.
     owner : Connection or None
         Who has imported it.
-    number : int
-        Its number on the bus, another one each time it is plugged in.
     """
 
     def __init__(self, device: UsbDevice) -> None:
         self.device = device
         self.owner: Connection | None = None
-        self.number = 1
         self._connections: dict[socket.socket, Connection] = {}
 
     def serve(self, listener: socket.socket, stop: int) -> None:
@@ -212,10 +209,11 @@ class Server:
                 for sock in set(ready).intersection(taking):
                     self._read(sock)
                 self.device.advance()
-                if self.owner:
+                if self.owner and self.device.plugged:
                     self.owner.complete()
-                    if not self.device.plugged:
-                        self.owner.over = True
+                elif self.owner:  # the end of the connection says it all
+                    self.owner.out.clear()
+                    self.owner.over = True
                 for sock in {*writable, *self._connections}:
                     self._write(sock)
 
@@ -261,9 +259,7 @@ class Server:
         sock.close()
         if self.owner is connection:
             self.owner = None
-            self.number += 1
-            if self.device.plugged:
-                self.device.plug()
+            self.device.reset()
 
     def _close_all(self) -> None:
         for sock in list(self._connections):
