@@ -173,7 +173,9 @@ class Backend:
         node.close()
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
-        """Give the device a configuration: its endpoints begin anew."""
+        """Give the device a configuration: its endpoints begin anew. Nobody may hold them then."""
+        if dev_handle.node.claims or dev_handle.node.plugged.drivers:
+            raise _error(errno.EBUSY)
         dev_handle.node.control(0x00, Request.SET_CONFIGURATION, config_value)
 
     def get_configuration(self, dev_handle: _Handle) -> int:

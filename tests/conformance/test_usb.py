@@ -44,6 +44,7 @@ def gadget(place):
         for address in (IN, OUT):
             with contextlib.suppress(usb.core.USBError):
                 device.clear_halt(address)
+        usb.util.release_interface(device, NUMBER)
         device.set_configuration()
         place.tell("taken")
         usb.util.dispose_resources(device)
@@ -242,6 +243,9 @@ def test_who_claims_second_is_told_that_it_is_busy(gadget, device):
 
 
 def test_the_same_configuration_again_resets_the_device(gadget, device):
+    with failing(EBUSY):
+        device.set_configuration()
+    usb.util.release_interface(device, NUMBER)
     before = gadget.tell("resets")
     device.set_configuration()
     assert gadget.tell("resets") > before
