@@ -41,6 +41,7 @@ def gadget(place):
     yield place
     if place.find() is not None:
         device = place.find()
+        usb.util.claim_interface(device, NUMBER)  # or else Linux does, and keeps it
         for address in (IN, OUT):
             with contextlib.suppress(usb.core.USBError):
                 device.clear_halt(address)
