@@ -143,9 +143,7 @@ def _initrd(command: str) -> Path:
                 names.append(path.name)
                 shutil.copy(path, work / "modules")
     init = work / "init"
-    init.write_text(
-        INIT.format(modules=" ".join(names), command=shlex.quote(command), mark=_MARK)
-    )
+    init.write_text(INIT.format(modules=" ".join(names), command=shlex.quote(command), mark=_MARK))
     init.chmod(0o755)
     files = "\n".join(str(path.relative_to(work)) for path in work.rglob("*"))
     packed = subprocess.run(

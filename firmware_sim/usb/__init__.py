@@ -9,8 +9,8 @@
     backend       pyusb's way to either          usbip_server  a device for other processes' kernels
                                                  usbip_host    the other end, without a kernel
 
-`open_in_process` and `open_usbip` are what ports of the kinds ``sim-usb:`` and ``usbip:`` are opened
-by: they give backends of pyusb.
+`open_in_process` and `open_usbip` open ports of the kinds ``sim-usb:`` and ``usbip:``: they give
+backends of pyusb.
 """
 
 import re
@@ -74,7 +74,9 @@ def open_usbip(url: str) -> Backend:
     ValueError
         If it is not written like that.
     """
-    match = re.fullmatch(r"usbip://(?:\[([0-9a-fA-F:]+)\]|([^\[\]:/?#@]+))(?::([0-9]{1,5}))?/?", url)
+    match = re.fullmatch(
+        r"usbip://(?:\[([0-9a-fA-F:]+)\]|([^\[\]:/?#@]+))(?::([0-9]{1,5}))?/?", url
+    )
     if not match or not 0 < int(match[3] or DEFAULT_PORT) < 1 << 16:
         raise ValueError("write usbip://HOST:PORT like usbip://127.0.0.1:3240")
     return Backend(UsbIpHost(match[1] or match[2], int(match[3] or DEFAULT_PORT)))

@@ -152,9 +152,7 @@ class Backend:
         self.get_configuration_descriptor(dev, config)
         return [dev.said[1][1][intf][0]][alt]
 
-    def get_endpoint_descriptor(
-        self, dev: _Node, ep: int, intf: int, alt: int, config: int
-    ) -> Any:
+    def get_endpoint_descriptor(self, dev: _Node, ep: int, intf: int, alt: int, config: int) -> Any:
         """Give an endpoint of an interface."""
         self.get_interface_descriptor(dev, intf, alt, config)
         return dev.said[1][1][intf][1][ep]

@@ -11,7 +11,6 @@ from firmware_sim import spec
 from firmware_sim.usb.descriptors import (
     BULK,
     CS_INTERFACE,
-    IN,
     INTERRUPT,
     Descriptors,
     Endpoint,
@@ -92,7 +91,9 @@ class DisplayFunction:
         bulk = (Endpoint(_OUT, BULK, packet), Endpoint(_IN, BULK, packet))
         config = wire.device.config
         texts = ("voxdisplay", config.name, config.serial)
-        self.descriptors = Descriptors(spec.USB_TEST_VENDOR, spec.USB_TEST_PRODUCT, *texts, *self._interfaces(bulk))
+        self.descriptors = Descriptors(
+            spec.USB_TEST_VENDOR, spec.USB_TEST_PRODUCT, *texts, *self._interfaces(bulk)
+        )
 
     @staticmethod
     def _interfaces(bulk: tuple[Endpoint, ...]) -> tuple[tuple[Interface, ...], int]:

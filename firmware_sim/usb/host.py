@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from firmware_sim.usb.device import UsbDevice, Urb
+from firmware_sim.usb.device import Urb, UsbDevice
 
 HIGH_SPEED: Final = 3
 SET_CONFIGURATION: Final = bytes((0x00, 9, 1, 0, 0, 0, 0, 0))

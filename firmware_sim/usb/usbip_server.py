@@ -12,7 +12,7 @@ from typing import Final
 
 from firmware_sim.usb import usbip
 from firmware_sim.usb.descriptors import IN
-from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, UsbDevice, Urb
+from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, Urb, UsbDevice
 
 _CHUNK: Final = 1 << 18
 # What a host may have under way, as Linux limits it for programs; and what it may leave unread.
@@ -200,14 +200,15 @@ class Server:
             while True:
                 taking = [s for s, c in self._connections.items() if len(c.out) < _CLOGGED]
                 sending = [s for s, c in self._connections.items() if c.out]
-                readers = [listener, stop, *taking]
+                readers: list[socket.socket | int] = [listener, stop, *taking]
                 ready, writable, _ = select.select(readers, sending, [], self.device.until_due())
                 if stop in ready:
                     return
                 if listener in ready:
                     self._accept(listener)
-                for sock in set(ready).intersection(taking):
-                    self._read(sock)
+                for sock in taking:
+                    if sock in ready:
+                        self._read(sock)
                 self.device.advance()
                 if self.owner and self.device.plugged:
                     self.owner.complete()

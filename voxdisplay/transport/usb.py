@@ -12,7 +12,7 @@ import contextlib
 import errno
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import usb.core
@@ -53,12 +53,14 @@ class UsbTransport:
         self.port = port
         wanted = _Wanted("usb:" if backend is not None else port)
         self.backend = find_backend(port) if backend is None else backend
-        self._detached = False
         self._closed = False
         self._faults = 0
+        self._claimed: int | None = None
+        self._detached: int | None = None
         self._device = _choose(port, wanted, self.backend)
         try:
-            self._claim()
+            with _explained(port, self._device):
+                self._claim()
         except BaseException:
             self.close()
             raise
@@ -66,29 +68,23 @@ class UsbTransport:
     def _claim(self) -> None:
         """Open the device and take its interface."""
         device = self._device
-        with _explained(self.port, device):
-            configuration, interface = next(_display_interfaces(device))
-            self._number = interface.bInterfaceNumber
-            if _active_configuration(device) != configuration.bConfigurationValue:
-                # Only then: it would reset the endpoints, and end what others have begun.
-                configuration.set()
-            with contextlib.suppress(NotImplementedError):  # not on every system
-                if device.is_kernel_driver_active(self._number):
-                    device.detach_kernel_driver(self._number)
-                    self._detached = True
-            usb.util.claim_interface(device, self._number)
+        configuration, interface = next(_display_interfaces(device))
+        number = interface.bInterfaceNumber
         self._out, self._in = _endpoint(interface, "OUT"), _endpoint(interface, "IN")
-        if self._out is None or self._in is None:
-            raise OpenError(
-                f"{self.port}: the device's interface has no bulk endpoint each way",
-                port=self.port,
-                hint="its firmware does not follow protocol.md, section 16.1",
-            )
+        if _active_configuration(device) != configuration.bConfigurationValue:
+            configuration.set()  # only then: it resets the device
+        with contextlib.suppress(NotImplementedError):  # not on every system
+            if device.is_kernel_driver_active(number):
+                device.detach_kernel_driver(number)
+                self._detached = number
+        usb.util.claim_interface(device, number)
+        self._claimed = number
 
     def read(self, timeout_s: float) -> bytes:
         """See `Transport.read`."""
+        self._check_open()
         deadline_s = time.monotonic() + timeout_s
-        packet_bytes = self._in.wMaxPacketSize
+        packet_bytes = _packet_bytes(self._in)
         while True:
             # A transfer ends with a packet that is not full, and a device need not send one. So
             # the first packet is waited for by itself, and the rest only as long as it flows.
@@ -101,40 +97,39 @@ class UsbTransport:
     def _receive(self, size: int, timeout_s: float) -> bytes:
         """Do a transfer; give nothing if nothing came, or an empty packet, or a damaged one."""
         try:
-            data = self._in.read(size, _milliseconds(timeout_s)).tobytes()
+            data = bytes(self._in.read(size, _milliseconds(timeout_s)))
         except usb.core.USBTimeoutError:
-            data = b""
+            return b""
         except usb.core.USBError as error:
             self._mend(error, self._in)
             return b""
         self._faults = 0
-        return bytes(data)
+        return data
 
     def write(self, data: bytes, timeout_s: float) -> None:
         """See `Transport.write`."""
+        self._check_open()
         deadline_s = time.monotonic() + timeout_s
-        view = memoryview(data)
-        while view:
-            view = view[self._send(view[:_WRITE_BYTES], deadline_s, len(data) - len(view)) :]
-        if data and len(data) % self._out.wMaxPacketSize == 0:
-            # The device may be waiting for more in a transfer of its own: tell it that this is all.
-            self._send(b"", deadline_s, len(data))
+        sent = 0
+        while sent < len(data):
+            piece = data[sent : sent + _WRITE_BYTES]
+            sent += self._send(piece, deadline_s, f"only {sent} of {len(data)} bytes")
+        if data and len(data) % _packet_bytes(self._out) == 0:
+            # The device may wait for more in a transfer of its own: tell it that this is all.
+            self._send(b"", deadline_s, "no end of what was sent")
 
-    def _send(self, data: memoryview | bytes, deadline_s: float, before: int) -> int:
+    def _send(self, data: bytes, deadline_s: float, so_far: str) -> int:
         """Do a transfer; give how many bytes the device took, which may be a part."""
         left_s = deadline_s - time.monotonic()
         try:
-            sent: int = self._out.write(data, _milliseconds(left_s))
+            sent = int(self._out.write(data, _milliseconds(left_s)))
         except usb.core.USBTimeoutError as error:
             raise TransportTimeout(
-                f"{self.port} takes no more bytes: {before} were sent before",
-                hint="is its firmware still running?",
+                f"{self.port} took {so_far}", hint="is its firmware still running?"
             ) from error
         except usb.core.USBError as error:
             self._mend(error, self._out)
             return 0
-        if left_s <= 0 and sent < len(data):
-            raise TransportTimeout(f"{self.port} takes its bytes too slowly")
         self._faults = 0
         return sent
 
@@ -157,28 +152,36 @@ class UsbTransport:
             return TransportClosed(f"{self.port} is gone: it was unplugged, or has restarted")
         return TransportClosed(f"{self.port} does not work any more: {error}")
 
+    def _check_open(self) -> None:
+        """Refuse to go on with a closed port: pyusb would open it again."""
+        if self._closed:
+            raise TransportClosed(f"{self.port} is closed")
+
     def close(self) -> None:
         """See `Transport.close`."""
         if self._closed:
             return
         self._closed = True
-        with contextlib.suppress(usb.core.USBError, NotImplementedError):  # it may be gone
-            usb.util.release_interface(self._device, self._number)
-            if self._detached:
-                self._device.attach_kernel_driver(self._number)
+        with contextlib.suppress(usb.core.USBError):  # it may be gone
+            if self._claimed is not None:
+                usb.util.release_interface(self._device, self._claimed)
+            if self._detached is not None:
+                self._device.attach_kernel_driver(self._detached)
         usb.util.dispose_resources(self._device)
 
 
-def found() -> list[FoundPort]:
+def usb_ports() -> list[FoundPort]:
     """List the displays on USB. Without libusb there are none to be seen."""
     try:
-        backend = find_backend("usb:")
-        return [
-            FoundPort(_name(device), _text(device, "product") or "display", *_ids(device))
-            for device in _displays(backend)
-        ]
+        displays = _displays(find_backend("usb:"))
     except (OpenError, usb.core.USBError):
         return []
+    ports = []
+    for device in displays:
+        product = _text(device, "product") or "display"
+        ports.append(FoundPort(_name(device), product, *_ids(device)))
+        usb.util.dispose_resources(device)
+    return sorted(ports, key=lambda port: port.port)
 
 
 class _Wanted:
@@ -196,24 +199,30 @@ class _Wanted:
         self._serial = match[3]
 
     def __call__(self, device: usb.core.Device) -> bool:
+        """Tell whether a display is the one. To read its serial number, it must be opened."""
         if self._ids and (device.idVendor, device.idProduct) != self._ids:
             return False
-        return not self._serial or _text(device, "serial_number", always=True) == self._serial
+        if not self._serial:
+            return True
+        _active_configuration(device)  # opens it, or says why not
+        return _text(device, "serial_number") == self._serial
 
 
 def _choose(port: str, wanted: _Wanted, backend: Any) -> usb.core.Device:
     """Give the only display that is wanted."""
-    displays: list[usb.core.Device] = []
     with _explained(port):
-        displays = list(_displays(backend))
+        displays = _displays(backend)
     chosen = []
     for device in displays:
         with _explained(port, device):
             if wanted(device):
                 chosen.append(device)
+    named = ", ".join(_name(device) for device in (chosen or displays)[:_SHOWN])
+    for device in displays:
+        if chosen != [device]:
+            usb.util.dispose_resources(device)
     if len(chosen) == 1:
         return chosen[0]
-    named = ", ".join(_name(device) for device in (chosen or displays)[:_SHOWN])
     if chosen:
         raise OpenError(
             f"{port}: there are {len(chosen)} displays", port=port, hint=f"choose one of {named}"
@@ -225,41 +234,31 @@ def _choose(port: str, wanted: _Wanted, backend: Any) -> usb.core.Device:
     )
 
 
-def _displays(backend: Any) -> Iterator[usb.core.Device]:
-    """Find the devices with an interface of the protocol's class.
-
-    One that cannot be looked at counts only if no other is a display: then it may be the one.
-    """
-    unseen: usb.core.USBError | None = None
-    any_display = False
+def _displays(backend: Any) -> list[usb.core.Device]:
+    """Find the devices with an interface of the protocol's class."""
+    displays = []
     for device in usb.core.find(find_all=True, backend=backend):
-        try:
-            is_display = any(True for _ in _display_interfaces(device))
-        except usb.core.USBError as error:
-            unseen = error
-            continue
-        except NotImplementedError:  # on some systems, a device of the system's own
-            continue
-        if is_display:
-            any_display = True
-            yield device
-    if unseen and not any_display and unseen.errno == errno.EBUSY:
-        raise unseen
+        # Some systems do not let us look at devices of their own.
+        with contextlib.suppress(usb.core.USBError, NotImplementedError):
+            if next(_display_interfaces(device), None):
+                displays.append(device)
+    return displays
 
 
 def _display_interfaces(
     device: usb.core.Device,
 ) -> Iterator[tuple[usb.core.Configuration, usb.core.Interface]]:
+    """Find the interfaces of the protocol's class that have a bulk endpoint each way."""
+    wanted = (spec.USB_CLASS, spec.USB_SUBCLASS, spec.USB_PROTOCOL, 0)
     for configuration in device:
         for interface in configuration:
-            triple = (
+            is_ours = wanted == (
                 interface.bInterfaceClass,
                 interface.bInterfaceSubClass,
                 interface.bInterfaceProtocol,
+                interface.bAlternateSetting,
             )
-            if triple == (spec.USB_CLASS, spec.USB_SUBCLASS, spec.USB_PROTOCOL) and (
-                interface.bAlternateSetting == 0
-            ):
+            if is_ours and _endpoint(interface, "OUT") and _endpoint(interface, "IN"):
                 yield configuration, interface
 
 
@@ -275,6 +274,10 @@ def _endpoint(interface: usb.core.Interface, direction: str) -> Any:
     return usb.util.find_descriptor(interface, custom_match=matches)
 
 
+def _packet_bytes(endpoint: usb.core.Endpoint) -> int:
+    return int(endpoint.wMaxPacketSize) & 0x7FF  # the bits above count packets, not bytes
+
+
 def _active_configuration(device: usb.core.Device) -> int:
     """Give the value of the configuration; 0 if there is none."""
     try:
@@ -285,15 +288,13 @@ def _active_configuration(device: usb.core.Device) -> int:
         raise
 
 
-def _text(device: usb.core.Device, name: str, *, always: bool = False) -> str | None:
-    """Give a text of the device, for which it must be opened; None if it has none to give."""
+def _text(device: usb.core.Device, name: str) -> str | None:
+    """Give a text of the device; None if it has none, or gives none."""
     try:
-        text: str | None = getattr(device, name)
+        text = getattr(device, name)
     except (usb.core.USBError, ValueError, NotImplementedError):
-        if always:
-            raise
         return None
-    return text
+    return text and "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def _ids(device: usb.core.Device) -> tuple[int, int, str | None]:
@@ -320,5 +321,9 @@ def _explained(port: str, device: usb.core.Device | None = None) -> Iterator[Non
         if error.errno == errno.EBUSY:
             raise busy(port, device) from error
         raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
-    except (ValueError, NotImplementedError) as error:
-        raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
+    except NotImplementedError as error:
+        raise OpenError(
+            f"{port} cannot be opened: {error}",
+            port=port,
+            hint="on Windows, the display needs the driver WinUSB: https://zadig.akeo.ie gives it",
+        ) from error

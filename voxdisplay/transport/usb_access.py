@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 from voxdisplay.errors import OpenError
 
 UDEV_FILE = "/etc/udev/rules.d/70-voxdisplay.rules"
+_PROC = Path("/proc")
 _MOST_HOLDERS = 5
 
 
@@ -51,17 +53,15 @@ def find_backend(port: str) -> Any:
 
 def forbidden(port: str, device: Any) -> OpenError:
     """Give the error for a device that may not be opened, with the way to be allowed."""
-    if not sys.platform.startswith("linux") or device is None:
-        return OpenError(
-            f"{port} may not be opened", port=port, hint="on Windows it needs the WinUSB driver"
+    if device is None or not sys.platform.startswith("linux"):
+        hint = "ask whoever runs this machine"
+    else:
+        rule = udev_rule(device.idVendor, device.idProduct)
+        hint = (
+            f"allow it, and plug the display in again:\n  echo '{rule}' | sudo tee {UDEV_FILE}\n"
+            "  sudo udevadm control --reload"
         )
-    rule = udev_rule(device.idVendor, device.idProduct)
-    return OpenError(
-        f"{port} may not be opened",
-        port=port,
-        hint=f"allow it, then plug the display in again:\n  echo '{rule}' | sudo tee {UDEV_FILE}\n"
-        "  sudo udevadm control --reload",
-    )
+    return OpenError(f"{port} may not be opened", port=port, hint=hint)
 
 
 def udev_rule(vid: int, pid: int) -> str:
@@ -74,17 +74,16 @@ def udev_rule(vid: int, pid: int) -> str:
 
 def busy(port: str, device: Any) -> OpenError:
     """Give the error for a device that another program uses, with its name if it can be known."""
-    names = holders(Path("/proc"), device.bus, device.address) if device is not None else []
-    by = f" by {', '.join(names)}" if names else ""
+    names = holders(_PROC, device.bus, device.address) if device is not None else []
     return OpenError(
-        f"{port} is busy: it is used{by or ' by another program'}",
+        f"{port} is busy: {', '.join(names) or 'something else'} has it open",
         port=port,
         hint="end that program, or close the display there",
     )
 
 
 def holders(proc: Path, bus: int | None, address: int | None) -> list[str]:
-    """Name the processes that have a USB device open, as far as the system lets us see.
+    """Name the other processes that have a USB device open, as far as the system lets us see.
 
     Parameters
     ----------
@@ -97,6 +96,8 @@ def holders(proc: Path, bus: int | None, address: int | None) -> list[str]:
     node = f"/dev/bus/usb/{bus or 0:03d}/{address or 0:03d}"
     names = []
     for process in sorted(proc.glob("[0-9]*")):
+        if process.name == str(os.getpid()):
+            continue
         try:
             held = any(str(fd.readlink()) == node for fd in (process / "fd").iterdir())
             if held:
