@@ -6,7 +6,8 @@ Names and layouts are those of the USB 2.0 specification, chapter 9. It knows no
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Final
+from types import SimpleNamespace
+from typing import Final, TypeAlias
 
 DEVICE: Final = 1
 CONFIGURATION: Final = 2
@@ -121,15 +122,13 @@ class Descriptors:
         return head + body
 
 
-class Record:
-    """A descriptor as a host's software shows it: its fields by their names in the standard."""
+Record: TypeAlias = SimpleNamespace
 
-    def __init__(self, names: str, values: tuple[int, ...]) -> None:
-        self.__dict__.update(zip(names.split(), values, strict=True))
-        self.extra_descriptors: list[int] = []
 
-    def __getattr__(self, name: str) -> int:  # only for who checks types: all are in __dict__
-        raise AttributeError(name)
+def _record(names: str, values: tuple[int, ...]) -> Record:
+    """Make a descriptor as a host's software shows it: its fields by the standard's names."""
+    fields = dict(zip(names.split(), values, strict=True))
+    return SimpleNamespace(**fields, extra_descriptors=[])
 
 
 _DEVICE_NAMES: Final = (
@@ -152,7 +151,7 @@ _ENDPOINT_NAMES: Final = (
 
 def read_device(data: bytes) -> Record:
     """Read a device descriptor."""
-    return Record(_DEVICE_NAMES, _DEVICE.unpack(data))
+    return _record(_DEVICE_NAMES, _DEVICE.unpack(data))
 
 
 def read_configuration(data: bytes) -> tuple[Record, list[tuple[Record, list[Record]]]]:
@@ -166,14 +165,14 @@ def read_configuration(data: bytes) -> tuple[Record, list[tuple[Record, list[Rec
         of what stands before them.
     """
     records = _records(data)
-    configuration = last = Record(_CONFIGURATION_NAMES, _CONFIGURATION.unpack(next(records)))
+    configuration = last = _record(_CONFIGURATION_NAMES, _CONFIGURATION.unpack(next(records)))
     interfaces: list[tuple[Record, list[Record]]] = []
     for raw in records:
         if raw[1] == INTERFACE:
-            last = Record(_INTERFACE_NAMES, _INTERFACE.unpack(raw))
+            last = _record(_INTERFACE_NAMES, _INTERFACE.unpack(raw))
             interfaces.append((last, []))
         elif raw[1] == ENDPOINT and interfaces:
-            last = Record(_ENDPOINT_NAMES, (*_ENDPOINT.unpack(raw), 0, 0))
+            last = _record(_ENDPOINT_NAMES, (*_ENDPOINT.unpack(raw), 0, 0))
             interfaces[-1][1].append(last)
         else:
             last.extra_descriptors += raw

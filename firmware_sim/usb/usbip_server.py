@@ -17,7 +17,7 @@ from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, Urb, UsbDevice
 _CHUNK: Final = 1 << 18
 # What a host may have under way, as Linux limits it for programs; and what it may leave unread.
 MOST_BYTES: Final = 16 << 20
-_CLOGGED: Final = 1 << 20
+CLOGGED: Final = 1 << 20
 _MOST_CONNECTIONS: Final = 16
 
 
@@ -47,8 +47,13 @@ class Connection:
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""
         self._in += data
-        while not self.over and (self._message() if self.imported else self._operation()):
-            pass
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Take what the host has sent, as long as it reads the answers."""
+        while not self.over and len(self.out) < CLOGGED:
+            if not (self._message() if self.imported else self._operation()):
+                return
 
     @property
     def imported(self) -> bool:
@@ -198,10 +203,10 @@ class Server:
         with contextlib.ExitStack() as stack:
             stack.callback(self._close_all)
             while True:
-                taking = [s for s, c in self._connections.items() if len(c.out) < _CLOGGED]
+                taking = [s for s, c in self._connections.items() if len(c.out) < CLOGGED]
                 sending = [s for s, c in self._connections.items() if c.out]
                 readers: list[socket.socket | int] = [listener, stop, *taking]
-                ready, writable, _ = select.select(readers, sending, [], self.device.until_due())
+                ready, _, _ = select.select(readers, sending, [], self.device.until_due())
                 if stop in ready:
                     return
                 if listener in ready:
@@ -215,7 +220,7 @@ class Server:
                 elif self.owner:  # the end of the connection says it all
                     self.owner.out.clear()
                     self.owner.over = True
-                for sock in {*writable, *self._connections}:
+                for sock in list(self._connections):
                     self._write(sock)
 
     def _accept(self, listener: socket.socket) -> None:
@@ -240,12 +245,11 @@ class Server:
             self._close(sock)
 
     def _write(self, sock: socket.socket) -> None:
-        connection = self._connections.get(sock)
-        if not connection:
-            return
+        connection = self._connections[sock]
         try:
             if connection.out:
                 del connection.out[: sock.send(connection.out)]
+                connection.go_on()
         except BlockingIOError:
             return
         except OSError:
