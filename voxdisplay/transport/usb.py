@@ -320,6 +320,10 @@ def _explained(port: str, device: usb.core.Device | None = None) -> Iterator[Non
             raise forbidden(port, device) from error
         if error.errno == errno.EBUSY:
             raise busy(port, device) from error
+        if error.errno in _GONE:
+            raise OpenError(
+                f"{port} went away while it was opened", port=port, hint="is it plugged in well?"
+            ) from error
         raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
     except NotImplementedError as error:
         raise OpenError(

@@ -1,0 +1,211 @@
+"""A display on USB as a person uses it: pushed to, pulled out, plugged in again."""
+
+import contextlib
+import json
+import os
+import random
+import threading
+import time
+
+import numpy as np
+import pytest
+from usb_lab import until
+
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+from firmware_sim.serve import listen
+from firmware_sim.usb import open_usbip
+from firmware_sim.usb.backend import Backend
+from firmware_sim.usb.device import UsbDevice
+from firmware_sim.usb.function import DisplayFunction
+from firmware_sim.usb.host import Bus
+from firmware_sim.usb.usbip_server import Server
+from firmware_sim.wire import Wire
+from voxdisplay.cli.main import main
+from voxdisplay.transport import usb as port_module
+
+PAPER = "examples/paper-curve.json"
+WAIT_S = 20  # for what hangs; nothing is measured by it
+ROUNDS = [
+    pytest.param(30, id="some"),
+    pytest.param(1000, id="1000", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("format_", ["mono1", "rgb888"])
+def test_push_over_usbip_to_another_process(emulator, run, tmp_path, format_):
+    dump, read = tmp_path / "front.npy", tmp_path / "read.npy"
+    arguments = ("--size", "17x64x40", "--format", format_, "--dump", dump)
+    device = emulator("--usbip", "127.0.0.1:0", *arguments)
+    assert device.port.startswith("usbip://127.0.0.1:")
+    for _ in range(2):
+        done = run("push", PAPER, "--port", device.port, "--verify", "--json")
+        assert done.returncode == 0, done.stderr
+        result = json.loads(done.stdout)
+        assert (result["verified"], result["port"]) == (True, device.port)
+    assert run("read", "--port", device.port, "-o", read).returncode == 0
+    assert np.array_equal(np.load(read), np.load(dump))
+    assert np.load(read).any()
+    assert device.stop() == 0
+    done = run("push", PAPER, "--port", device.port)
+    assert done.returncode == 3
+    assert f"{device.port} cannot be opened" in done.stderr
+
+
+def test_a_second_program_is_told_that_the_display_is_busy(emulator, run):
+    device = emulator("--usbip", "127.0.0.1:0", "--size", "3x5x7")
+    backend = open_usbip(device.port)
+    (node,) = backend.enumerate_devices()
+    handle = backend.open_device(node)
+    done = run("push", PAPER, "--port", device.port)
+    assert done.returncode == 3
+    assert "is busy" in done.stderr
+    backend.close_device(handle)
+    assert run("push", PAPER, "--port", device.port).returncode == 0
+
+
+def test_push_over_usb_in_this_process(run):
+    port = "sim-usb:?size=17x64x40&format=index8"
+    done = run("push", PAPER, "--port", port, "--verify", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verified"] is True
+
+
+def test_pulled_out_in_mid_push(run):
+    done = run("push", PAPER, "--port", "sim-usb:?size=17x64x40&unplug=2", "--verify")
+    assert done.returncode == 3
+    assert "is gone: it was unplugged" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "write sim-usb:" in run("push", PAPER, "--port", "sim-usb:x").stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--usb-class", "vendor"), "--usb-class is for --usbip"),
+        (("--usbip", "127.0.0.1:0", "--link", "x"), "leave out --tcp and --usbip"),
+        (("--usbip", "0.0.0.0:0"), "--allow-remote"),
+        (("--usbip", "here"), "write HOST:PORT"),
+    ],
+)
+def test_what_the_emulator_does_not_do(capsys, arguments, message):
+    from firmware_sim.__main__ import main as emulate  # noqa: PLC0415
+
+    with pytest.raises(SystemExit):
+        emulate(list(arguments))
+    assert message in capsys.readouterr().err
+
+
+# Pulled out at any moment
+
+
+class Emulated:
+    """A display that can be pulled out, and a way to it."""
+
+    def __init__(self):
+        wire = Wire(Device(Config((17, 64, 40), refresh=0, pixel_format="index8")))
+        self.device = UsbDevice(DisplayFunction(wire))
+
+    def idle(self):
+        return True
+
+
+class InProcess(Emulated):
+    def __init__(self):
+        super().__init__()
+        self.bus = Bus(self.device)
+        self.backend = Backend(self.bus)
+        self.pull, self.plug = self.bus.unplug, self.bus.plug
+
+
+@contextlib.contextmanager
+def over_usbip():
+    emulated = Emulated()
+    device = emulated.device
+    pulled = threading.Event()
+    until_due = device.function.until_due
+
+    def until_due_or_pulled():  # in the server's own thread
+        if pulled.is_set() and device.plugged:
+            device.unplug()
+        due = until_due()
+        return 0.002 if due is None else min(due, 0.002)
+
+    device.function.until_due = until_due_or_pulled
+
+    def plug():
+        pulled.clear()
+        device.plug()
+
+    emulated.pull, emulated.plug = pulled.set, plug
+    stop, stopper = os.pipe()
+    with listen("127.0.0.1", 0) as listener:
+        server = Server(device)
+        emulated.idle = lambda: not server._connections
+        thread = threading.Thread(target=server.serve, args=(listener, stop))
+        thread.start()
+        try:
+            emulated.backend = open_usbip(f"usbip://127.0.0.1:{listener.getsockname()[1]}")
+            yield emulated
+        finally:
+            os.write(stopper, b"\0")
+            thread.join(WAIT_S)
+            os.close(stop)
+            os.close(stopper)
+
+
+@contextlib.contextmanager
+def in_process():
+    yield InProcess()
+
+
+def held():
+    """Descriptors and threads of this process."""
+    return len(os.listdir("/proc/self/fd")), threading.active_count()  # noqa: PTH208
+
+
+@pytest.mark.parametrize("rounds", ROUNDS)
+@pytest.mark.parametrize("carrier", [in_process, over_usbip], ids=["usb", "usbip"])
+def test_pulled_out_at_any_moment(monkeypatch, capsys, carrier, rounds):
+    """An error in time, of the right kind; nothing is left over, and the next push works."""
+    chance = random.Random(rounds)
+    with carrier() as emulated:
+        backend = emulated.backend
+        monkeypatch.setattr(port_module, "find_backend", lambda port: backend)  # noqa: ARG005
+
+        def push():
+            began_s = time.monotonic()
+            code = main(["push", PAPER, "--port", "usb:", "--verify", "--timeout", "60"])
+            assert time.monotonic() - began_s < WAIT_S, "it took until the end of its patience"
+            said = capsys.readouterr()
+            assert "Traceback" not in said.err
+            until(emulated.idle, "the server to close its end")
+            return code, said.err
+
+        device = emulated.device
+        assert push()[0] == 0  # all that is loaded once is loaded
+        before, packets, began_s = held(), device.packets, time.monotonic()
+        assert push()[0] == 0
+        packets, seconds = device.packets - packets, time.monotonic() - began_s
+        gone = 0
+        for number in range(rounds):
+            if number % 2:
+                device.unplug_at = device.packets + chance.randint(1, packets)
+                code, said = push()
+            else:
+                timer = threading.Timer(chance.uniform(0, seconds), emulated.pull)
+                timer.start()
+                code, said = push()
+                timer.join()
+            device.unplug_at = None
+            if code:
+                gone += 1
+                assert code == 3
+                assert "is gone" in said or "no such display" in said or "went away" in said, said
+            if number % 2 == 0:
+                until(lambda: not device.plugged, "it to be out")  # maybe after all was done
+            if not device.plugged:
+                emulated.plug()
+            assert push()[0] == 0
+            assert held() == before
+        assert gone > rounds // 4
