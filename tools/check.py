@@ -25,7 +25,7 @@ def steps(*, fast: bool, fix: bool) -> dict[str, list[str]]:
         tests = ["-m", "pytest", "-q", "tests/conformance", "tests/unit/test_architecture.py"]
     else:
         coverage = [f"--cov={package}" for package in COVERED]
-        tests = ["-m", "pytest", "-m", "not slow", "--cov-branch", *coverage]
+        tests = ["-m", "pytest", "-m", "not slow and not kernel", "--cov-branch", *coverage]
         tests += ["--cov-report=term-missing:skip-covered", "--cov-fail-under=100"]
     return {
         "format": [*ruff_format, "."],

@@ -90,7 +90,7 @@ class DisplayFunction:
         self._out = ByteStream(packet)
         bulk = (Endpoint(_OUT, BULK, packet), Endpoint(_IN, BULK, packet))
         config = wire.device.config
-        texts = ("voxdisplay", config.name, config.serial)
+        texts = ("voxdisplay project", config.name, config.serial)
         self.descriptors = Descriptors(
             spec.USB_TEST_VENDOR, spec.USB_TEST_PRODUCT, *texts, *self._interfaces(bulk)
         )
