@@ -317,7 +317,7 @@ def _explained(port: str, device: usb.core.Device | None = None) -> Iterator[Non
         yield
     except usb.core.USBError as error:
         if error.errno == errno.EACCES:
-            raise forbidden(port, device) from error
+            raise forbidden(port) from error
         if error.errno == errno.EBUSY:
             raise busy(port, device) from error
         if error.errno in _GONE:

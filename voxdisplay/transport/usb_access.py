@@ -9,8 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from voxdisplay.errors import OpenError
+from voxdisplay.wire import spec
 
-UDEV_FILE = "/etc/udev/rules.d/70-voxdisplay.rules"
+# Lets who sits at the machine use any device with an interface of the protocol's class.
+UDEV_RULE = (
+    'SUBSYSTEM=="usb", ENV{ID_USB_INTERFACES}=="*:'
+    f'{spec.USB_CLASS:02x}{spec.USB_SUBCLASS:02x}{spec.USB_PROTOCOL:02x}:*", TAG+="uaccess"'
+)
+_UDEV_FILE = "/etc/udev/rules.d/70-voxdisplay.rules"
 _PROC = Path("/proc")
 _MOST_HOLDERS = 5
 
@@ -51,25 +57,15 @@ def find_backend(port: str) -> Any:
     return backend
 
 
-def forbidden(port: str, device: Any) -> OpenError:
+def forbidden(port: str) -> OpenError:
     """Give the error for a device that may not be opened, with the way to be allowed."""
-    if device is None or not sys.platform.startswith("linux"):
-        hint = "ask whoever runs this machine"
-    else:
-        rule = udev_rule(device.idVendor, device.idProduct)
-        hint = (
-            f"allow it, and plug the display in again:\n  echo '{rule}' | sudo tee {UDEV_FILE}\n"
-            "  sudo udevadm control --reload"
-        )
-    return OpenError(f"{port} may not be opened", port=port, hint=hint)
-
-
-def udev_rule(vid: int, pid: int) -> str:
-    """Give the rule that lets who sits at the machine use a device."""
-    return (
-        f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{vid:04x}", ATTR{{idProduct}}=="{pid:04x}", '
-        'MODE="0660", TAG+="uaccess"'
+    hint = (
+        f"allow it, and plug the display in again:\n  echo '{UDEV_RULE}' | sudo tee {_UDEV_FILE}\n"
+        "  sudo udevadm control --reload"
     )
+    if not sys.platform.startswith("linux"):
+        hint = "ask whoever runs this machine"
+    return OpenError(f"{port} may not be opened", port=port, hint=hint)
 
 
 def busy(port: str, device: Any) -> OpenError:
