@@ -216,13 +216,14 @@ def _serve(kind: str) -> None:
         sock, _ = listener.accept()
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         mode = b"e"
-        while data := sock.recv(CHUNK):
-            # Modes come as one letter, data as zeros.
-            mode = data.strip(b"\0")[-1:] or mode
-            if mode == b"e":
-                sock.sendall(data.replace(b"e", b""))
-            while mode == b"g":
-                sock.sendall(bytes(CHUNK))
+        with contextlib.suppress(ConnectionError):
+            while data := sock.recv(CHUNK):
+                # Modes come as one letter, data as zeros.
+                mode = data.strip(b"\0")[-1:] or mode
+                if mode == b"e":
+                    sock.sendall(data.replace(b"e", b""))
+                while mode == b"g":
+                    sock.sendall(bytes(CHUNK))
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from voxdisplay.wire import spec
 
 _READ_BYTES = 16384  # a multiple of every packet size there is, so that no packet is too long
 _WRITE_BYTES = 65536
+_REST_S = 0.02  # for as much as one read takes, at full speed; the end of a transfer ends it sooner
 _SHORTEST_S = 0.001  # libusb counts in milliseconds, and takes 0 for ever
 _MOST_FAULTS = 8  # stalls and packets that are too long, in a row
 _SHOWN = 10  # devices named in an error
@@ -90,7 +91,7 @@ class UsbTransport:
             # the first packet is waited for by itself, and the rest only as long as it flows.
             data = self._receive(packet_bytes, deadline_s - time.monotonic())
             if len(data) == packet_bytes:
-                data += self._receive(_READ_BYTES, _SHORTEST_S)
+                data += self._receive(_READ_BYTES, _REST_S)
             if data or time.monotonic() >= deadline_s:
                 return data
 
