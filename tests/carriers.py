@@ -15,6 +15,7 @@ import time
 import tty
 
 from serial import rfc2217
+from usb_carriers import USB_CARRIERS
 
 from voxdisplay.transport import open_transport
 from voxdisplay.transport.plugin import PluginTransport
@@ -225,6 +226,7 @@ CARRIERS = {
     "tcp": lambda: listening("tcp"),
     "socket": lambda: listening("socket"),
     "rfc2217": over_rfc2217,
+    **USB_CARRIERS,
 }
 
 

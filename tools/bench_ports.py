@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
+from bench_usb import on_usb, on_usbip
 from serial import rfc2217
 
 from voxdisplay.errors import TransportError
@@ -190,6 +191,8 @@ PORTS = [
     Port("tcp://", lambda: on_socket("tcp"), "bare TCP"),
     Port("socket://", lambda: on_socket("socket"), "bare TCP"),
     Port("rfc2217://", lambda: on_socket("rfc2217"), "bare TCP", 1 << 19),
+    Port("usb:", lambda: on_usb(Peer().feed)),
+    Port("usbip://", lambda: on_usbip(Peer().feed, in_another_process), "bare TCP"),
 ]
 
 

@@ -19,6 +19,7 @@ from typing import Any, Final
 from firmware_sim.config import Config, parse_number
 from firmware_sim.device import Device
 from firmware_sim.in_process import parse_url
+from firmware_sim.pace import paced
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction
@@ -50,8 +51,9 @@ def open_in_process(url: str) -> Backend:
     """
     fields = parse_url(url, "sim-usb:", _KEYS)
     faults, seed = fields.pop("faults", ()), fields.pop("seed", 0)
-    unplug_at = fields.pop("unplug_at", None)
-    device = UsbDevice(DisplayFunction(Wire(Device(Config(**fields)), faults, seed)))
+    baud, unplug_at = fields.pop("baud", 0), fields.pop("unplug_at", None)
+    wire = paced(Wire(Device(Config(**fields)), faults, seed), baud)
+    device = UsbDevice(DisplayFunction(wire))
     device.unplug_at = unplug_at
     return Backend(Bus(device))
 

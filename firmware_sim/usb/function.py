@@ -8,6 +8,7 @@ import struct
 from typing import Final
 
 from firmware_sim import spec
+from firmware_sim.pace import PacedWire
 from firmware_sim.usb.descriptors import (
     BULK,
     CS_INTERFACE,
@@ -84,7 +85,7 @@ class DisplayFunction:
         What it says of itself. Its serial number is the device's.
     """
 
-    def __init__(self, wire: Wire, packet: int = HIGH_SPEED_PACKET) -> None:
+    def __init__(self, wire: Wire | PacedWire, packet: int = HIGH_SPEED_PACKET) -> None:
         self.wire = wire
         self._packet = packet
         self._out = ByteStream(packet)
@@ -104,7 +105,7 @@ class DisplayFunction:
         """See `Function.takes`. What is longer than all of an empty ring, the device refuses."""
         del endpoint
         device = self.wire.device
-        return device.room >= min(size, device.config.rx_buffer)
+        return self.wire.takes() and device.room >= min(size, device.config.rx_buffer)
 
     def receive(self, endpoint: int, packet: bytes) -> None:
         """See `Function.receive`."""
@@ -143,7 +144,7 @@ class SerialFunction(DisplayFunction):
         Baud rate and the rest, as the host has set it last; they change nothing.
     """
 
-    def __init__(self, wire: Wire, packet: int = HIGH_SPEED_PACKET) -> None:
+    def __init__(self, wire: Wire | PacedWire, packet: int = HIGH_SPEED_PACKET) -> None:
         super().__init__(wire, packet)
         self.line_coding = _LINE_CODING
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from usb_lab import until
 
+import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.serve import listen
@@ -147,6 +148,21 @@ def in_process():
 def held():
     """Descriptors and threads of this process."""
     return len(os.listdir("/proc/self/fd")), threading.active_count()  # noqa: PTH208
+
+
+def test_it_comes_back_and_shows_its_picture_again(monkeypatch):
+    emulated = InProcess()
+    memory = emulated.device.function.wire.device.memory
+    monkeypatch.setattr(port_module, "find_backend", lambda port: emulated.backend)  # noqa: ARG005
+    with vd.open("usb:", reconnect_s=WAIT_S) as display:
+        frame = display.frame()
+        frame.set(np.full((40, 64, 17), 7, np.uint8))
+        emulated.pull()
+        back = threading.Timer(0.05, emulated.plug)
+        back.start()
+        display.present(frame)
+        back.join()
+    assert set(memory.front.pixels) == {7}
 
 
 @pytest.mark.parametrize("rounds", ROUNDS)

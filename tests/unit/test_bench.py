@@ -17,5 +17,15 @@ def test_the_table_of_curves_runs():
 def test_the_table_of_ports_runs():
     command = [sys.executable, str(BENCH), "ports", "--quick", "--repeats", "1"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
-    for port in ("bare pty", "/dev/pts/N", "tcp://", "socket://", "rfc2217://", "sim:"):
+    ports = (
+        "bare pty",
+        "/dev/pts/N",
+        "tcp://",
+        "socket://",
+        "rfc2217://",
+        "usb:",
+        "usbip://",
+        "sim:",
+    )
+    for port in ports:
         assert f"\n{port} " in run.stdout

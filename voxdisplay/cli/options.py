@@ -82,8 +82,8 @@ def port_options(function: _C) -> _C:
             envvar="VOXDISPLAY_PORT",
             metavar="PORT",
             shell_complete=_complete_port,
-            help="sim: | /dev/ttyUSB0 | COM3 | tcp://host:port | a pyserial URL. "
-            "Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
+            help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
+            "a pyserial URL. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
         ),
     ):
         function = option(function)

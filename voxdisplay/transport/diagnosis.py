@@ -41,7 +41,7 @@ def explain(port: str, error: BaseException) -> OpenError:
         return _forbidden(port, path)
     if number in {errno.EBUSY, errno.EAGAIN} or "PermissionError" in str(error):
         # Windows says of a port that is open elsewhere that access is denied.
-        return _busy(port, path)
+        return busy(port, path)
     if number == errno.ENOENT or "FileNotFoundError" in str(error):
         return OpenError(f"{port} does not exist", port=port, hint=_what_there_is())
     if number in {errno.EIO, errno.ENXIO, errno.ENODEV}:
@@ -83,7 +83,8 @@ def _what_there_is() -> str:
 # -- somebody else has it
 
 
-def _busy(port: str, path: str) -> OpenError:
+def busy(port: str, path: str) -> OpenError:
+    """Give the error for a port that somebody else has open, at a path of the system."""
     names = [f"{_program(pid)} (process {pid})" for pid in _holders(path)]
     if not names:
         return OpenError(

@@ -171,7 +171,7 @@ class UsbTransport:
         usb.util.dispose_resources(self._device)
 
 
-def usb_ports() -> list[FoundPort]:
+def found() -> list[FoundPort]:
     """List the displays on USB. Without libusb there are none to be seen."""
     try:
         displays = _displays(find_backend("usb:"))
@@ -179,8 +179,9 @@ def usb_ports() -> list[FoundPort]:
         return []
     ports = []
     for device in displays:
-        product = _text(device, "product") or "display"
-        ports.append(FoundPort(_name(device), product, *_ids(device)))
+        product = _text(device, "product")
+        description = product or "a display"
+        ports.append(FoundPort(_name(device), description, *_ids(device), product=product))
         usb.util.dispose_resources(device)
     return sorted(ports, key=lambda port: port.port)
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import re
 import sys
 from pathlib import Path
 from typing import Any
 
+import usb.backend.libusb1
+import usb.util
+
 from voxdisplay.errors import OpenError
+from voxdisplay.transport import diagnosis
 from voxdisplay.wire import spec
 
 # Lets who sits at the machine use any device with an interface of the protocol's class.
@@ -17,8 +19,7 @@ UDEV_RULE = (
     f'{spec.USB_CLASS:02x}{spec.USB_SUBCLASS:02x}{spec.USB_PROTOCOL:02x}:*", TAG+="uaccess"'
 )
 _UDEV_FILE = "/etc/udev/rules.d/70-voxdisplay.rules"
-_PROC = Path("/proc")
-_MOST_HOLDERS = 5
+_NODES = Path("/dev/bus/usb")
 
 
 def find_backend(port: str) -> Any:
@@ -40,8 +41,6 @@ def find_backend(port: str) -> Any:
         If there is none.
 
     """
-    import usb.backend.libusb1  # noqa: PLC0415 - loads libusb
-
     try:
         import libusb_package  # noqa: PLC0415 - need not be there
     except ImportError:
@@ -70,35 +69,11 @@ def forbidden(port: str) -> OpenError:
 
 def busy(port: str, device: Any) -> OpenError:
     """Give the error for a device that another program uses, with its name if it can be known."""
-    names = holders(_PROC, device.bus, device.address) if device is not None else []
+    if device is not None:
+        usb.util.dispose_resources(device)  # or else we would be one of those who have it open
+        node = _NODES / f"{device.bus or 0:03d}" / f"{device.address or 0:03d}"
+        if node.exists():
+            return diagnosis.busy(port, str(node))
     return OpenError(
-        f"{port} is busy: {', '.join(names) or 'something else'} has it open",
-        port=port,
-        hint="end that program, or close the display there",
+        f"{port} is busy", port=port, hint="another program has it open: end it, or let go there"
     )
-
-
-def holders(proc: Path, bus: int | None, address: int | None) -> list[str]:
-    """Name the other processes that have a USB device open, as far as the system lets us see.
-
-    Parameters
-    ----------
-    proc : Path
-        The folder of processes: ``/proc``.
-    bus, address : int or None
-        Place of the device.
-
-    """
-    node = f"/dev/bus/usb/{bus or 0:03d}/{address or 0:03d}"
-    names = []
-    for process in sorted(proc.glob("[0-9]*")):
-        if process.name == str(os.getpid()):
-            continue
-        try:
-            held = any(str(fd.readlink()) == node for fd in (process / "fd").iterdir())
-            if held:
-                name = re.sub(r"[^ -~]", "?", (process / "comm").read_text("utf-8").strip())
-                names.append(f"{name} (process {process.name})")
-        except OSError:  # it has ended, or is none of ours
-            continue
-    return names[:_MOST_HOLDERS]
