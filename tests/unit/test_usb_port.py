@@ -4,6 +4,7 @@ import errno
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from usb_gadget import NUMBER, GadgetDevice
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.descriptors import BULK, Descriptors, Endpoint, Interface
 from firmware_sim.usb.host import Bus
-from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport import open_transport, usb_access
 from voxdisplay.transport import usb as port_module
 from voxdisplay.transport.discovery import all_ports
@@ -289,6 +290,26 @@ def test_a_packet_that_is_too_long_is_passed_over():
     transport = UsbTransport("usb:x", backend=backend)
     backend.host.device.function.sending += [bytes(600), b"next"]
     assert transport.read(1) == b"next"
+    transport.close()
+
+
+def test_a_device_that_takes_its_bytes_too_slowly():
+    backend = Backend(Bus(GadgetDevice()))
+    function = backend.host.device.function
+    next_s = [0.0]
+
+    def takes(endpoint, size):
+        del endpoint, size
+        if time.monotonic() < next_s[0]:
+            return False
+        next_s[0] = time.monotonic() + 0.002
+        return True
+
+    function.takes = takes
+    function.until_due = lambda: max(0.0, next_s[0] - time.monotonic())
+    transport = UsbTransport("usb:x", backend=backend)
+    with pytest.raises(TransportTimeout, match=r"took only [0-9]+ of 1048576 bytes in time"):
+        transport.write(bytes(1 << 20), 0.1)
     transport.close()
 
 

@@ -115,6 +115,8 @@ class UsbTransport:
         while sent < len(data):
             piece = data[sent : sent + _WRITE_BYTES]
             sent += self._send(piece, deadline_s, f"only {sent} of {len(data)} bytes")
+            if sent < len(data) and time.monotonic() > deadline_s:
+                raise TransportTimeout(f"{self.port} took only {sent} of {len(data)} bytes in time")
         if data and len(data) % _packet_bytes(self._out) == 0:
             # The device may wait for more in a transfer of its own: tell it that this is all.
             self._send(b"", deadline_s, "no end of what was sent")
