@@ -30,8 +30,12 @@ NUMBER = 1  # of the display's interface
 POLL_S = 0.01  # how long a command waits at most, in a process of its own
 
 
-def pattern(size, start=0):
-    return bytes((start + i * 7 + (i >> 8)) & 0xFF for i in range(size))
+_PATTERN = bytes((i * 7 + (i >> 8)) & 0xFF for i in range(1 << 16))
+
+
+def pattern(size):
+    """Bytes of which no two packets are equal, up to 64 KiB."""
+    return (_PATTERN * (size // len(_PATTERN) + 1))[:size]
 
 
 class Gadget:

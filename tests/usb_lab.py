@@ -5,6 +5,7 @@ Each gives a backend of pyusb that sees it, and a way to tell it things.
 
 import contextlib
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -22,7 +23,8 @@ from firmware_sim.usb.usbip_host import UsbIpHost
 
 GADGET = Path(__file__).with_name("usb_gadget.py")
 VHCI = Path("/sys/devices/platform/vhci_hcd.0")
-DEADLINE_S = 60  # for what hangs; nothing is measured by it
+# For what hangs; nothing is measured by it.
+DEADLINE_S = 60 * int(os.environ.get("TEST_PATIENCE", "1"))
 
 
 def until(condition, what):

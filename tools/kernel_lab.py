@@ -76,8 +76,8 @@ def main() -> int:
     command = [sys.executable, "-m", "pytest", "-m", "kernel", "-p", "no:cacheprovider"]
     command += ["-p", "no:hypothesispytest", "--tb=short", "--color=no", *pytest_arguments]
     command += [str(path) for path in sorted(ROOT.glob("tests/**/test_*.py")) if _has_mark(path)]
-    writable = "TMPDIR=/dev/shm HOME=/dev/shm PYTHONDONTWRITEBYTECODE=1"
-    line = f"cd {shlex.quote(str(ROOT))} && export {writable} && exec {shlex.join(command)}"
+    settings = "TMPDIR=/dev/shm HOME=/dev/shm PYTHONDONTWRITEBYTECODE=1 TEST_PATIENCE=10"
+    line = f"cd {shlex.quote(str(ROOT))} && export {settings} && exec {shlex.join(command)}"
     return _run(kernel, _initrd(line))
 
 
