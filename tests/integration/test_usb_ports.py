@@ -65,23 +65,6 @@ def test_pulled_out_in_mid_push(run):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--usb-class", "vendor"), "--usb-class is for --usbip"),
-        (("--usbip", "127.0.0.1:0", "--link", "x"), "leave out --tcp and --usbip"),
-        (("--usbip", "0.0.0.0:0"), "--allow-remote"),
-        (("--usbip", "here"), "write HOST:PORT"),
-    ],
-)
-def test_what_the_emulator_does_not_do(capsys, arguments, message):
-    from firmware_sim.__main__ import main as emulate  # noqa: PLC0415
-
-    with pytest.raises(SystemExit):
-        emulate(list(arguments))
-    assert message in capsys.readouterr().err
-
-
 # Pulled out at any moment
 
 

@@ -512,6 +512,10 @@ def test_the_program_on_tcp() -> None:
         (["--tcp", "0.0.0.0:0"], "--allow-remote"),
         (["--tcp", "127.0.0.1:0", "--pty"], "not allowed with"),
         (["--tcp", "127.0.0.1:0", "--link", "x"], "leave out --tcp"),
+        (["--usbip", "127.0.0.1:0", "--link", "x"], "leave out --tcp and --usbip"),
+        (["--usbip", "here"], "HOST:PORT like 127.0.0.1:5000"),
+        (["--usbip", "0.0.0.0:0"], "--allow-remote"),
+        (["--usb-class", "vendor"], "--usb-class is for --usbip"),
         (["--dump", "/nowhere/at/all.npy"], "/nowhere"),
         (["--link", "/nowhere/at/all"], "/nowhere"),
     ],
@@ -543,6 +547,8 @@ def test_help_has_examples(
         (["--tcp", "127.0.0.1:0"], "tcp://127.0.0.1:"),
         (["--tcp", "[::1]:0"], "tcp://[::1]:"),
         (["--tcp", "0.0.0.0:0", "--allow-remote"], "tcp://0.0.0.0:"),
+        (["--usbip", "127.0.0.1:0"], "usbip://127.0.0.1:"),
+        (["--usbip", "127.0.0.1:0", "--usb-class", "cdc-acm"], "usbip://127.0.0.1:"),
     ],
 )
 def test_the_program_in_this_process(

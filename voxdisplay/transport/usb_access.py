@@ -51,7 +51,7 @@ def find_backend(port: str) -> Any:
         raise OpenError(
             f"{port}: there is no libusb on this machine",
             port=port,
-            hint="install it: pip install 'voxdisplay[usb]'",
+            hint="install it: pip install 'voxdisplay[usb]', or apt install libusb-1.0-0",
         )
     return backend
 
