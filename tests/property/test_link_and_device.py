@@ -269,7 +269,7 @@ def test_a_device_that_is_slower_than_patience_is_waited_for():
 def test_a_refused_frame_is_told_and_the_next_is_shown():
     rig = Rig()
     rig.refusals.add("OP")
-    rig.link.present([b"\xe0"])
+    rig.link.present([b"\x07"])
     rig.run(lambda: any(isinstance(event, Refused) for event in rig.events))
     for _ in range(2):
         frame = random_frame(rig.rng)

@@ -123,6 +123,14 @@ def test_full_bricks_that_stand_together_are_a_box():
     assert ops.count("OCT") >= 1
 
 
+def test_full_bricks_that_stand_apart_are_bricks():
+    grid = Grid(64, 48, 40)
+    voxels = np.concatenate((block((0, 0, 0), (15, 15, 15)), block((32, 16, 16), (47, 31, 31))))
+    (payload,) = encode(voxels, OCT | BOX, grid=grid)
+    assert payload == bytes.fromhex("64 00 00 00 00 64 02 01 01 00")
+    assert_draws([payload], voxels, grid=grid)
+
+
 def test_a_cuboid_anywhere_is_a_box():
     voxels = block((3, 5, 2), (30, 9, 17))
     (payload,) = encode(voxels, OCT | DOTS | BOX)
