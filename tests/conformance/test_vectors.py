@@ -11,6 +11,7 @@ from voxdisplay.palette import DEFAULT
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
+from voxdisplay.wire.arcs import encode_arcs
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.choice import Content, encode
 from voxdisplay.wire.colors import color_pieces
@@ -250,3 +251,17 @@ def test_dialogues_as_the_driver_reads_them(vector):
                 assert PixelFormat.of_wire(packet.format) is PixelFormat[facts["format"]]
                 for name in ("boot", "max_payload", "rx_buffer", "refresh"):
                     assert getattr(packet, name) == int(facts[name])
+
+
+@pytest.mark.parametrize(
+    "vector",
+    [v for v in document.vectors("ops") if v.name.startswith("arc-") and v.voxels()],
+    ids=str,
+)
+def test_arcs_of_the_driver(vector):
+    """These vectors give the voxels in the order of the curve: there is one way to code them."""
+    voxels = np.array(list(vector.voxels()))
+    pens = np.array([int.from_bytes(pixel, "little") for pixel in vector.voxels().values()])
+    pixel_format = PixelFormat(vector["format"].lower())
+    coding = Coding(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
+    assert encode_arcs(voxels, pens, coding) == [vector.hex("ops")]

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import document
 import pytest
 
 MUTANTS = Path(__file__).parents[1] / "mutants.py"
@@ -32,10 +31,15 @@ BEHAVIOUR = {
 }  # fmt: skip
 # Said to USB and not on the wire: the tests of USB hold these.
 CARRIER = {f"USB_{n}" for n in ("CLASS", "SUBCLASS", "PROTOCOL", "TEST_VENDOR", "TEST_PRODUCT")}
+# The models of ARC are told apart by these numbers; moved by one, they are still apart.
+TOLD_APART = {
+    f"ARC_{name}" for name in ("COUNT", "LONE", "TURN", "MAIN", "HISTORY", "RUNS", "MODELS")
+}
+# Seen 6 times or 7, a model learns as fast; curves are longer than a vector in tests of units only.
+LONGER = {"ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN"}
 # The document has no vector for these yet.
 AWAITED = {
-    # The driver codes no range-coded chains.
-    "driver": {"OP_ARC"} | {name for name in document.literals() if name.startswith("ARC_")},
+    "driver": {"ARC_BEHIND"},  # of who reads
     "device": {"CODE_OVERRUN"},  # the order of ERROR and ACK is free
 }
 
@@ -50,5 +54,6 @@ def test_a_literal_that_is_wrong_by_one_fails_some_vector(side, spec, excused):
         [sys.executable, MUTANTS, spec], capture_output=True, text=True, check=False, timeout=400
     )
     assert run.returncode == 0, run.stderr
-    excused = excused | RESERVED | MADE_OF_OTHERS | BEHAVIOUR | CARRIER | OF_THE_OTHER_SIDE[side]
+    excused = excused | RESERVED | MADE_OF_OTHERS | BEHAVIOUR | CARRIER | TOLD_APART | LONGER
+    excused |= OF_THE_OTHER_SIDE[side]
     assert set(run.stdout.split()) - excused <= AWAITED[side]

@@ -1,6 +1,5 @@
 """Range-coded chains: what the emulator draws of them, and when they are sent."""
 
-import document
 import numpy as np
 import pytest
 from drawing import page_after, values_of
@@ -55,19 +54,6 @@ def test_the_emulator_draws_what_was_meant(seed, grid, pixel_format, most, count
     meant[grid.index_of(voxels)] = pens
     shown = values_of(page_after(payloads, grid, pixel_format), pixel_format)
     assert np.array_equal(shown, meant)
-
-
-@pytest.mark.parametrize(
-    "vector",
-    [v for v in document.vectors("ops") if v.name.startswith("arc-") and v.voxels()],
-    ids=str,
-)
-def test_the_vectors_are_the_coders_own_bytes(vector):
-    pixel_format = PixelFormat(vector["format"].lower())
-    voxels = np.array(list(vector.voxels()))
-    pens = np.array([int.from_bytes(pixel, "little") for pixel in vector.voxels().values()])
-    coding = Coding(Grid(*vector.grid), pixel_format, 1024, ARC)
-    assert encode_arcs(voxels, pens, coding) == [vector.hex("ops")]
 
 
 def test_a_long_straight_line_is_cut_where_a_piece_may_be_longest():
