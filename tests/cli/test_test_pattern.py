@@ -8,7 +8,7 @@ import pytest
 from conftest import ROOT
 
 # The emulator, with a fault of a kind that devices have: voxel (x, y, z) of an op is put elsewhere
-# in memory, while memory is read out, and its digest taken, in scan order.
+# in memory, while memory is read out, and its digest taken, in scan order. It knows single voxels, and neither lines nor bricks.
 FAULTY = """
 import sys
 from firmware_sim import grid
@@ -42,6 +42,7 @@ def faulty():
 
     def start(fault, *more):
         command = [sys.executable, "-c", FAULTY, fault, "--tcp", "127.0.0.1:0", "--size", SIZE]
+        command += ["--features", "dots,read,digest"]
         process = subprocess.Popen([*command, *more], stdout=subprocess.PIPE, text=True, cwd=ROOT)
         running.append(process)
         return json.loads(process.stdout.readline())["port"]

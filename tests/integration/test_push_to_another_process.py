@@ -25,7 +25,9 @@ def drawn(rows, size, format_):
 def test_the_dump_is_the_sequence(emulator, run, tmp_path, size, format_):
     text = "x".join(map(str, size))
     dump, voxels = tmp_path / "out.npy", tmp_path / "voxels.npy"
-    device = emulator("--pty", "--dump", dump, "--size", text, "--format", format_)
+    features = "line,box,dots,oct,read,digest"  # a palette of its own would have orange elsewhere
+    options = ("--size", text, "--format", format_, "--features", features)
+    device = emulator("--pty", "--dump", dump, *options)
 
     pushed = run("push", PAPER, "--port", device.port, "--fit", "none", "--verify", "--json")
     assert pushed.returncode == 0, pushed.stderr
