@@ -8,27 +8,25 @@ import pytest
 from conftest import ROOT
 
 # The emulator, with a fault of a kind that devices have: voxel (x, y, z) of an op is put elsewhere
-# in memory, while memory is read out, and its digest taken, in scan order. It knows single voxels, and neither lines nor bricks.
+# in memory, while runs are written, memory is read out and its digest taken, in scan order.
 FAULTY = """
 import sys
-from firmware_sim import grid
+from array import array
+from firmware_sim.memory import Page
 
 fault = sys.argv.pop(1)
-index, init = grid.Grid.index, grid.Grid.__post_init__
+nx, ny, nz = 12, 12, 7
+plot = Page.plot
 
-def wired(self, x, y, z):
-    if x >= self.nx or y >= self.ny or z >= self.nz:
-        return None
-    return index(self, y, x, z) if fault == "swapped" else index(self, x, y, self.nz - 1 - z)
+def wired(index):
+    x, y, z = index % nx, index // nx % ny, index // nx // ny
+    return y + nx * (x + ny * z) if fault == "swapped" else x + nx * (y + ny * (nz - 1 - z))
 
-def strides(self):
-    init(self)
-    x, y, z = self.strides
-    changed = (y, x, z) if fault == "swapped" else (x, y, -z)
-    object.__setattr__(self, "strides", changed)
+def fill(self, starts, count, pixel):
+    self.plot([start + k for start in starts for k in range(count)], pixel)
 
-grid.Grid.index, grid.Grid.__post_init__ = wired, strides
-grid.Grid.leaves = lambda *_: False
+Page.plot = lambda self, indices, pixel: plot(self, array("Q", map(wired, indices)), pixel)
+Page.fill = fill
 from firmware_sim.__main__ import main
 sys.exit(main())
 """
@@ -42,7 +40,6 @@ def faulty():
 
     def start(fault, *more):
         command = [sys.executable, "-c", FAULTY, fault, "--tcp", "127.0.0.1:0", "--size", SIZE]
-        command += ["--features", "dots,read,digest"]
         process = subprocess.Popen([*command, *more], stdout=subprocess.PIPE, text=True, cwd=ROOT)
         running.append(process)
         return json.loads(process.stdout.readline())["port"]
