@@ -38,8 +38,12 @@ class Decoder:
 
     def draw(self, payload: bytes) -> None:
         """Draw the ops of one packet, or raise `Refused`."""
-        self._payload, self._at = payload, 0
         self.begin_packet()
+        self.go_on(payload)
+
+    def go_on(self, payload: bytes) -> None:
+        """Draw ops that follow others in the same packet."""
+        self._payload, self._at = payload, 0
         while self._at < len(payload):
             self._op_at = self._at
             self._op(self._byte())

@@ -6,6 +6,7 @@ No coder: each function writes just the op that it is asked for (section 7 of pr
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from voxdisplay.conformance.decoder import Decoder, Place, Refused
@@ -101,28 +102,19 @@ def dots(said: Said, places: Sequence[Place]) -> bytes:
 
 def brick(said: Said, level: int, at: Place, voxels: Iterable[Place]) -> bytes:
     """Give OCT for voxels of a brick; a node of which all are written has the mask 00."""
-    side = 1 << level
-    corner = tuple(a * side for a in at)
-    inside = {tuple(v - c for v, c in zip(place, corner, strict=True)) for place in voxels}
+    inside = {tuple(v - (a << level) for v, a in zip(voxel, at, strict=True)) for voxel in voxels}
     out = bytes((spec.OP_OCT | level,)) + xyz(said, at)
     nodes = [(0, 0, 0)]
-    while side > 1:
-        side //= 2
+    for size in reversed(range(level)):  # children of a node have the side 2 ** size
+        written = Counter((x >> size, y >> size, z >> size) for x, y, z in inside)
         children = []
         for x, y, z in nodes:
-            counts = []
-            for bit in range(8):
-                cx, cy, cz = x + side * (bit & 1), y + side * (bit >> 1 & 1), z + side * (bit >> 2)
-                count = sum(
-                    cx <= vx < cx + side and cy <= vy < cy + side and cz <= vz < cz + side
-                    for vx, vy, vz in inside
-                )
-                counts.append((count, (cx, cy, cz)))
-            if all(count == side**3 for count, _ in counts):
+            named = [(2 * x + (c & 1), 2 * y + (c >> 1 & 1), 2 * z + (c >> 2)) for c in range(8)]
+            if all(written[child] == 8**size for child in named):
                 out += b"\0"
                 continue
-            out += bytes((sum(1 << bit for bit, (count, _) in enumerate(counts) if count),))
-            children += [child for count, child in counts if count]
+            out += bytes((sum(1 << c for c, child in enumerate(named) if written[child]),))
+            children += [child for child in named if written[child]]
         nodes = children
     return out
 
@@ -198,13 +190,13 @@ def some_op(said: Said, rng: random.Random) -> bytes:
     if said.has("LINE"):
         makers.append(lambda: line(said, some_place(said, rng), some_place(said, rng)))
     if said.has("BOX"):
-        makers.append(lambda: box(said, (place := some_place(said, rng)), near(said, rng, place)))
+        makers.append(lambda: box(said, (place := some_place(said, rng)), near(said, rng, place, 4)))
     if said.has("DOTS"):
         makers.append(
             lambda: dots(said, [some_place(said, rng) for _ in range(rng.randint(1, 9))])
         )
     if said.has("OCT"):
-        makers.append(lambda: some_brick(said, rng, rng.randrange(5), rng.random()))
+        makers.append(lambda: some_brick(said, rng, rng.randrange(5), rng.random() ** 8))
     if said.has("DIFF"):
         makers.append(lambda: differences([rng.randint(-8, 7) for _ in range(rng.randint(1, 70))]))
     if said.has("PALETTE"):
@@ -227,7 +219,7 @@ def _some_chain(said: Said, rng: random.Random) -> bytes:
     return move(said, start) + chain(said, octant, crumbs)
 
 
-def near(said: Said, rng: random.Random, place: Place, far: int = 8) -> Place:
+def near(said: Said, rng: random.Random, place: Place, far: int) -> Place:
     """Give a place on the grid that is not far from another on each axis."""
     x, y, z = (
         min(max(a + rng.randint(-far, far), 0), side - 1)
@@ -237,31 +229,36 @@ def near(said: Said, rng: random.Random, place: Place, far: int = 8) -> Place:
 
 
 def some_brick(said: Said, rng: random.Random, level: int, density: float) -> bytes:
-    """Give OCT for some of a brick's voxels that are on the grid."""
-    side = 1 << level
-    at = tuple(rng.randrange(-(-n // side)) for n in said.grid)
-    inside = [
-        (x, y, z)
-        for z in range(at[2] * side, min((at[2] + 1) * side, said.nz))
-        for y in range(at[1] * side, min((at[1] + 1) * side, said.ny))
-        for x in range(at[0] * side, min((at[0] + 1) * side, said.nx))
+    """Give OCT for about so many of a brick's voxels that are on the grid."""
+    at = tuple(rng.randrange(-(-side >> level)) for side in said.grid)
+    spans = [
+        range(a << level, min(a + 1 << level, side)) for a, side in zip(at, said.grid, strict=True)
     ]
-    chosen = [place for place in inside if rng.random() < density] or inside[:1]
+    if density == 1:
+        chosen = [(x, y, z) for z in spans[2] for y in spans[1] for x in spans[0]]
+    else:
+        count = max(1, int(density * 8**level))
+        chosen = [
+            (rng.choice(spans[0]), rng.choice(spans[1]), rng.choice(spans[2]))
+            for _ in range(count)
+        ]
     return brick(said, level, (at[0], at[1], at[2]), chosen)
 
 
 def program(said: Said, rng: random.Random, size: int) -> bytes:
     """Give ops of at most ``size`` bytes that no device refuses."""
-    payload = b""
-    for _ in range(200):
-        more = payload + some_op(said, rng)
-        if len(more) > size:
-            break
+    payload = run()
+    decoder = Decoder(said, Page())
+    decoder.draw(payload)
+    for _ in range(60):
+        op = some_op(said, rng)
+        before = decoder.cursor, decoder.pen
         try:
-            Decoder(said, Page()).draw(more)
+            if len(payload) + len(op) <= size:
+                decoder.go_on(op)
+                payload += op
         except Refused:
-            continue
-        payload = more
+            decoder.cursor, decoder.pen = before
     return payload
 
 

@@ -115,7 +115,16 @@ def overrun(probe: Probe) -> None:
     while packets and budget > 0:
         burst.append(packets.pop(0))
         budget -= len(wire(burst[-1]))
-    come = probe.say(data(0, 0, b"", CLEAR | COMMIT), *burst)
+    probe.send(data(0, 0, b"", CLEAR | COMMIT), *burst)
+    come = []
+    for answer in probe.answers():  # a STATUS right behind might be lost, too
+        come.append(answer)
+        is_ack = answer.kind == spec.TYPE_ACK
+        if is_ack and answer.last == len(burst):
+            break
+        if shown_at(come, 0) < len(come) and any(a.kind == spec.TYPE_ERROR for a in come):
+            break
+    come += probe.sync()
     errors = [answer for answer in come if answer.kind == spec.TYPE_ERROR]
     if not errors:
         probe.demand_ack(probe.state, next=1 + len(burst), damaged=damaged)
