@@ -70,9 +70,7 @@ class Decoder:
     def parts(self, raw: bytes, count: int, bits: int) -> list[int]:
         """Crumbs, nibbles and MONO1 pixels: the first is in the lowest bits of the first byte."""
         per_byte = 8 // bits
-        return [
-            raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)
-        ]
+        return [raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)]
 
     def steps_of(self, byte: int) -> int:
         """A chain has n steps behind the voxel where it begins, and the byte is n - 1."""

@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.probe import Broken, Probe
+from voxdisplay.conformance.probe import Broken, NotApplicable, Probe
 from voxdisplay.wire import spec
 
 _MOST_S = 20.0
@@ -41,7 +41,7 @@ def keep(probe: Probe) -> Kept | None:
             probe.read_range(at, page.count)  # is it a picture at all?
             payloads.append(ops.skip(at) + page.tail)
             at += page.count
-    except Broken:
+    except (Broken, NotApplicable):
         return None
     return Kept(tuple(payloads), digest)
 

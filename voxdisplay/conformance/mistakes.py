@@ -217,9 +217,7 @@ MISTAKES: tuple[type[Decoder], ...] = tuple(
 )
 
 
-def pages_by_mistake(
-    said: Said, base: Page, payloads: list[bytes]
-) -> Iterator[tuple[str, Page]]:
+def pages_by_mistake(said: Said, base: Page, payloads: list[bytes]) -> Iterator[tuple[str, Page]]:
     """Draw payloads with each misreading; give what it says of itself, and its page."""
     for mistake in MISTAKES:
         decoder = mistake(said, base.copy())
@@ -237,8 +235,14 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
     old = before.digest(said)
     if said.voxels <= 1 << 20:
         dark = sum(mix(i, 0) for i in range(said.voxels) if i not in page.pixels)
-        yield (right + dark) & 0xFFFFFFFF, "the digest adds dark voxels: only those that are lit count"
-    yield old, "this is the digest of the picture before: that of the front page after the swap counts"
+        yield (
+            (right + dark) & 0xFFFFFFFF,
+            "the digest adds dark voxels: only those that are lit count",
+        )
+    yield (
+        old,
+        "this is the digest of the picture before: that of the front page after the swap counts",
+    )
     yield (right + old) & 0xFFFFFFFF, "the old pictures' terms are still in the digest"
     yield ~right & 0xFFFFFFFF, "the digest is inverted"
     lit = [mix(i, value) for i, value in page.pixels.items()]
@@ -261,6 +265,9 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
         without = Page(page.pixels)
         yield without.digest(said), "the palette is not in the digest"
         whole = sum(mix(said.voxels + i, 0x1000000 + c) for i, c in enumerate(page.palette))
-        yield (without.digest(said) + whole) & 0xFFFFFFFF, "entries of the default palette count too"
+        yield (
+            (without.digest(said) + whole) & 0xFFFFFFFF,
+            "entries of the default palette count too",
+        )
     h = [i * spec.DIGEST_MUL_INDEX + v * spec.DIGEST_MUL_VALUE for i, v in page.pixels.items()]
     yield sum(h) & 0xFFFFFFFF, "the digest leaves out all steps of mix but the first"

@@ -190,11 +190,11 @@ def some_op(said: Said, rng: random.Random) -> bytes:
     if said.has("LINE"):
         makers.append(lambda: line(said, some_place(said, rng), some_place(said, rng)))
     if said.has("BOX"):
-        makers.append(lambda: box(said, (place := some_place(said, rng)), near(said, rng, place, 4)))
-    if said.has("DOTS"):
         makers.append(
-            lambda: dots(said, [some_place(said, rng) for _ in range(rng.randint(1, 9))])
+            lambda: box(said, (place := some_place(said, rng)), near(said, rng, place, 4))
         )
+    if said.has("DOTS"):
+        makers.append(lambda: dots(said, [some_place(said, rng) for _ in range(rng.randint(1, 9))]))
     if said.has("OCT"):
         makers.append(lambda: some_brick(said, rng, rng.randrange(5), rng.random() ** 8))
     if said.has("DIFF"):
@@ -239,8 +239,7 @@ def some_brick(said: Said, rng: random.Random, level: int, density: float) -> by
     else:
         count = max(1, int(density * 8**level))
         chosen = [
-            (rng.choice(spans[0]), rng.choice(spans[1]), rng.choice(spans[2]))
-            for _ in range(count)
+            (rng.choice(spans[0]), rng.choice(spans[1]), rng.choice(spans[2])) for _ in range(count)
         ]
     return brick(said, level, (at[0], at[1], at[2]), chosen)
 

@@ -134,6 +134,10 @@ def damage(stream: bytes, longest: int) -> int:
 # -- what a device answers
 
 
+class NoSuchField(AttributeError):
+    """An answer was asked for what its type does not have: it is of another type than it must be."""
+
+
 @dataclass(frozen=True, slots=True)
 class Answer:
     """A packet of a device. The fields of its type's layout are attributes, too.
@@ -181,7 +185,7 @@ class Answer:
         for (field, _, _), value in zip(layout, self._values(), strict=True):
             if field == name:
                 return int(value)
-        raise AttributeError(f"{TYPE_NAMES.get(self.kind, self.kind)} has no field {name}")
+        raise NoSuchField(f"no field {name!r} in {self}")
 
     def _values(self) -> tuple[int, ...]:
         layout = _STRUCTS.get(self.kind)

@@ -161,11 +161,14 @@ class Probe:
         """Give the next answer; None if none comes until then (`time.monotonic`)."""
         while not self._heard:
             left_s = until_s - time.monotonic()
-            if left_s <= 0:
+            come = self._pipe.read(max(left_s, 0.0))  # what is there already is never missed
+            if not come and left_s <= 0:
                 return None
-            for answer in self.hearing.feed(self._pipe.read(left_s)):
+            for answer in self.hearing.feed(come):
                 self._note(sent=False, data=answer.body, text=str(answer))
                 self._heard.append(answer)
+            if left_s < -self._timeout_s:  # it babbles
+                return None
         self._unanswered_bytes = 0
         return self._heard.popleft()
 
@@ -422,7 +425,11 @@ class Probe:
         right = must.digest(said)
         if pixels == must.pixels:
             likely = next(
-                (why for d, why in mistakes.digests_by_mistake(said, must, before) if d == ack.digest),
+                (
+                    why
+                    for d, why in mistakes.digests_by_mistake(said, must, before)
+                    if d == ack.digest
+                ),
                 "the pixels read back are right: the digest is not kept as section 8 says",
             )
             raise Broken(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)

@@ -11,6 +11,7 @@ from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist
 from voxdisplay.conformance import first_contact
 from voxdisplay.conformance.catalogue import CHECKS, Check
 from voxdisplay.conformance.keeping import keep, put_back
+from voxdisplay.conformance.packets import NoSuchField
 from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Silent
 from voxdisplay.conformance.said import FORMATS, Said
 from voxdisplay.errors import TransportError
@@ -154,7 +155,11 @@ def examine(
     if not met or probe.said.format not in FORMATS or not probe.said.voxels:
         first = first_contact.CHECK
         came = str(probe.info) if met else "nothing that could be read"
-        end(Result(first, Verdict.BROKEN, "INFO that can be read", came, likely, log=tuple(probe.log)))
+        end(
+            Result(
+                first, Verdict.BROKEN, "INFO that can be read", came, likely, log=tuple(probe.log)
+            )
+        )
         for check in selected:
             end(Result(check, Verdict.NOT_RUN, reason="the device could not be talked to"))
         return report
@@ -177,7 +182,9 @@ def examine(
                 gone = "the device does not answer any more"
         except TransportError as error:
             gone = str(error)
-            result = Result(check, Verdict.BROKEN, "the port stays open", gone, log=tuple(probe.log))
+            result = Result(
+                check, Verdict.BROKEN, "the port stays open", gone, log=tuple(probe.log)
+            )
         end(result)
     if not gone:
         report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
@@ -207,6 +214,8 @@ def _make(probe: Probe, check: Check) -> Result:
         result = Result(check, Verdict.NOT_APPLICABLE, reason=str(reason))
     except Broken as broken:
         result = _broken(probe, check, broken)
+    except NoSuchField as field:
+        result = _broken(probe, check, Broken("an answer of another type", str(field)))
     made = tuple(probe.log)
     try:
         probe.open()

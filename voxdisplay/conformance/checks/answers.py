@@ -23,7 +23,9 @@ def answers_checked(probe: Probe) -> None:
     demand_none(probe, "checked", "the CRC-32 of header and payload, lowest byte first")
 
 
-@check("4", "answers-whole", "all that the device sends is ACK, INFO, PAGE or ERROR, with all fields")
+@check(
+    "4", "answers-whole", "all that the device sends is ACK, INFO, PAGE or ERROR, with all fields"
+)
 def answers_whole(probe: Probe) -> None:
     demand_none(probe, "whole", "a packet of a device's type, and long enough")
 

@@ -73,7 +73,9 @@ def arc_curves(probe: Probe) -> None:
             probe.show(fitting(said, walk(said, rng, steps, steady), pen))
 
 
-@check("7.7", "arc-pieces", "pieces jump or go on, each with its pen", feature("ARC"), seen, long_axis)
+@check(
+    "7.7", "arc-pieces", "pieces jump or go on, each with its pen", feature("ARC"), seen, long_axis
+)
 def arc_pieces(probe: Probe) -> None:
     said, rng = probe.said, probe.rng
     for _ in range(6):
@@ -92,7 +94,13 @@ def arc_pieces(probe: Probe) -> None:
         probe.show(ops.pen(said, 1) + op)
 
 
-@check("7.7", "arc-behind-ops", "other ops may come before it, and their pen holds", feature("ARC"), seen)
+@check(
+    "7.7",
+    "arc-behind-ops",
+    "other ops may come before it, and their pen holds",
+    feature("ARC"),
+    seen,
+)
 def arc_behind_ops(probe: Probe) -> None:
     said = probe.said
     place = ops.some_place(said, probe.rng)
@@ -100,7 +108,9 @@ def arc_behind_ops(probe: Probe) -> None:
     probe.show(ops.pen(said, value) + ops.skip(said.voxels) + encode(said, [Piece((place,))]))
 
 
-@check("7.7", "arc-long", "memory and models hold out over long runs", feature("ARC"), seen, long_axis)
+@check(
+    "7.7", "arc-long", "memory and models hold out over long runs", feature("ARC"), seen, long_axis
+)
 def arc_long(probe: Probe) -> None:
     said = probe.said
     main = said.grid.index(max(said.grid))
@@ -116,7 +126,13 @@ def arc_long(probe: Probe) -> None:
     probe.show(fitting(said, places))
 
 
-@check("7.7", "arc-cut", "an ARC that needs more bytes is refused: TRUNCATED", feature("ARC"), long_axis)
+@check(
+    "7.7",
+    "arc-cut",
+    "an ARC that needs more bytes is refused: TRUNCATED",
+    feature("ARC"),
+    long_axis,
+)
 def arc_cut(probe: Probe) -> None:
     said = probe.said
     op = fitting(said, walk(said, probe.rng, 60, 0.6))
@@ -127,14 +143,22 @@ def arc_cut(probe: Probe) -> None:
                 probe.refuse_ops(ops.run() + op[:size], refused.code, 1)
 
 
-@check("7.7", "arc-too-many", "an ARC with a byte too many is refused: PADDING", feature("ARC"), long_axis)
+@check(
+    "7.7",
+    "arc-too-many",
+    "an ARC with a byte too many is refused: PADDING",
+    feature("ARC"),
+    long_axis,
+)
 def arc_too_many(probe: Probe) -> None:
     said = probe.said
     op = fitting(said, walk(said, probe.rng, 30, 0.6))[: said.max_payload - 2]
     probe.refuse_ops(ops.run() + op + b"\0", spec.CODE_PADDING, 1)
 
 
-@check("7.7", "arc-off-the-grid", "an ARC that begins or leads off the grid is refused", feature("ARC"))
+@check(
+    "7.7", "arc-off-the-grid", "an ARC that begins or leads off the grid is refused", feature("ARC")
+)
 def arc_off_the_grid(probe: Probe) -> None:
     said = probe.said
     for axis, side in enumerate(said.grid):

@@ -24,7 +24,9 @@ def levels(probe: Probe) -> None:
             probe.show(_payload(probe, level, density))
 
 
-@check("7.4", "children", "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)", feature("OCT"), seen)
+@check(
+    "7.4", "children", "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)", feature("OCT"), seen
+)
 def children(probe: Probe) -> None:
     for level in (1, 2, 3, 4):
         side = 1 << level - 1
@@ -34,7 +36,9 @@ def children(probe: Probe) -> None:
                 probe.show(ops.brick(probe.said, level, (0, 0, 0), [child]))
 
 
-@check("7.4", "full-nodes", "a mask 00 is a node of which all voxels are written", feature("OCT"), seen)
+@check(
+    "7.4", "full-nodes", "a mask 00 is a node of which all voxels are written", feature("OCT"), seen
+)
 def full_nodes(probe: Probe) -> None:
     said = probe.said
     for level in range(1, spec.LIMIT_MAX_LEVEL + 1):
@@ -43,7 +47,9 @@ def full_nodes(probe: Probe) -> None:
         probe.show(_payload(probe, level, 1.0))
 
 
-@check("7.4", "brick-cursor", "OCT leaves cursor and pen as they are", feature("OCT"), seen, voxels(2))
+@check(
+    "7.4", "brick-cursor", "OCT leaves cursor and pen as they are", feature("OCT"), seen, voxels(2)
+)
 def brick_cursor(probe: Probe) -> None:
     said = probe.said
     brick = ops.brick(said, 0, (0, 0, 0), [])
@@ -64,17 +70,36 @@ def differences(probe: Probe) -> None:
     probe.show(ops.pen(said, 5) + ops.differences([-8] * up))
 
 
-@check("7.5", "difference-pen", "after DIFF the pen is the last pixel", feature("DIFF"), seen, voxels(4))
+@check(
+    "7.5",
+    "difference-pen",
+    "after DIFF the pen is the last pixel",
+    feature("DIFF"),
+    seen,
+    voxels(4),
+)
 def difference_pen(probe: Probe) -> None:
     said = probe.said
     probe.show(ops.pen(said, 9) + ops.differences([3, -1]) + ops.run(2))
     probe.show(ops.literal(said, [20]) + ops.differences([1, 2, 3]))
 
 
-@check("7.6", "colors", "COLORS sets entries of the page's palette", feature("PALETTE"), feature("DIGEST"))
+@check(
+    "7.6",
+    "colors",
+    "COLORS sets entries of the page's palette",
+    feature("PALETTE"),
+    feature("DIGEST"),
+)
 def colors(probe: Probe) -> None:
     rng = probe.rng
-    for first, n in ((0, 1), (255, 1), (7, 3), (250, 6), (0, min(256, probe.said.max_payload // 3 - 1))):
+    for first, n in (
+        (0, 1),
+        (255, 1),
+        (7, 3),
+        (250, 6),
+        (0, min(256, probe.said.max_payload // 3 - 1)),
+    ):
         values = [(rng.randrange(256), rng.randrange(256), rng.randrange(256)) for _ in range(n)]
         probe.show(ops.colors(first, values) + ops.run(), exactly=True)
 

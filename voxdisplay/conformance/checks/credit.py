@@ -41,7 +41,11 @@ def returned(probe: Probe) -> None:
         )
 
 
-@check("9.2", "not-withdrawn", "room that was promised is not taken back", )
+@check(
+    "9.2",
+    "not-withdrawn",
+    "room that was promised is not taken back",
+)
 def not_withdrawn(probe: Probe) -> None:
     said = probe.said
     room = min(said.rx_buffer, _BURST_BYTES) - spec.LIMIT_RESERVE
@@ -65,7 +69,12 @@ def not_withdrawn(probe: Probe) -> None:
     probe.demand_ack(probe.state, next=len(burst))
 
 
-@check("9.2", "room-is-there", "all that credit allows is taken, also behind a frame that waits", ticking)
+@check(
+    "9.2",
+    "room-is-there",
+    "all that credit allows is taken, also behind a frame that waits",
+    ticking,
+)
 def room_is_there(probe: Probe) -> None:
     said = probe.said
     for round_ in range(3):
@@ -95,14 +104,18 @@ def zeros_between(probe: Probe) -> None:
     first = data(0, 0, b"", CLEAR | COMMIT)
     room = min(said.rx_buffer, 1 << 20) - spec.LIMIT_RESERVE - len(wire(first))
     burst = filling(probe, 1, 1, room)
-    probe.raw(wire(first) + b"".join(wire(packet) + bytes(9) for packet in burst), "packets, and 00")
+    probe.raw(
+        wire(first) + b"".join(wire(packet) + bytes(9) for packet in burst), "packets, and 00"
+    )
     come = probe.sync()
     for answer in come:
         probe.demand(answer.kind != spec.TYPE_ERROR, "all packets are taken", answer)
     probe.demand_ack(probe.state, next=(1 + len(burst)) % 256, damaged=damaged)
 
 
-@check("11", "overrun", "more bytes than credit are told by OVERRUN, and the session goes on", ticking)
+@check(
+    "11", "overrun", "more bytes than credit are told by OVERRUN, and the session goes on", ticking
+)
 def overrun(probe: Probe) -> None:
     said = probe.said
     if said.rx_buffer > _BURST_BYTES:

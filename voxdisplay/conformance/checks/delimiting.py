@@ -62,7 +62,9 @@ def bit_errors(probe: Probe) -> None:
     for bit in sorted(probe.rng.sample(bits, min(40, len(bits)))):
         bad = bytearray(good)
         bad[bit >> 3] ^= 1 << (bit & 7)
-        demand_damage(probe, bytes(bad), f"a packet with bit {bit} flipped", "is the CRC looked at?")
+        demand_damage(
+            probe, bytes(bad), f"a packet with bit {bit} flipped", "is the CRC looked at?"
+        )
     probe.draw(ops.dot(probe.said, 0))
 
 
@@ -73,7 +75,9 @@ def cut_packets(probe: Probe) -> None:
         demand_damage(probe, good[:size] + b"\0", f"the first {size} bytes of a packet, and 00")
 
 
-@check("3", "merged-packets", "two packets that have lost the 00 between them are one damaged segment")
+@check(
+    "3", "merged-packets", "two packets that have lost the 00 between them are one damaged segment"
+)
 def merged_packets(probe: Probe) -> None:
     first, second = wire(data(0, 0)), wire(data(1, 0))
     demand_damage(probe, first[:-1] + second, "two packets without 00 between")

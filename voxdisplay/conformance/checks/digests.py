@@ -29,7 +29,9 @@ def sum_(probe: Probe) -> None:
         probe.show(before + ops.literal(said, values), exactly=True)
 
 
-@check("8", "overwritten", "an overwritten pixel takes its term out of the digest", feature("DIGEST"))
+@check(
+    "8", "overwritten", "an overwritten pixel takes its term out of the digest", feature("DIGEST")
+)
 def overwritten(probe: Probe) -> None:
     said = probe.said
     back = ops.move(said, (0, 0, 0))
@@ -38,7 +40,9 @@ def overwritten(probe: Probe) -> None:
     probe.show(ops.pen(said, 1) + ops.run(), clear=False, exactly=True)
 
 
-@check("8", "erased", "a pixel that becomes dark takes its term out of the digest", feature("DIGEST"))
+@check(
+    "8", "erased", "a pixel that becomes dark takes its term out of the digest", feature("DIGEST")
+)
 def erased(probe: Probe) -> None:
     said = probe.said
     back = ops.move(said, (0, 0, 0))
@@ -55,15 +59,21 @@ def kept(probe: Probe) -> None:
     probe.show(ops.dot(said, 2), clear=False, exactly=True)
 
 
-@check("8", "of-the-front", "the digest is that of the front page, not of the back", feature("DIGEST"))
+@check(
+    "8", "of-the-front", "the digest is that of the front page, not of the back", feature("DIGEST")
+)
 def of_the_front(probe: Probe) -> None:
     ack = probe.show(ops.dot(probe.said, 0), exactly=True)
     probe.draw(ops.dot(probe.said, probe.said.voxels - 1, 0))
     probe.sync()
-    probe.demand_ack(probe.state, "what is drawn into the back page is not on display", digest=ack.digest)
+    probe.demand_ack(
+        probe.state, "what is drawn into the back page is not on display", digest=ack.digest
+    )
 
 
-@check("8", "given-up", "a frame given up leaves nothing in the digest", feature("DIGEST"), voxels(2))
+@check(
+    "8", "given-up", "a frame given up leaves nothing in the digest", feature("DIGEST"), voxels(2)
+)
 def given_up(probe: Probe) -> None:
     probe.show(ops.dot(probe.said, 0), exactly=True)
     probe.draw(ops.dot(probe.said, 1), clear=False)

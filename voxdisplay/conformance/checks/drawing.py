@@ -18,7 +18,13 @@ def long_axis(said: Said) -> str:
     return "" if max(said.grid) > 1 else "no axis has more than one voxel"
 
 
-@check("2", "scan-order", "x runs fastest, then y, then z; coordinates come as x, y, z", seen, voxels(2))
+@check(
+    "2",
+    "scan-order",
+    "x runs fastest, then y, then z; coordinates come as x, y, z",
+    seen,
+    voxels(2),
+)
 def scan_order(probe: Probe) -> None:
     said = probe.said
     for axis in range(3):
@@ -32,7 +38,13 @@ def scan_order(probe: Probe) -> None:
         probe.show(ops.move(said, place) + ops.run())
 
 
-@check("2.1", "pixels", "a pixel's bytes come lowest first, and all its bits count", seen, formats(*_COLORED))
+@check(
+    "2.1",
+    "pixels",
+    "a pixel's bytes come lowest first, and all its bits count",
+    seen,
+    formats(*_COLORED),
+)
 def pixels(probe: Probe) -> None:
     said = probe.said
     for bit in range(8 * said.pixel_bytes):
@@ -88,7 +100,9 @@ def later_counts(probe: Probe) -> None:
     probe.show(ops.run() + back + ops.pen(said, 0) + ops.run())
 
 
-@check("7.1", "octants", "each of the 24 octants has its main axis and its directions", seen, long_axis)
+@check(
+    "7.1", "octants", "each of the 24 octants has its main axis and its directions", seen, long_axis
+)
 def octants(probe: Probe) -> None:
     said = probe.said
     for octant in range(spec.LIMIT_MAX_OCTANT + 1):
@@ -147,7 +161,9 @@ def counts(probe: Probe) -> None:
             probe.show(lit + ops.pen(said, 0) + ops.skip(0) + ops.run())
 
 
-@check("7.2", "to-the-end", "SKIP, RUN and LIT may go to the last voxel: the cursor is V then", seen)
+@check(
+    "7.2", "to-the-end", "SKIP, RUN and LIT may go to the last voxel: the cursor is V then", seen
+)
 def to_the_end(probe: Probe) -> None:
     said = probe.said
     tail = min(said.voxels, 40)

@@ -139,7 +139,9 @@ def clear_flag_differs(probe: Probe) -> None:
         probe.refuse(data(1, 0, b"", flags ^ CLEAR), spec.CODE_FRAME, 0)
 
 
-@check("6", "next-while-missing", "f + 1 is dropped while packets of f may be missing, and answered")
+@check(
+    "6", "next-while-missing", "f + 1 is dropped while packets of f may be missing, and answered"
+)
 def next_while_missing(probe: Probe) -> None:
     probe.ask(data(1, 0))
     ack = probe.ask(data(2, 1, b"\x1f\xff"))

@@ -91,7 +91,9 @@ def new_session(probe: Probe) -> None:
     probe.draw(b"")
 
 
-@check("5", "front-page-stays", "the front page stays as it is, but its frame id is forgotten", seen)
+@check(
+    "5", "front-page-stays", "the front page stays as it is, but its frame id is forgotten", seen
+)
 def front_page_stays(probe: Probe) -> None:
     probe.show(ops.dot(probe.said, probe.said.voxels - 1))
     probe.open()
@@ -119,7 +121,9 @@ def pending_dropped(probe: Probe) -> None:
         session = probe.session % 65535 + 1
         come = probe.say(data(1, 1, ops.dot(probe.said, 0), 1 | COMMIT), hello(session))
         probe.session = session
-        at = next(i for i, answer in enumerate(come) if answer.kind == spec.TYPE_INFO)
+        kinds = [answer.kind for answer in come]
+        probe.demand(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
+        at = kinds.index(spec.TYPE_INFO)
         if any(answer.flags & SHOWN and answer.frame == 1 for answer in come[:at]):
             probe.open()
             continue  # the tick was faster
@@ -137,9 +141,7 @@ def other_major(probe: Probe) -> None:
         info = greeted(probe, hello(0x4321, major))
         probe.demand(info.session == 0x4321, "the session of that HELLO in INFO", info)
         probe.demand(info.major == spec.VERSION_MAJOR, "the device's own major in INFO", info)
-        probe.demand_ack(
-            probe.state, "what was open stays open", session=probe.session, next=1
-        )
+        probe.demand_ack(probe.state, "what was open stays open", session=probe.session, next=1)
 
 
 @check("5", "other-major-first", "also where no session is open")
@@ -163,7 +165,9 @@ def hello_ignored(probe: Probe) -> None:
         probe.demand_ack(probe.state, session=probe.session)
 
 
-@check("5", "hello-short", "a HELLO that ends before offset 8 is refused: LENGTH, whatever its major")
+@check(
+    "5", "hello-short", "a HELLO that ends before offset 8 is refused: LENGTH, whatever its major"
+)
 def hello_short(probe: Probe) -> None:
     for payload in (b"\1\1\1\0", b"\1\1\1", b"\1", b"", b"\1\0\0\0", b"\2\0\0", b"\7\1\1\0"):
         probe.refuse(body(spec.TYPE_HELLO, payload=payload), spec.CODE_LENGTH, 0)
@@ -177,7 +181,9 @@ def session_zero(probe: Probe) -> None:
         probe.demand_ack(probe.state, "what was open stays open", session=probe.session)
 
 
-@check("5", "keep-in-new-session", "a first frame without CLEAR copies what is shown", seen, voxels(2))
+@check(
+    "5", "keep-in-new-session", "a first frame without CLEAR copies what is shown", seen, voxels(2)
+)
 def keep_in_new_session(probe: Probe) -> None:
     probe.show(ops.dot(probe.said, 0))
     probe.open()

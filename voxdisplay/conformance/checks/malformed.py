@@ -27,7 +27,8 @@ def noise(probe: Probe) -> None:
     rng = probe.rng
     for number in range(40):
         bytes_ = bytes(
-            rng.choice((0, 1, 2, 5, 8, 255, rng.randrange(256))) for _ in range(rng.randint(1, _NOISE))
+            rng.choice((0, 1, 2, 5, 8, 255, rng.randrange(256)))
+            for _ in range(rng.randint(1, _NOISE))
         )
         demand_count(probe, bytes_ + b"\0", f"noise {number}")
     probe.draw(ops.run())

@@ -56,14 +56,22 @@ def whole_page(probe: Probe) -> None:
 def ranges(probe: Probe) -> None:
     picture(probe)
     v = probe.said.voxels
-    for start, count in ((0, 1), (v - 1, 1), (v // 2, v - v // 2), (0, min(v, 31)), (0, min(v, 33))):
+    for start, count in (
+        (0, 1),
+        (v - 1, 1),
+        (v // 2, v - v // 2),
+        (0, min(v, 31)),
+        (0, min(v, 33)),
+    ):
         demand_range(probe, start, count)
     for _ in range(8):
         start = probe.rng.randrange(min(v, 60))
         demand_range(probe, start, probe.rng.randint(1, min(v - start, 70)))
 
 
-@check("10", "page-fields", "PAGE has the READ's tag, start and flag, and the frame on display", READ)
+@check(
+    "10", "page-fields", "PAGE has the READ's tag, start and flag, and the frame on display", READ
+)
 def page_fields(probe: Probe) -> None:
     probe.show(ops.run())
     probe.show(ops.run())
@@ -89,7 +97,9 @@ def page_frame(probe: Probe) -> None:
     probe.demand(page.frame == 0, "frame 0, as of an ACK without SHOWN", page)
 
 
-@check("10", "back-page", "BACK reads what has been drawn and is not on display yet", READ, voxels(2))
+@check(
+    "10", "back-page", "BACK reads what has been drawn and is not on display yet", READ, voxels(2)
+)
 def back_page(probe: Probe) -> None:
     said = probe.said
     probe.show(ops.dot(said, 0))

@@ -39,13 +39,21 @@ def session_ends(probe: Probe) -> None:
         answer = probe.ask(packet)
         right = answer.kind == spec.TYPE_ERROR
         right = right and (answer.code, answer.offset) == (spec.CODE_NO_SESSION, 0)
-        probe.demand(right, "ERROR NO_SESSION at offset 0", answer, "a refused DATA ends the session")
+        probe.demand(
+            right, "ERROR NO_SESSION at offset 0", answer, "a refused DATA ends the session"
+        )
     probe.open()
     probe.sync()
     probe.demand_ack(probe.state, session=probe.session, next=0)
 
 
-@check("11", "frame-dropped", "what is not on display is dropped when a DATA is refused", seen, voxels(2))
+@check(
+    "11",
+    "frame-dropped",
+    "what is not on display is dropped when a DATA is refused",
+    seen,
+    voxels(2),
+)
 def frame_dropped(probe: Probe) -> None:
     probe.show(ops.dot(probe.said, 0))
     must = probe.front or Page()
@@ -68,7 +76,9 @@ def error_names_packet(probe: Probe) -> None:
         probe.demand(same, f"seq {packet[1]} and frame {packet[2]} in ERROR", error)
 
 
-@check("11", "error-session", "an ERROR has the session in which it was refused, or 0 if none is open")
+@check(
+    "11", "error-session", "an ERROR has the session in which it was refused, or 0 if none is open"
+)
 def error_session(probe: Probe) -> None:
     for packet in (body(0), data(0, 0, b"\x1f")):
         error = probe.ask(packet)
@@ -111,7 +121,9 @@ def reserved_ops(probe: Probe) -> None:
             probe.refuse_ops(ops.run() + bytes((op, 1, 0, 0, 0, 0, 0)), spec.CODE_OP, 1)
 
 
-@check("11", "count-form", "a LEB128 not in its shortest form, too long or too large is refused: COUNT")
+@check(
+    "11", "count-form", "a LEB128 not in its shortest form, too long or too large is refused: COUNT"
+)
 def count_form(probe: Probe) -> None:
     for tail in (b"\x80\0", b"\x9f\x80\0", b"\xff" * 5 + b"\1", b"\xe0\xff\xff\xff\x0f"):
         for op in (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT):
@@ -156,7 +168,9 @@ def padding(probe: Probe) -> None:
         raw = bytearray(-(-steps // 4))
         raw[-1] = 1 << 2 * (steps % 4)
         prefixed(probe, bytes((spec.OP_STEP, steps - 1)) + raw, spec.CODE_PADDING)
-        prefixed(probe, bytes((spec.OP_FROM,)) + place + bytes((steps - 1,)) + raw, spec.CODE_PADDING)
+        prefixed(
+            probe, bytes((spec.OP_FROM,)) + place + bytes((steps - 1,)) + raw, spec.CODE_PADDING
+        )
     raw = bytearray((spec.OP_STEP, 0, 0x80))
     prefixed(probe, bytes(raw), spec.CODE_PADDING)
 
@@ -174,7 +188,9 @@ def difference_padding(probe: Probe) -> None:
         prefixed(probe, bytes((spec.OP_DIFF | 2 * len(raw) - 2,)) + raw, spec.CODE_PADDING)
 
 
-@check("11", "pixel", "a pixel that MONO1 does not have is refused: PIXEL", formats(spec.FORMAT_MONO1))
+@check(
+    "11", "pixel", "a pixel that MONO1 does not have is refused: PIXEL", formats(spec.FORMAT_MONO1)
+)
 def pixel(probe: Probe) -> None:
     for value in (2, 3, 128, 255):
         prefixed(probe, bytes((spec.OP_PEN, value)), spec.CODE_PIXEL)
@@ -197,7 +213,9 @@ def move_outside(probe: Probe) -> None:
                 )
 
 
-@check("7.8", "step-outside", "a step that leaves the grid on any axis is outside, whatever its index")
+@check(
+    "7.8", "step-outside", "a step that leaves the grid on any axis is outside, whatever its index"
+)
 def step_outside(probe: Probe) -> None:
     said = probe.said
     for octant in range(spec.LIMIT_MAX_OCTANT + 1):
@@ -214,7 +232,9 @@ def step_outside(probe: Probe) -> None:
             )
 
 
-@check("7.8", "behind-the-end", "a cursor of V is no voxel: a chain, and any count, is outside there")
+@check(
+    "7.8", "behind-the-end", "a cursor of V is no voxel: a chain, and any count, is outside there"
+)
 def behind_the_end(probe: Probe) -> None:
     said = probe.said
     end = ops.skip(said.voxels)
@@ -324,7 +344,9 @@ def order_of_read(probe: Probe) -> None:
     probe.refuse(read(v, 1), spec.CODE_OUTSIDE, 4)
 
 
-@check("11", "first-op-first", "ops are checked from first to last, and the first fault is reported")
+@check(
+    "11", "first-op-first", "ops are checked from first to last, and the first fault is reported"
+)
 def first_op_first(probe: Probe) -> None:
     said = probe.said
     outside = ops.run(said.voxels + 1)
@@ -357,7 +379,9 @@ def order_of_op(probe: Probe) -> None:
         probe.refuse_ops(ops.colors(255, [(1, 2, 3)] * 2)[:-1], spec.CODE_TRUNCATED)
 
 
-@check("11", "anything", "whatever the ops, they are drawn or refused as sections 7 and 11 say", seen)
+@check(
+    "11", "anything", "whatever the ops, they are drawn or refused as sections 7 and 11 say", seen
+)
 def anything(probe: Probe) -> None:
     said, rng = probe.said, probe.rng
     done = 0
@@ -365,7 +389,9 @@ def anything(probe: Probe) -> None:
         payload = bytearray(ops.program(said, rng, min(said.max_payload, 60)))
         for _ in range(rng.randint(1, 3)):
             payload[rng.randrange(len(payload))] = rng.randrange(256)
-        cut = bytes(payload[: rng.randint(1, len(payload))]) if rng.random() < 0.3 else bytes(payload)
+        cut = (
+            bytes(payload[: rng.randint(1, len(payload))]) if rng.random() < 0.3 else bytes(payload)
+        )
         try:
             _Cautious(said, Page()).draw(cut)
         except _TooMuch:

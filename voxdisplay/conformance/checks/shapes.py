@@ -26,7 +26,14 @@ def corners(said: Said) -> list[Place]:
     return sorted(set(itertools.product(*({0, side - 1} for side in said.grid))))
 
 
-@check("7.3", "lines", "LINE draws the straight line, both ends included", feature("LINE"), seen, long_axis)
+@check(
+    "7.3",
+    "lines",
+    "LINE draws the straight line, both ends included",
+    feature("LINE"),
+    seen,
+    long_axis,
+)
 def lines(probe: Probe) -> None:
     said, rng = probe.said, probe.rng
     for begin in corners(said):
@@ -36,7 +43,14 @@ def lines(probe: Probe) -> None:
     probe.show(ops.line(said, (0, 0, 0), corners(said)[-1]))
 
 
-@check("7.3", "line-ties", "LINE rounds up from the middle, in both directions", feature("LINE"), seen, two_axes)
+@check(
+    "7.3",
+    "line-ties",
+    "LINE rounds up from the middle, in both directions",
+    feature("LINE"),
+    seen,
+    two_axes,
+)
 def line_ties(probe: Probe) -> None:
     said = probe.said
     for main, other in itertools.permutations(range(3), 2):
@@ -63,7 +77,9 @@ def line_of_one(probe: Probe) -> None:
     probe.show(ops.line(probe.said, place, place))
 
 
-@check("7.3", "shape-cursor", "after LINE and BOX the cursor is at the voxel named", seen, long_axis)
+@check(
+    "7.3", "shape-cursor", "after LINE and BOX the cursor is at the voxel named", seen, long_axis
+)
 def shape_cursor(probe: Probe) -> None:
     said = probe.said
     end = tuple(min(side - 1, 4) for side in said.grid)
@@ -74,7 +90,13 @@ def shape_cursor(probe: Probe) -> None:
             probe.show(make(said, (end[0], end[1], end[2]), (0, 0, 0)) + erase)
 
 
-@check("7.3", "boxes", "BOX has all voxels between two corners, whichever is larger", feature("BOX"), seen)
+@check(
+    "7.3",
+    "boxes",
+    "BOX has all voxels between two corners, whichever is larger",
+    feature("BOX"),
+    seen,
+)
 def boxes(probe: Probe) -> None:
     said, rng = probe.said, probe.rng
     base = ops.some_place(said, rng)
@@ -95,7 +117,14 @@ def dots(probe: Probe) -> None:
             probe.show(ops.dots(said, [ops.some_place(said, rng) for _ in range(n)]))
 
 
-@check("7.3", "dots-cursor", "after DOTS the cursor is at its last voxel", feature("DOTS"), seen, voxels(2))
+@check(
+    "7.3",
+    "dots-cursor",
+    "after DOTS the cursor is at its last voxel",
+    feature("DOTS"),
+    seen,
+    voxels(2),
+)
 def dots_cursor(probe: Probe) -> None:
     said = probe.said
     places = [said.place(0), said.place(said.voxels - 1), said.place(1)]

@@ -53,7 +53,9 @@ def next_waits(probe: Probe) -> None:
         for answer in come[:at]:
             early = answer.kind == spec.TYPE_ACK and answer.next == second + 1
             probe.demand(not early, f"the swap of frame {first} before anything behind it", answer)
-        probe.demand(at < len(come), f"frame {first} on display before anything behind it", come[-1])
+        probe.demand(
+            at < len(come), f"frame {first} on display before anything behind it", come[-1]
+        )
         probe.demand(
             not probe.said.has("DIGEST") or come[at].digest == page.digest(probe.said),
             f"frame {first} on display as it was drawn",
@@ -91,7 +93,9 @@ def all_waits(probe: Probe) -> None:
         kinds = [answer.kind for answer in come]
         probe.demand(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
         info = kinds.index(spec.TYPE_INFO)
-        probe.demand(shown_at(come, 0) < info, "frame 0 on display before HELLO is taken", come[info])
+        probe.demand(
+            shown_at(come, 0) < info, "frame 0 on display before HELLO is taken", come[info]
+        )
 
 
 @check("6", "own-while-pending", "a packet of f is refused while f is pending: FRAME at 2", ticking)
@@ -103,7 +107,9 @@ def own_while_pending(probe: Probe) -> None:
     probe.demand(right, "ERROR FRAME at offset 2", errors[0])
 
 
-@check("6", "one-after-another", "frames sent one behind the other are shown in turn", seen, voxels(3))
+@check(
+    "6", "one-after-another", "frames sent one behind the other are shown in turn", seen, voxels(3)
+)
 def one_after_another(probe: Probe) -> None:
     for frame in range(6):
         probe.show(ops.dot(probe.said, frame % 3), clear=frame % 3 == 0)

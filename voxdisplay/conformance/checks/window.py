@@ -11,7 +11,9 @@ from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 
-@check("9.1", "window-edges", "31 above `next` is new, 32 to 223 is refused, from 224 on a duplicate")
+@check(
+    "9.1", "window-edges", "31 above `next` is new, 32 to 223 is refused, from 224 on a duplicate"
+)
 def window_edges(probe: Probe) -> None:
     for base in (0, 3):
         for ahead in (31, 32, 33, 128, 223, 224, 255):
@@ -35,7 +37,9 @@ def duplicate_answered(probe: Probe) -> None:
         probe.demand_ack(probe.ask(data(seq, 0)), next=1, received=2, last=seq)
 
 
-@check("9.1", "duplicate-unseen", "neither frame nor ops of a duplicate are looked at", seen, voxels(3))
+@check(
+    "9.1", "duplicate-unseen", "neither frame nor ops of a duplicate are looked at", seen, voxels(3)
+)
 def duplicate_unseen(probe: Probe) -> None:
     probe.say(data(0, 0, ops.dot(probe.said, 0)), data(2, 0))
     for packet in (
@@ -51,7 +55,9 @@ def duplicate_unseen(probe: Probe) -> None:
     probe.demand_ack(probe.ask(data(3, 0, b"\x1f", CLEAR | COMMIT)), next=4, shown=1)
 
 
-@check("9.1", "applied-once", "each packet is applied once, however often it comes", seen, voxels(2))
+@check(
+    "9.1", "applied-once", "each packet is applied once, however often it comes", seen, voxels(2)
+)
 def applied_once(probe: Probe) -> None:
     probe.say(data(0, 0, ops.run(2)), data(1, 0, ops.pen(probe.said, 0) + ops.run()))
     probe.say(data(0, 0, ops.run(2)))

@@ -1,0 +1,1456 @@
+"""Devices that break protocol.md in one place each, made of the emulator.
+
+Each has the name of its fault, how to make it, and the checks that must notice: all of them, and
+no other, may fail.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from firmware_sim import arc, bits, crc, device, info, memory, operands, receiver, sender
+from firmware_sim import session as sessions
+from firmware_sim import shapes, spec, unpack
+from firmware_sim.grid import Grid
+from firmware_sim.refusal import Refusal
+from firmware_sim.session import State, Verdict
+
+Device, Session, Receiver = device.Device, sessions.Session, receiver.Receiver
+Decoder, Operands, Page = unpack._Decoder, operands.Operands, memory.Page
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A fault: ``make`` gets pytest's monkeypatch; ``config`` changes the device."""
+
+    name: str
+    make: Callable
+    fails: tuple[str, ...]
+    likely: str = ""
+    config: dict = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+MUTANTS: list[Mutant] = []
+
+
+def mutant(*fails: str, likely: str = "", **config: object):
+    def enlist(make: Callable) -> Callable:
+        name = make.__name__.strip("_").replace("_", "-")
+        MUTANTS.append(Mutant(name, make, fails, likely, config))
+        return make
+
+    return enlist
+
+
+def around(patch, owner, name, wrapper):
+    """Replace a method by wrapper(old, self, ...)."""
+    old = getattr(owner, name)
+    patch.setattr(owner, name, lambda *args, **more: wrapper(old, *args, **more))
+
+
+# -- section 3 and 4
+
+
+@mutant()
+def crc_not_checked(patch):
+    def end(old, self):
+        old(self)
+        whole = self.size >= spec.LIMIT_MIN_SEGMENT and not (self._left or self._bad)
+        if whole and self._length >= 7:
+            self.packet = bytes(self._buffer[: self._length - 4])
+            self.damaged = False
+
+    around(patch, Receiver, "_end", end)
+
+
+@mutant()
+def short_segments_counted(patch):
+    patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 5)
+
+
+@mutant()
+def segment_of_8_forgiven(patch):
+    patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 9)
+
+
+@mutant()
+def empty_segments_counted(patch):
+    def end(old, self):
+        old(self)
+        if not self.size:
+            self.damaged = True
+
+    around(patch, Receiver, "_end", end)
+
+
+@mutant()
+def cobs_overrun_forgiven(patch):
+    def end(old, self):
+        self._left = 0
+        old(self)
+        if self.damaged and self._length < 7:
+            self.damaged = False
+
+    around(patch, Receiver, "_end", end)
+
+
+@mutant()
+def damage_not_counted(patch):
+    def damage(old, self):
+        old(self)
+        self.damaged -= 1
+
+    around(patch, Device, "_damage", damage)
+
+
+@mutant()
+def damage_not_answered(patch):
+    def damage(_, self):
+        self.damaged += 1
+
+    around(patch, Device, "_damage", damage)
+
+
+@mutant()
+def damage_ends_the_session(patch):
+    def damage(old, self):
+        old(self)
+        self.session = None
+
+    around(patch, Device, "_damage", damage)
+
+
+@mutant()
+def longest_packet_too_long(patch):
+    around(patch, Receiver, "__init__", lambda old, self, longest: old(self, longest - 1))
+
+
+@mutant()
+def too_long_taken(patch):
+    around(patch, Receiver, "__init__", lambda old, self, longest: old(self, longest + 1))
+
+
+@mutant()
+def answers_in_short_groups(patch):
+    patch.setattr(sender, "_GROUP", 100)
+
+
+@mutant()
+def answers_with_another_check_value(patch):
+    def send(kind, flags, seq, frame, payload):
+        packet = bytes((kind << 4 | flags, seq, frame)) + payload
+        check = crc.crc32(packet) ^ (0 if kind != spec.TYPE_PAGE else 1)
+        return sender.encode(packet + check.to_bytes(4, "little"))
+
+    patch.setattr(device, "send", send)
+
+
+@mutant()
+def debugging_text_between(patch):
+    def refuse(old, self, *args):
+        self._out += b"refused\r\n\0"
+        old(self, *args)
+
+    around(patch, Device, "_refuse", refuse)
+
+
+@mutant()
+def reserved_types_silent(patch):
+    def answer(old, self, packet):
+        if packet[0] >> 4 in {0, 12}:
+            return
+        old(self, packet)
+
+    around(patch, Device, "_answer", answer)
+
+
+@mutant()
+def reserved_data_flags_taken(patch):
+    patch.setattr(device, "_DATA_FLAGS", 15)
+
+
+@mutant()
+def status_fields_taken(patch):
+    def status(old, self, packet, flags, seq, frame):
+        old(self, packet, 0, seq, 0)
+
+    around(patch, Device, "_status", status)
+
+
+@mutant()
+def read_reserved_taken(patch):
+    def read(old, self, packet, flags, seq, frame):
+        old(self, packet[:3] + b"\0" + packet[4:], flags, seq, frame)
+
+    around(patch, Device, "_read", read)
+
+
+@mutant()
+def reserved_flag_sent(patch):
+    def _send(old, self, kind, flags, *rest):
+        old(self, kind, flags | (8 if kind == spec.TYPE_ACK else 0), *rest)
+
+    around(patch, Device, "_send", _send)
+
+
+# -- section 5
+
+
+def _announce(patch, **changes):
+    import dataclasses
+
+    old = info.announce
+    patch.setattr(device, "announce", lambda *args: dataclasses.replace(old(*args), **changes))
+
+
+@mutant()
+def rx_buffer_too_small(patch):
+    _announce(patch, credit=1024)
+
+
+@mutant()
+def unknown_feature(patch):
+    _announce(patch, features=0x3FF)
+
+
+@mutant()
+def one_page(patch):
+    patch.setattr(memory.Memory, "PAGES", 1)
+
+
+@mutant()
+def name_no_utf8(patch):
+    _announce(patch, strings=b"\x02\xff\xfe\x01x\x00")
+
+
+@mutant()
+def strings_cut_off(patch):
+    _announce(patch, strings=b"\x02ab\x01x")
+
+
+def _hello(patch, change):
+    def hello(old, self, packet):
+        session = self.session
+        old(self, packet)
+        change(self, packet, session)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def hello_keeps_the_session(patch):
+    def change(self, packet, session):
+        if session and self.session and packet[3] == 1:
+            session.number = self.session.number
+            self.session = session
+
+    _hello(patch, change)
+
+
+@mutant()
+def hello_clears_the_front_page(patch):
+    _hello(patch, lambda self, packet, session: self.memory.front.clear())
+
+
+@mutant()
+def hello_keeps_shown(patch):
+    def change(self, packet, session):
+        if session and self.session is not session:
+            self.session.shown = session.shown
+
+    _hello(patch, change)
+
+
+@mutant()
+def hello_shows_what_was_pending(patch):
+    def hello(old, self, packet):
+        if self.pending:
+            self.memory.swap()
+        old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def other_major_opens(patch):
+    def hello(old, self, packet):
+        old(self, packet[:3] + b"\1" + packet[4:])
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def other_major_unanswered(patch):
+    def hello(old, self, packet):
+        if len(packet) < 8 or packet[3] == 1:
+            old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def longer_hello_refused(patch):
+    def hello(old, self, packet):
+        if len(packet) > 8:
+            raise Refusal(spec.CODE_LENGTH, 0, "")
+        old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def hello_fields_checked(patch):
+    def hello(old, self, packet):
+        if packet[1] or packet[7:8] > b"\0":
+            raise Refusal(spec.CODE_FIELD, 1, "")
+        old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant()
+def short_hello_taken(patch):
+    around(patch, Device, "_hello", lambda old, self, packet: old(self, packet.ljust(8, b"\0")))
+
+
+@mutant()
+def session_zero_taken(patch):
+    def hello(old, self, packet):
+        try:
+            old(self, packet)
+        except Refusal as refusal:
+            if refusal.code != spec.CODE_FIELD:
+                raise
+            self.session = Session(0)
+            self._send(spec.TYPE_INFO, 0, 0, 0, self._announcement.payload(0))
+
+    around(patch, Device, "_hello", hello)
+
+
+# -- section 6
+
+
+@mutant()
+def swap_without_commit(patch):
+    def mark(old, self, seq, flags):
+        old(self, seq, flags)
+        if not self.received:
+            self.state = State.PENDING
+
+    around(patch, Session, "mark", mark)
+
+
+@mutant()
+def swap_of_what_is_not_whole(patch):
+    def mark(old, self, seq, flags):
+        old(self, seq, flags)
+        if self._commit is not None:
+            self.state = State.PENDING
+
+    around(patch, Session, "mark", mark)
+
+
+@mutant()
+def highest_commit_counts(patch):
+    def mark(old, self, seq, flags):
+        if self._commit is not None:
+            flags &= ~spec.DATA_FLAG_COMMIT
+        old(self, seq, flags)
+
+    around(patch, Session, "mark", mark)
+
+
+@mutant()
+def keep_starts_dark(patch):
+    around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, True))
+
+
+@mutant()
+def clear_does_not_clear(patch):
+    around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, False))
+
+
+@mutant()
+def keep_is_the_page_before_last(patch):
+    around(patch, memory.Memory, "begin", lambda old, self, dark: dark and old(self, True))
+
+
+@mutant()
+def given_up_frame_stays(patch):
+    def begin(old, self, frame, flags):
+        given_up = self.state is State.FILLING
+        old(self, frame, flags)
+        self.given_up = given_up
+
+    around(patch, Session, "begin", begin)
+
+    def data(old, self, session, packet, flags, seq, frame):
+        around_memory = self.memory.begin
+        session.given_up = False
+        self.memory.begin = lambda dark: None if session.given_up else around_memory(dark)
+        try:
+            old(self, session, packet, flags, seq, frame)
+        finally:
+            self.memory.begin = around_memory
+
+    around(patch, Device, "_data", data)
+
+
+@mutant()
+def swap_not_reported(patch):
+    def tick(_, self):
+        if self.session and self.pending:
+            self._swap(self.session)
+            if self._waiting:
+                packet, self._waiting, self._waiting_size = self._waiting, b"", 0
+                self._dispatch(packet)
+                self._drain()
+
+    around(patch, Device, "tick", tick)
+
+
+@mutant(refresh=0)
+def two_acks_at_once(patch):
+    def swap(old, self, session):
+        old(self, session)
+        self._acknowledge()
+
+    around(patch, Device, "_swap", swap)
+
+
+@mutant()
+def pending_not_said(patch):
+    patch.setattr(device.spec, "ACK_FLAG_PENDING", 0)
+
+
+@mutant()
+def next_does_not_wait(patch):
+    patch.setattr(Session, "must_wait", lambda *_: False)
+
+    def judge(old, self, seq, frame, flags):
+        if self.state is State.PENDING:
+            self.state = State.EMPTY
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def next_is_checked_while_pending(patch):
+    def must_wait(old, self, seq, frame):
+        if old(self, seq, frame) and frame != (self._newest + 1) % 256:
+            raise Refusal(spec.CODE_FRAME, 2, "")
+        return old(self, seq, frame)
+
+    around(patch, Session, "must_wait", must_wait)
+
+    def dispatch(old, self, packet):
+        try:
+            old(self, packet)
+        except Refusal as refusal:
+            self._refuse(packet[1], packet[2], refusal)
+            self.session = None
+
+    around(patch, Device, "_dispatch", dispatch)
+
+
+@mutant()
+def hello_overtakes_what_waits(patch):
+    def take(old, self, data, at):
+        at = old(self, data, at)
+        hello = data[at:].rfind(b"\x02\x30")
+        if self._waiting and hello >= 0:
+            self._waiting = b""
+            return old(self, data, at + hello)
+        return at
+
+    around(patch, Device, "_take", take)
+
+
+@mutant()
+def any_id_begins(patch):
+    def judge(old, self, seq, frame, flags):
+        verdict = None
+        try:
+            verdict = old(self, seq, frame, flags)
+        except Refusal as refusal:
+            if refusal.code != spec.CODE_FRAME or frame == self._newest:
+                raise
+            verdict = Verdict.BEGIN
+        return verdict
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def dropped_is_marked_received(patch):
+    def judge(old, self, seq, frame, flags):
+        verdict = old(self, seq, frame, flags)
+        if verdict is Verdict.DROP:
+            self.received |= 1 << self._ahead(seq) >> 1
+        return verdict
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def dropped_is_refused(patch):
+    def judge(old, self, seq, frame, flags):
+        verdict = old(self, seq, frame, flags)
+        if verdict is Verdict.DROP:
+            raise Refusal(spec.CODE_FRAME, 2, "")
+        return verdict
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def dropped_ops_are_looked_at(patch):
+    def data(old, self, session, packet, flags, seq, frame):
+        self._unpacker.draw(packet, Page(self.config.shape.volume, self.config.pixels.size))
+        old(self, session, packet, flags, seq, frame)
+
+    around(patch, Device, "_data", data)
+
+
+@mutant()
+def clear_flag_not_compared(patch):
+    def check_own(old, self, seq, flags):
+        old(self, seq, flags & ~1 | self._clear)
+
+    around(patch, Session, "_check_own", check_own)
+
+
+@mutant()
+def behind_commit_taken(patch):
+    def check_own(old, self, seq, flags):
+        commit, self._commit = self._commit, None
+        old(self, seq, flags)
+        self._commit = commit
+
+    around(patch, Session, "_check_own", check_own)
+
+
+@mutant()
+def shown_frame_is_drawn_on(patch):
+    def check_own(old, self, seq, flags):
+        if self.state is not State.EMPTY or self.shown is None:
+            old(self, seq, flags)
+
+    around(patch, Session, "_check_own", check_own)
+
+
+@mutant()
+def clear_before_id(patch):
+    def judge(old, self, seq, frame, flags):
+        begun = self.state is State.FILLING
+        if begun and not self._is_duplicate(seq) and bool(flags & 1) != self._clear:
+            raise Refusal(spec.CODE_FRAME, 0, "")
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def out_of_order_begin_dropped(patch):
+    def judge(old, self, seq, frame, flags):
+        verdict = old(self, seq, frame, flags)
+        return Verdict.DROP if verdict is Verdict.BEGIN and self._ahead(seq) else verdict
+
+    around(patch, Session, "judge", judge)
+
+
+# -- section 7
+
+
+def _unpacked(patch, name, wrapper):
+    """Change a method that is named in the table of ops."""
+    around(patch, Decoder, name, wrapper)
+
+
+@mutant(likely="axes y and z are swapped")
+def y_and_z_swapped(patch):
+    def place(old, self):
+        x, y, z = old(self)
+        return x, z, y
+
+    around(patch, Operands, "place", place)
+
+
+@mutant()
+def z_runs_fastest(patch):
+    def init(old, self, nx, ny, nz):
+        old(self, nx, ny, nz)
+        object.__setattr__(self, "strides", (ny * nz, nz, 1))
+
+    around(patch, Grid, "__init__", init)
+    patch.setattr(Grid, "index", lambda self, x, y, z: z + self.nz * (y + self.ny * x))
+    patch.setattr(
+        Grid,
+        "place",
+        lambda self, i: (i // self.nz // self.ny, i // self.nz % self.ny, i % self.nz),
+    )
+
+
+@mutant(likely="byte is n - 1")
+def step_one_too_few(patch):
+    def plot(old, self, indices, pixel):
+        old(self, indices, pixel)
+
+    around(patch, Page, "plot", plot)
+
+    def walk(_, self, octant, count, raw):
+        self._check_cursor()
+        path = b"".join([unpack._CRUMBS[byte] for byte in raw])[:count]
+        at, voxels = self._cursor, [self._cursor]
+        for crumb in path[:-1]:
+            at += self._device.steps[octant][crumb]
+            voxels.append(at)
+        self._page.plot(array("Q", voxels), self._pen)
+        self._cursor = at
+
+    around(patch, Decoder, "_walk", walk)
+
+
+@mutant(likely="taken for rising")
+def octant_signs(patch):
+    around(patch, Grid, "steps", lambda old, self, octant: old(self, octant ^ 7))
+    around(
+        patch, Grid, "leaves", lambda old, self, i, octant, moves: old(self, i, octant ^ 7, moves)
+    )
+
+
+@mutant(likely="bit 0 is for axis main + 1")
+def crumb_bits_swapped(patch):
+    swapped = [bytes((0, 2, 1, 3)[c] for c in row) for row in unpack._CRUMBS]
+    patch.setattr(unpack, "_CRUMBS", swapped)
+
+
+@mutant(likely="lowest bits")
+def crumbs_high_first(patch):
+    patch.setattr(unpack, "_CRUMBS", [row[::-1] for row in unpack._CRUMBS])
+
+
+@mutant(likely="cursor at the voxel")
+def chain_start_left_out(patch):
+    def walk(old, self, octant, count, raw):
+        first = self._cursor
+        before = self._page.pixels[first : first + 1] if self._format.size == 1 else None
+        old(self, octant, count, raw)
+        if before is not None:
+            self._page.put(first, bytes(before))
+
+    around(patch, Decoder, "_walk", walk)
+
+
+@mutant(likely="stayed at the first")
+def chain_cursor_stays(patch):
+    def walk(old, self, octant, count, raw):
+        first = self._cursor
+        old(self, octant, count, raw)
+        self._cursor = first
+
+    around(patch, Decoder, "_walk", walk)
+
+
+@mutant()
+def step_wraps_around(patch):
+    def leaves(_, self, index, octant, moves):
+        steps = self.steps(octant)
+        end = index + moves[0] * steps[0]
+        end += moves[1] * (steps[1] - steps[0]) + moves[2] * (steps[2] - steps[0])
+        return not 0 <= end < self.volume
+
+    around(patch, Grid, "leaves", leaves)
+
+
+@mutant(likely="31 + k")
+def long_count_from_31(patch):
+    around(patch, Operands, "count", lambda old, self, c: old(self, c) - (c == 31))
+
+
+@mutant()
+def any_leb128_taken(patch):
+    def count(_, self, operand):
+        if operand < 31:
+            return operand + 1
+        total, shift = 0, 0
+        while True:
+            byte = self.byte()
+            total |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return 32 + total
+
+    around(patch, Operands, "count", count)
+
+
+@mutant(likely="left as it was")
+def literal_leaves_pen(patch):
+    def write(old, self, count, pixels):
+        pen = self._pen
+        old(self, count, pixels)
+        self._pen = pen
+
+    around(patch, Decoder, "_write", write)
+
+
+@mutant(pixel_format="mono1", likely="lowest bits")
+def mono_high_bit_first(patch):
+    patch.setattr(unpack, "_BITS", [row[::-1] for row in unpack._BITS])
+
+
+@mutant(pixel_format="mono1")
+def mono_pen_of_two(patch):
+    def pen(old, self, low):
+        value = self._in.take(1)
+        self._pen = bytes((value[0] & 1,))
+
+    _unpacked(patch, "pen", pen)
+
+
+@mutant(pixel_format="rgb565", likely="lowest first")
+def pixels_big_endian(patch):
+    def pen(old, self, low):
+        old(self, low)
+        self._pen = self._pen[::-1]
+
+    _unpacked(patch, "pen", pen)
+
+
+@mutant(likely="pen is not reset")
+def pen_not_reset(patch):
+    def draw(_, self, packet, page):
+        inner = operands.Operands(packet, self.grid.coordinate_size)
+        decoder = Decoder(self, inner, page)
+        decoder._pen = getattr(self, "pen", decoder._pen)
+        while (op := inner.op()) is not None:
+            if self.ops[op] is None:
+                raise inner.refusal(spec.CODE_OP, "")
+            self.ops[op](decoder, op & 31)
+        self.pen = decoder._pen
+
+    around(patch, unpack.Unpacker, "draw", draw)
+
+
+@mutant(likely="cursor is not reset")
+def cursor_not_reset(patch):
+    def draw(_, self, packet, page):
+        inner = operands.Operands(packet, self.grid.coordinate_size)
+        decoder = Decoder(self, inner, page)
+        decoder._cursor = getattr(page, "cursor", 0)
+        while (op := inner.op()) is not None:
+            if self.ops[op] is None:
+                raise inner.refusal(spec.CODE_OP, "")
+            self.ops[op](decoder, op & 31)
+        page.cursor = decoder._cursor
+
+    around(patch, unpack.Unpacker, "draw", draw)
+
+    def clear(old, self):
+        self.cursor = 0
+        old(self)
+
+    around(patch, Page, "clear", clear)
+
+
+@mutant()
+def end_padding_taken(patch):
+    _unpacked(patch, "end", lambda old, self, low: self._in.rest())
+
+
+@mutant()
+def unused_bits_taken(patch):
+    def small(_, self, count, bits_):
+        raw = self.take((count * bits_ + 7) // 8)
+        used = count * bits_ % 8
+        return raw[:-1] + bytes((raw[-1] & (1 << used) - 1,)) if used else raw
+
+    around(patch, Operands, "small", small)
+
+
+@mutant()
+def reserved_ops_skipped(patch):
+    def ops(old, features):
+        table = old(features)
+        table[0x1F] = table[0x07] = lambda decoder, low: None
+        return table
+
+    around(patch, unpack, "_ops", ops)
+
+
+@mutant()
+def run_past_the_end_is_cut(patch):
+    def room(_, self, count):
+        if self._cursor >= self._grid.volume:
+            raise self._outside("")
+        return min(count, self._grid.volume - self._cursor)
+
+    around(patch, Decoder, "_room", room)
+
+
+@mutant(likely="rounded down")
+def line_ties_down(patch):
+    def line(old, grid, start, target):
+        return (
+            old(grid, grid.index(*target), grid.place(start))[::-1]
+            if False
+            else _down(grid, start, target)
+        )
+
+    def _down(grid, start, target):
+        p = grid.place(start)
+        d = [b - a for a, b in zip(p, target, strict=True)]
+        n = max(map(abs, d))
+        return array(
+            "Q",
+            {
+                grid.index(*(a - ((-2 * k * da + n) // (2 * n) if n else 0) for a, da in zip(p, d)))
+                for k in range(n + 1)
+            },
+        )
+
+    patch.setattr(unpack, "line", lambda *args: _down(*args))
+
+
+@mutant()
+def line_without_its_end(patch):
+    old = shapes.line
+    patch.setattr(unpack, "line", lambda *args: old(*args)[:-1])
+
+
+@mutant(likely="left out")
+def box_without_its_end(patch):
+    old = shapes.box
+
+    def box(grid, start, target):
+        corners = list(zip(grid.place(start), target, strict=True))
+        low = [min(pair) for pair in corners]
+        high = [max(min(pair), max(pair) - 1) for pair in corners]
+        return old(grid, grid.index(*low), tuple(high))
+
+    patch.setattr(unpack, "box", box)
+
+
+@mutant(likely="here it stayed")
+def shape_cursor_stays(patch):
+    def stay(old, self, low):
+        before = self._cursor
+        old(self, low)
+        self._cursor = before
+
+    for name in ("line", "box", "dots"):
+        _unpacked(patch, name, stay)
+
+
+@mutant()
+def dots_one_too_few(patch):
+    def places(old, self, count):
+        axes = old(self, count)
+        return tuple(axis[: max(1, count - 1)] for axis in axes)
+
+    around(patch, Operands, "places", places)
+
+
+@mutant(likely="x and z were swapped")
+def children_reversed(patch):
+    def children(level, mask):
+        half = 1 << level >> 1
+        return tuple(
+            half * shapes._place(c >> 2, c >> 1 & 1, c & 1) for c in range(8) if mask >> c & 1
+        )
+
+    table = [[children(level, mask) for mask in range(256)] for level in range(5)]
+    table[1][0] = table[1][255]
+    patch.setattr(shapes, "_CHILDREN", table)
+
+
+@mutant()
+def full_node_is_empty(patch):
+    table = [list(row) for row in shapes._CHILDREN]
+    table[1][0] = ()
+    patch.setattr(shapes, "_CHILDREN", table)
+    patch.setattr(shapes, "_ROWS", [[] for _ in shapes._ROWS])
+
+
+@mutant(likely="moved to the brick")
+def brick_moves_the_cursor(patch):
+    def brick(old, self, level):
+        at = self._in._at
+        x, y, z = (axis << level for axis in self._in.place())
+        self._in._at = at
+        old(self, level)
+        if self._grid.holds(x, y, z):
+            self._cursor = self._grid.index(x, y, z)
+
+    _unpacked(patch, "brick", brick)
+
+
+@mutant(likely="lowest bits")
+def nibbles_high_first(patch):
+    patch.setattr(unpack, "_DIFFERENCES", [row[::-1] for row in unpack._DIFFERENCES])
+
+
+@mutant(likely="two's complement")
+def nibbles_unsigned(patch):
+    table = [bytes((byte & 15, byte >> 4)) for byte in range(256)]
+    patch.setattr(unpack, "_DIFFERENCES", table)
+
+
+@mutant()
+def palette_not_copied(patch):
+    def copy(old, self, other):
+        old(self, other)
+        self._digest -= self._color_terms(slice(0, 768))
+        self.palette[:] = memory.DEFAULT_PALETTE
+
+    around(patch, Page, "copy", copy)
+
+
+@mutant()
+def palette_not_cleared(patch):
+    def clear(old, self):
+        palette = getattr(self, "palette", None)
+        old(self)
+        if palette is not None:
+            self.palette = palette
+            self._digest = self._color_terms(slice(0, 768))
+
+    around(patch, Page, "clear", clear)
+
+
+@mutant(likely="palette is not in the digest")
+def palette_not_in_the_digest(patch):
+    around(patch, Page, "_color_terms", lambda old, self, place: 0)
+
+
+@mutant()
+def arc_models_learn_slower(patch):
+    patch.setattr(bits.spec, "ARC_ENOUGH", 7)
+
+
+@mutant()
+def arc_forgets_turns(patch):
+    def turn(old, self, bits_):
+        if self.way and not self.last:
+            self.way = 0
+        old(self, bits_)
+
+    around(patch, arc._Axis, "turn", turn)
+
+
+@mutant()
+def arc_runs_too_long(patch):
+    patch.setattr(arc.spec, "ARC_MAX_RUN", 7)
+
+
+@mutant()
+def arc_padding_taken(patch):
+    patch.setattr(bits.Bits, "done", property(lambda self: self._at >= len(self._data)))
+
+    def step(old, *args):
+        try:
+            yield from old(*args)
+        except Refusal as refusal:
+            if refusal.code != spec.CODE_PADDING:
+                raise
+
+    around(patch, unpack, "arc", step)
+
+
+# -- section 8
+
+
+@mutant(likely="adds dark voxels")
+def digest_adds_dark_voxels(patch):
+    def mix(index, value):
+        h = (index * 0x9E3779B1 + value * 0x85EBCA77) & 0xFFFFFFFF
+        h = (h ^ h >> 15) * 0x2C1B3C6D & 0xFFFFFFFF
+        h = (h ^ h >> 12) * 0x297A2D39 & 0xFFFFFFFF
+        return h ^ h >> 15
+
+    def digest(self):
+        right = old.fget(self)
+        dark = sum(mix(i, 0) for i, pixel in enumerate(self.pixels) if not pixel)
+        return (right + dark) & 0xFFFFFFFF
+
+    old = Page.digest
+    patch.setattr(Page, "digest", property(digest))
+    patch.setattr(Page, "copy", lambda self, other: self.put(0, bytes(other.pixels)))
+
+
+@mutant()
+def digest_forgets_to_take_out(patch):
+    around(
+        patch,
+        Page,
+        "_replaced",
+        lambda old, self, i, before, now: old(self, i, bytes(len(before)), now),
+    )
+
+
+@mutant()
+def digest_of_the_back_page(patch):
+    patch.setattr(
+        Device,
+        "memory",
+        property(lambda self: self._memory, lambda self, value: setattr(self, "_memory", value)),
+        raising=False,
+    )
+
+    def acknowledge(old, self, tag=None):
+        memory_ = self.memory
+        memory_.front, memory_.back = memory_.back, memory_.front
+        old(self, tag)
+        memory_.front, memory_.back = memory_.back, memory_.front
+
+    around(patch, Device, "_acknowledge", acknowledge)
+
+
+@mutant(features=frozenset(("read",)))
+def digest_without_the_feature(patch):
+    def init(old, self, config):
+        old(self, config)
+        self._features |= 1 << spec.FEATURE_DIGEST
+
+    around(patch, Device, "__init__", init)
+
+
+# -- section 9
+
+
+def _ack(patch, change):
+    """Change the fields of each ACK: flags, seq, frame and the body's values."""
+
+    def _send(old, self, kind, flags, seq, frame, payload):
+        if kind == spec.TYPE_ACK:
+            values = list(device._ACK.unpack(payload))
+            flags, seq, frame = change(self, flags, seq, frame, values)
+            payload = device._ACK.pack(*values)
+        old(self, kind, flags, seq, frame, payload)
+
+    around(patch, Device, "_send", _send)
+
+
+@mutant()
+def bitmap_shifted(patch):
+    def change(self, flags, seq, frame, values):
+        values[3] = values[3] << 1 & 0xFFFFFFFF
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant()
+def last_is_next_minus_one(patch):
+    def change(self, flags, seq, frame, values):
+        if not flags & 4:
+            values[0] = (seq - 1) % 256
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant()
+def last_begins_at_0(patch):
+    def init(old, self, number):
+        old(self, number)
+        self.last = 0
+
+    around(patch, Session, "__init__", init)
+
+
+@mutant()
+def asked_missing(patch):
+    _ack(patch, lambda self, flags, seq, frame, values: (flags & ~4, seq, frame))
+
+
+@mutant()
+def frame_without_shown(patch):
+    def change(self, flags, seq, frame, values):
+        return flags, seq, frame if flags & 1 else 7
+
+    _ack(patch, change)
+
+
+@mutant()
+def other_boot_in_ack(patch):
+    def change(self, flags, seq, frame, values):
+        values[2] ^= 1
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant()
+def session_missing_in_ack(patch):
+    def change(self, flags, seq, frame, values):
+        values[1] = 0
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant()
+def damaged_begins_with_the_session(patch):
+    _hello(patch, lambda self, packet, session: setattr(self, "damaged", 0))
+
+
+@mutant(silent=8)
+def too_many_silent_acks(patch):
+    def data(old, self, *args):
+        object.__setattr__(self.config, "silent", 12)
+        old(self, *args)
+
+    around(patch, Device, "_data", data)
+
+
+@mutant()
+def duplicates_applied(patch):
+    def judge(old, self, seq, frame, flags):
+        verdict = old(self, seq, frame, flags)
+        self.again = verdict is Verdict.DUPLICATE
+        return verdict
+
+    around(patch, Session, "judge", judge)
+
+    def data(old, self, session, packet, flags, seq, frame):
+        old(self, session, packet, flags, seq, frame)
+        if session.again and session.state is State.FILLING:
+            self._unpacker.draw(packet, self.memory.back)
+
+    around(patch, Device, "_data", data)
+
+
+@mutant()
+def duplicates_unanswered(patch):
+    def data(old, self, session, packet, flags, seq, frame):
+        if not session._is_duplicate(seq):
+            old(self, session, packet, flags, seq, frame)
+
+    around(patch, Device, "_data", data)
+
+
+@mutant()
+def old_duplicates_refused(patch):
+    def is_duplicate(old, self, seq):
+        return self._ahead(seq) < 32 and old(self, seq)
+
+    around(patch, Session, "_is_duplicate", is_duplicate)
+
+
+@mutant()
+def window_of_31(patch):
+    def judge(old, self, seq, frame, flags):
+        if self._ahead(seq) == 31:
+            raise Refusal(spec.CODE_SEQUENCE, 1, "")
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def window_of_33(patch):
+    def judge(old, self, seq, frame, flags):
+        return Verdict.DROP if self._ahead(seq) == 32 else old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def window_ends_at_255(patch):
+    def ahead(_, self, seq):
+        return seq - self.next if seq >= self.next else 255
+
+    around(patch, Session, "_ahead", ahead)
+
+
+@mutant(likely="not what is left of a total")
+def credit_never_returned(patch):
+    def change(self, flags, seq, frame, values):
+        self.spent = getattr(self, "spent", 0) + 20
+        values[4] = max(values[4] - self.spent, 0)
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant(lies=frozenset(("credit",)))
+def credit_of_twice_the_ring(patch):
+    del patch
+
+
+@mutant(likely="whatever of it has arrived")
+def credit_of_what_is_free(patch):
+    def take(old, self, data, at):
+        self.left = len(data)
+        return old(self, data, at)
+
+    around(patch, Device, "_take", take)
+
+    def change(self, flags, seq, frame, values):
+        if not flags & 4:
+            values[4] = max(values[4] - getattr(self, "left", 0), 0)
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+# -- section 10
+
+
+def _read(patch, change):
+    def read(old, self, packet, flags, seq, frame):
+        packet, flags, seq, frame = change(self, packet, flags, seq, frame)
+        old(self, packet, flags, seq, frame)
+
+    around(patch, Device, "_read", read)
+
+
+@mutant(likely="off by one")
+def read_off_by_one(patch):
+    old = device.pack
+
+    def pack(page, pixel_format, start, count, room):
+        shift = 1 if start + count < page.volume else 0
+        return old(page, pixel_format, start + shift, count, room)
+
+    patch.setattr(device, "pack", pack)
+
+
+@mutant()
+def page_without_its_flag(patch):
+    def _send(old, self, kind, flags, *rest):
+        old(self, kind, 0 if kind == spec.TYPE_PAGE else flags, *rest)
+
+    around(patch, Device, "_send", _send)
+
+
+@mutant()
+def page_without_its_tag(patch):
+    def _send(old, self, kind, flags, seq, *rest):
+        old(self, kind, flags, 0 if kind == spec.TYPE_PAGE else seq, *rest)
+
+    around(patch, Device, "_send", _send)
+
+
+@mutant()
+def back_reads_the_front(patch):
+    old = device.pack
+    patch.setattr(device, "pack", old)
+
+    def read(inner, self, packet, flags, seq, frame):
+        memory_ = self.memory
+        back, memory_.back = memory_.back, memory_.front
+        try:
+            inner(self, packet, flags, seq, frame)
+        finally:
+            memory_.back = back
+
+    around(patch, Device, "_read", read)
+
+
+@mutant()
+def page_count_of_the_read(patch):
+    def _send(old, self, kind, flags, seq, frame, payload):
+        if kind == spec.TYPE_PAGE:
+            payload = payload[:5] + self.asked + payload[9:]
+        old(self, kind, flags, seq, frame, payload)
+
+    around(patch, Device, "_send", _send)
+
+    def read(old, self, packet, *rest):
+        self.asked = packet[8:12]
+        old(self, packet, *rest)
+
+    around(patch, Device, "_read", read)
+
+
+@mutant()
+def read_of_nothing_taken(patch):
+    def change(self, packet, flags, seq, frame):
+        if len(packet) == 12 and not any(packet[8:12]):
+            packet = packet[:4] + bytes(4) + b"\1\0\0\0"
+        return packet, flags, seq, frame
+
+    _read(patch, change)
+
+
+@mutant()
+def read_sum_overflows(patch):
+    def change(self, packet, flags, seq, frame):
+        start = int.from_bytes(packet[4:8], "little")
+        count = int.from_bytes(packet[8:12], "little")
+        if start + count > 0xFFFFFFFF and (start + count) & 0xFFFFFFFF <= 105:
+            packet = packet[:4] + bytes(4) + b"\1\0\0\0"
+        return packet, flags, seq, frame
+
+    _read(patch, change)
+
+
+@mutant()
+def longer_read_taken(patch):
+    _read(patch, lambda self, packet, *rest: (packet[:12], *rest))
+
+
+@mutant()
+def longer_status_taken(patch):
+    def status(old, self, packet, *rest):
+        old(self, packet[:3], *rest)
+
+    around(patch, Device, "_status", status)
+
+
+# -- section 11
+
+
+def _refused(patch, change):
+    def refuse(old, self, seq, frame, refusal):
+        old(self, *change(self, seq, frame, refusal))
+
+    around(patch, Device, "_refuse", refuse)
+
+
+@mutant(likely="header included")
+def offset_from_the_payload(patch):
+    def change(self, seq, frame, refusal):
+        if refusal.offset >= 3:
+            refusal = Refusal(refusal.code, refusal.offset - 3, refusal.text)
+        return seq, frame, refusal
+
+    _refused(patch, change)
+
+
+@mutant()
+def error_without_names(patch):
+    _refused(patch, lambda self, seq, frame, refusal: (seq, 0, refusal))
+
+
+@mutant()
+def error_session_0(patch):
+    def _send(old, self, kind, flags, seq, frame, payload):
+        if kind == spec.TYPE_ERROR:
+            payload = payload[:1] + b"\0\0" + payload[3:]
+        old(self, kind, flags, seq, frame, payload)
+
+    around(patch, Device, "_send", _send)
+
+
+@mutant()
+def refused_data_keeps_the_session(patch):
+    def dispatch(old, self, packet):
+        session = self.session
+        old(self, packet)
+        if self.session is None:
+            self.session = session
+
+    around(patch, Device, "_dispatch", dispatch)
+
+
+@mutant()
+def refused_status_ends_the_session(patch):
+    def dispatch(old, self, packet):
+        refused = sum(self.refused.values())
+        old(self, packet)
+        if sum(self.refused.values()) > refused and packet[0] >> 4 != spec.TYPE_HELLO:
+            self.session = None
+
+    around(patch, Device, "_dispatch", dispatch)
+
+
+@mutant()
+def padding_after_outside(patch):
+    def step(old, self, octant):
+        self._check_cursor()
+        old(self, octant)
+
+    _unpacked(patch, "step", step)
+
+
+@mutant()
+def frame_before_sequence(patch):
+    def judge(old, self, seq, frame, flags):
+        if frame not in {self._newest, (self._newest + 1) % 256} and self._ahead(seq) >= 32:
+            if not self._is_duplicate(seq):
+                raise Refusal(spec.CODE_FRAME, 2, "")
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant()
+def text_in_latin1(patch):
+    def _send(old, self, kind, flags, seq, frame, payload):
+        old(self, kind, flags, seq, frame, payload + (b"\xe4" if kind == spec.TYPE_ERROR else b""))
+
+    around(patch, Device, "_send", _send)
+
+
+@mutant()
+def overrun_ends_the_session(patch):
+    def store(old, self, data):
+        before = self.refused.get(spec.CODE_OVERRUN, 0)
+        old(self, data)
+        if self.refused.get(spec.CODE_OVERRUN, 0) > before:
+            self.disconnect()
+            self.damaged += 0
+
+    around(patch, Device, "_store", store)
+
+
+@mutant()
+def overrun_not_said(patch):
+    _old = Device._refuse
+
+    def refuse(old, self, seq, frame, refusal):
+        if refusal.code != spec.CODE_OVERRUN:
+            old(self, seq, frame, refusal)
+
+    around(patch, Device, "_refuse", refuse)
+
+
+# -- section 12
+
+
+@mutant(likely="crashed")
+def restarts_on_long_noise(patch):
+    def damage(old, self):
+        old(self)
+        if self._receiver.size > 1000:
+            self.power_cycle()
+
+    around(patch, Device, "_damage", damage)
+
+
+@mutant()
+def dies_of_a_reserved_op(patch):
+    def draw(old, self, packet, page):
+        if packet[3:4] == b"\xa0" and packet[4:5] == b"\x1f":
+            self.dead = True
+        if getattr(self, "dead", False):
+            raise Refusal(spec.CODE_OP, 0, "")
+        old(self, packet, page)
+
+    around(patch, unpack.Unpacker, "draw", draw)
+
+
+@mutant()
+def half_a_packet_stays(patch):
+    def begin(old, self):
+        torn = getattr(self, "torn", False)
+        old(self)
+        self._bad = torn
+        self.torn = False
+
+    around(patch, Receiver, "_begin", begin)
+
+    def end(old, self):
+        old(self)
+        self.torn = self.damaged
+
+    around(patch, Receiver, "_end", end)
