@@ -10,9 +10,21 @@ from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from firmware_sim import arc, bits, crc, device, info, memory, operands, receiver, sender
+from firmware_sim import (
+    arc,
+    bits,
+    crc,
+    device,
+    info,
+    memory,
+    operands,
+    receiver,
+    sender,
+    shapes,
+    spec,
+    unpack,
+)
 from firmware_sim import session as sessions
-from firmware_sim import shapes, spec, unpack
 from firmware_sim.grid import Grid
 from firmware_sim.refusal import Refusal
 from firmware_sim.session import State, Verdict

@@ -1,64 +1,39 @@
-"""``voxdisplay conformance``: does a device keep to protocol.md?"""
+"""``voxdisplay conformance``: tell whether a device keeps to protocol.md."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from itertools import groupby
+from typing import TYPE_CHECKING
 
 import click
 
-from voxdisplay.cli.options import DEFAULT_PORT, json_option, note, plural, print_json
-from voxdisplay.conformance.catalogue import Check
-from voxdisplay.conformance.run import Report, Result, Verdict, chosen, examine
-from voxdisplay.conformance.said import Said
+from voxdisplay.cli.options import (
+    DEFAULT_PORT,
+    json_option,
+    note,
+    port_option,
+    print_json,
+    progress_bar,
+)
 from voxdisplay.transport import open_transport
 
-_LAST_LINES = 8  # of a transcript, without --verbose
+if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
+    from voxdisplay.conformance.catalogue import Check
+    from voxdisplay.conformance.run import Result
+    from voxdisplay.conformance.said import Said
+
 _EXIT_BROKEN = 1
-_SECTIONS = {
-    "2": "scan order",
-    "2.1": "pixel formats",
-    "3": "delimiting",
-    "4": "packets",
-    "5": "HELLO and INFO",
-    "6": "frames and pages",
-    "7": "ops",
-    "7.1": "chains",
-    "7.2": "counts",
-    "7.3": "shapes",
-    "7.4": "bricks",
-    "7.5": "differences",
-    "7.6": "palette",
-    "7.7": "range-coded chains",
-    "7.8": "the grid's edges",
-    "8": "digest",
-    "9": "ACK",
-    "9.1": "window",
-    "9.2": "credit",
-    "10": "READ and PAGE",
-    "11": "ERROR",
-    "12": "malformed input",
-}
 
 
 @click.command(
     epilog="""\b
     voxdisplay conformance --port /dev/ttyUSB0
     voxdisplay conformance --port tcp://192.168.1.9:5000 --only 7.3 --only 9/status
-    voxdisplay conformance --list
+    voxdisplay conformance --only digest --list
 
-    Exit codes: 0 all that concerns the device holds; 1 something does not; 2 usage; 3 the port
-    cannot be opened."""
+    Exit codes: 0 all that concerns the device holds; 1 something does not, or could not be looked
+    at; 2 usage; 3 the port cannot be opened."""
 )
-@click.option(
-    "--port",
-    "-p",
-    envvar="VOXDISPLAY_PORT",
-    metavar="PORT",
-    help="As of voxdisplay push. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
-)
+@port_option
 @click.option(
     "--baud",
     type=click.IntRange(min=50),
@@ -83,7 +58,7 @@ _SECTIONS = {
     default=5.0,
     metavar="SECONDS",
     show_default=True,
-    help="How long the first answer may take: a board may restart when its port is opened.",
+    help="How long the first answer may take: a board may start anew when its port is opened.",
 )
 @click.option(
     "--only",
@@ -92,8 +67,8 @@ _SECTIONS = {
     help="Make only these checks: 7, 7.3, 7.3/line-ties, line-*. May be given several times.",
 )
 @click.option("--list", "as_list", is_flag=True, help="List the checks, and what each demands.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of all that is random.")
-@click.option("--verbose", "-v", is_flag=True, help="Show all that went over the wire.")
+@click.option("--seed", default=0, show_default=True, help="Where all that is random begins.")
+@click.option("--verbose", "-v", is_flag=True, help="Show all packets of every check.")
 @json_option
 def conformance(
     *,
@@ -109,30 +84,37 @@ def conformance(
 ) -> None:
     """Check that a device keeps to protocol.md, sentence by sentence.
 
-    Any device, behind any kind of port. It draws on the display; afterwards the display is as it
-    was, if the device can be read, otherwise dark.
+    It takes any device behind any kind of port. It draws on the display; afterwards the display is
+    as it was, if it can be read back, otherwise dark.
     """
+    from voxdisplay.conformance import report, run  # noqa: PLC0415 - only what is needed
+
     try:
-        selected = chosen(only)
+        selected = run.chosen(only)
     except ValueError as error:
-        raise click.BadParameter(
-            f"{error}: voxdisplay conformance --list lists them", param_hint="--only"
-        ) from error
+        raise click.BadParameter(f"{error}; --list lists them", param_hint="--only") from error
     if as_list:
-        _print_list(selected, as_json=as_json)
+        _list(selected, as_json=as_json)
         return
-    port = port or DEFAULT_PORT
+    if not port:
+        note("no --port: using the built-in emulator, sim:")
+        port = DEFAULT_PORT
     pipe = open_transport(port, baud=baud)
+    done = 0
     try:
-        with _progress(len(selected)) as bar:
+        with progress_bar("checking") as progress:
 
             def ended(result: Result) -> None:
-                if bar:
-                    bar.update(1)
+                nonlocal done
+                done += 1
+                if progress:
+                    progress(min(done, len(selected)), len(selected))
                 if verbose and not as_json:
-                    _print_verbose(result)
+                    text = f"{result.check.id}: {result.verdict.value} {result.reason}".rstrip()
+                    click.echo(report.clean(text))
+                    click.echo("\n".join(report.transcript_lines(result.log)))
 
-            report = examine(
+            outcome = run.examine(
                 pipe,
                 only,
                 timeout_s=timeout_s,
@@ -145,150 +127,27 @@ def conformance(
     finally:
         pipe.close()
     if as_json:
-        print_json(_json(port, report))
+        print_json(report.as_json(port, outcome))
     else:
-        _print_report(report, verbose=verbose)
-    if not report.holds:
+        for line in report.lines(outcome, transcripts=not verbose):
+            click.secho(line, fg="red" if line.startswith("BROKEN") else None)
+    if not outcome.holds:
         raise click.exceptions.Exit(_EXIT_BROKEN)
 
 
 def _announce(port: str, said: Said, *, kept: bool) -> None:
-    note(f"{port}  {_clean(str(said))}")
-    note(
-        "this draws on the display; it will be "
-        + ("as it was afterwards" if kept else "dark afterwards, as it cannot be read back")
-    )
+    from voxdisplay.conformance.report import clean  # noqa: PLC0415 - only what is needed
+
+    note(f"{port}  {clean(str(said))}")
+    afterwards = "as it was" if kept else "dark: what it shows cannot be read back"
+    note(f"this draws on the display; afterwards it will be {afterwards}")
 
 
-@contextmanager
-def _progress(count: int) -> Iterator[click.progressbar | None]:  # type: ignore[valid-type]
-    if not sys.stderr.isatty():
-        yield None
-        return
-    with click.progressbar(length=count, label="checking", file=sys.stderr) as bar:
-        yield bar
-
-
-def _print_list(checks: list[Check], *, as_json: bool) -> None:
+def _list(checks: list[Check], *, as_json: bool) -> None:
     if as_json:
-        print_json(
-            {
-                "checks": [
-                    {"section": c.section, "name": c.name, "demands": c.demands} for c in checks
-                ]
-            }
-        )
+        keys = ("section", "name", "demands")
+        print_json({"checks": [{key: getattr(check, key) for key in keys} for check in checks]})
         return
     width = max(len(check.id) for check in checks)
-    for check in _by_section(checks):
+    for check in sorted(checks, key=lambda check: check.order):
         click.echo(f"{check.id:<{width}}  {check.demands}")
-
-
-def _order(section: str) -> tuple[int, ...]:
-    return tuple(map(int, section.split(".")))
-
-
-def _by_section(checks: list[Check]) -> list[Check]:
-    return sorted(checks, key=lambda check: _order(check.section))
-
-
-def _print_report(report: Report, *, verbose: bool) -> None:
-    for result in report.results:
-        if result.verdict is Verdict.BROKEN:
-            _print_broken(result, verbose=verbose)
-    ordered = sorted(report.results, key=lambda result: _order(result.check.section))
-    for section, group in groupby(ordered, key=lambda result: result.check.section):
-        results = list(group)
-        counts = ", ".join(
-            f"{number} {verdict.value.replace('holds', 'hold') if number > 1 else verdict.value}"
-            for verdict in Verdict
-            if (number := sum(result.verdict is verdict for result in results))
-        )
-        click.echo(f"{section:>4}  {_SECTIONS.get(section, ''):<20}  {counts}")
-    skipped = [result for result in ordered if result.verdict is Verdict.NOT_APPLICABLE]
-    for reason, group in groupby(
-        sorted(skipped, key=lambda result: result.reason), key=lambda result: result.reason
-    ):
-        names = ", ".join(result.check.id for result in group)
-        click.echo(f"not applicable, {_clean(reason)}: {names}")
-    click.echo(_summary(report))
-    click.echo(f"the display is {report.left}")
-
-
-def _summary(report: Report) -> str:
-    broken = report.count(Verdict.BROKEN)
-    held = report.count(Verdict.HOLDS)
-    not_run = report.count(Verdict.NOT_RUN)
-    if report.holds:
-        return f"the device keeps to protocol.md in all that was looked at: {plural(held, 'check')}"
-    missed = f", {not_run} not run" if not_run else ""
-    return f"{broken} broken, {held} hold{missed}"
-
-
-def _print_broken(result: Result, *, verbose: bool) -> None:
-    check = result.check
-    click.echo(click.style(f"BROKEN  {check.id}", fg="red", bold=True))
-    click.echo(f"  section {check.section} demands: {check.demands}")
-    click.echo(f"  must be   {_clean(result.must)}")
-    click.echo(f"  was       {_clean(result.came)}")
-    if result.likely:
-        click.echo(f"  likely    {_clean(result.likely)}")
-    if not verbose:
-        left_out = len(result.log) - _LAST_LINES
-        if left_out > 0:
-            click.echo(f"     ... {plural(left_out, 'packet')} before: -v shows them")
-        for line in result.log[-_LAST_LINES:]:
-            click.echo(f"     {_clean(str(line))}")
-    click.echo()
-
-
-def _print_verbose(result: Result) -> None:
-    click.echo(f"{result.check.id}  {result.verdict.value}  {_clean(result.reason)}".rstrip())
-    for line in result.log:
-        click.echo(f"     {_clean(str(line))}")
-
-
-def _clean(text: str) -> str:
-    """Keep a device's text from steering the terminal."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-
-
-def _json(port: str, report: Report) -> dict[str, object]:
-    said = report.said
-    return {
-        "port": port,
-        "device": said
-        and {
-            "name": said.name,
-            "firmware": said.firmware,
-            "serial": said.serial,
-            "size": list(said.grid),
-            "format": said.format,
-            "refresh_hz": said.refresh / 1000,
-            "max_payload_bytes": said.max_payload,
-            "rx_buffer_bytes": said.rx_buffer,
-            "features": said.features,
-        },
-        "conforms": report.holds,
-        "counts": {verdict.value.replace(" ", "_"): report.count(verdict) for verdict in Verdict},
-        "display": report.left,
-        "results": [
-            {
-                "section": result.check.section,
-                "name": result.check.name,
-                "demands": result.check.demands,
-                "verdict": result.verdict.value.replace(" ", "_"),
-                "must": result.must or None,
-                "was": result.came or None,
-                "likely": result.likely or None,
-                "reason": result.reason or None,
-                "transcript": [
-                    {"sent": line.sent, "hex": line.data.hex(" ").upper(), "text": line.text}
-                    for line in result.log
-                ]
-                if result.verdict is Verdict.BROKEN
-                else None,
-            }
-            for result in report.results
-        ],
-    }

@@ -47,6 +47,11 @@ class Check:
         """Section and name."""
         return f"{self.section}/{self.name}"
 
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Its section as numbers, by which checks are listed."""
+        return tuple(map(int, self.section.split(".")))
+
     def matches(self, pattern: str) -> bool:
         """Tell whether a pattern names it: ``7``, ``7.3``, ``7.3/line-ties``, ``line-*``."""
         inner = f"{self.section}/".startswith((f"{pattern}/", f"{pattern}."))
@@ -58,6 +63,30 @@ class Check:
 
 
 CHECKS: list[Check] = []
+SECTIONS = {
+    "2": "scan order",
+    "2.1": "pixel formats",
+    "3": "delimiting",
+    "4": "packets",
+    "5": "HELLO and INFO",
+    "6": "frames and pages",
+    "7": "ops",
+    "7.1": "chains",
+    "7.2": "counts",
+    "7.3": "shapes",
+    "7.4": "bricks",
+    "7.5": "differences",
+    "7.6": "the palette",
+    "7.7": "range-coded chains",
+    "7.8": "the grid's edges",
+    "8": "the digest",
+    "9": "ACK",
+    "9.1": "the window",
+    "9.2": "credit",
+    "10": "READ and PAGE",
+    "11": "ERROR",
+    "12": "malformed input",
+}
 
 
 def check(section: str, name: str, demands: str, *needs: Need) -> Callable[[Body], Body]:

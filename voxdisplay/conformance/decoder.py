@@ -6,7 +6,7 @@ is a small method of its own, so that ``mistakes`` can misread one at a time. Kn
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from voxdisplay.conformance.page import Page, rgb
 from voxdisplay.conformance.said import Said
@@ -73,15 +73,15 @@ class Decoder:
         return [raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)]
 
     def steps_of(self, byte: int) -> int:
-        """A chain has n steps behind the voxel where it begins, and the byte is n - 1."""
+        """Give the steps of a chain: the byte is n - 1."""
         return byte + 1
 
     def chain_start(self, at: Place) -> list[Place]:
-        """A chain writes the pen to the voxel at the cursor first."""
+        """Begin a chain by writing the voxel at the cursor."""
         return [at]
 
     def count_of(self, low: int) -> int:
-        """c = 0..30 is n = c + 1, and c = 31 is n = 32 + k; k is LEB128."""
+        """C = 0..30 is n = c + 1, and c = 31 is n = 32 + k; k is LEB128."""
         return low + 1 if low < 31 else 32 + self._leb128()
 
     def rounded(self, k: int, d: int, length: int) -> int:
@@ -89,7 +89,7 @@ class Decoder:
         return (2 * k * d + length) // (2 * length) if length else 0
 
     def span(self, a: int, b: int) -> range:
-        """A BOX has both ends, whichever is the larger."""
+        """Include both ends of a BOX, whichever is the larger."""
         return range(min(a, b), max(a, b) + 1)
 
     def child(self, bit: int) -> Place:
@@ -121,7 +121,7 @@ class Decoder:
         return last
 
     def pixel_of(self, raw: bytes) -> int:
-        """The value of a pixel is its bytes as a little-endian integer."""
+        """Read a pixel's bytes as a little-endian integer."""
         return int.from_bytes(raw, "little")
 
     # -- reading
@@ -200,67 +200,56 @@ class Decoder:
     # -- the ops
 
     def _op(self, op: int) -> None:
-        kind, low = op & 0xE0, op & 0x1F
-        if op == spec.OP_END:
-            if any(self.rest()):
-                raise self.refuse(spec.CODE_PADDING)
-        elif op == spec.OP_PEN:
-            self._pen()
-        elif op == spec.OP_MOVE:
-            self.cursor = self.said.index(*self.inside(self._place()))
-        elif op == spec.OP_LINE and self.said.has("LINE"):
-            self._line()
-        elif op == spec.OP_BOX and self.said.has("BOX"):
-            self._box()
-        elif op == spec.OP_DOTS and self.said.has("DOTS"):
-            self._dots()
-        elif op == spec.OP_COLORS and self.said.has("PALETTE"):
-            self._colors()
-        elif op == spec.OP_ARC and self.said.has("ARC"):
-            from voxdisplay.conformance import arc  # noqa: PLC0415 - it draws with this decoder
+        for first, more, feature, draw in _OPS:
+            if first <= op <= first + more and (not feature or self.said.has(feature)):
+                draw(self, op - first)
+                return
+        raise self.refuse(spec.CODE_OP)
 
-            arc.draw(self)
-        elif kind == spec.OP_STEP and low <= spec.LIMIT_MAX_OCTANT:
-            self._chain(low, from_cursor=True)
-        elif kind == spec.OP_FROM and low <= spec.LIMIT_MAX_OCTANT:
-            self._chain(low, from_cursor=False)
-        elif kind == spec.OP_OCT and low <= spec.LIMIT_MAX_LEVEL and self.said.has("OCT"):
-            self._brick(low)
-        elif kind == spec.OP_SKIP:
-            self._skip(low)
-        elif kind == spec.OP_RUN:
-            self._run(low)
-        elif kind == spec.OP_LIT:
-            self._literal(low)
-        elif kind == spec.OP_DIFF and self.said.has("DIFF"):
-            self._differences(low)
-        else:
-            raise self.refuse(spec.CODE_OP)
+    def op_end(self, _: int) -> None:
+        """Demand that nothing follows END but 00."""
+        if any(self.rest()):
+            raise self.refuse(spec.CODE_PADDING)
 
-    def _pen(self) -> None:
+    def op_move(self, _: int) -> None:
+        """Set the cursor by MOVE."""
+        self.cursor = self.said.index(*self.inside(self._place()))
+
+    def op_arc(self, _: int) -> None:
+        """Draw an ARC."""
+        from voxdisplay.conformance import arc  # noqa: PLC0415 - it draws with this decoder
+
+        arc.draw(self)
+
+    def op_pen(self, _: int) -> None:
+        """Set the pen by PEN."""
         pen = self.pixel_of(self._take(self.said.pixel_bytes))
         if self.said.format == spec.FORMAT_MONO1 and pen > 1:
             raise self.refuse(spec.CODE_PIXEL)
         self.pen = pen
 
-    def _skip(self, low: int) -> None:
+    def op_skip(self, low: int) -> None:
+        """Move the cursor on by SKIP."""
         count = self.count_of(low)
         if self.cursor + count > self.said.voxels:
             raise self.refuse(spec.CODE_OUTSIDE)
         self.cursor += count
 
-    def _run(self, low: int) -> None:
+    def op_run(self, low: int) -> None:
+        """Draw a RUN."""
         count = self.count_of(low)
         if self.cursor + count > self.said.voxels:
             raise self.refuse(spec.CODE_OUTSIDE)
         self._along([self.pen] * count)
 
-    def _literal(self, low: int) -> None:
+    def op_literal(self, low: int) -> None:
+        """Draw a LIT."""
         values = self._pixels(self.count_of(low))
         self._along(values)
         self.pen = self.after_literal(self.pen, values[-1])
 
-    def _differences(self, low: int) -> None:
+    def op_differences(self, low: int) -> None:
+        """Draw a DIFF."""
         values, pen = [], self.pen
         for nibble in self._parts(self.count_of(low), 4):
             pen = (pen + self.difference(nibble)) % 256
@@ -268,8 +257,15 @@ class Decoder:
         self._along(values)
         self.pen = pen
 
-    def _chain(self, octant: int, *, from_cursor: bool) -> None:
-        named = None if from_cursor else self._place()
+    def op_step(self, octant: int) -> None:
+        """Draw a STEP."""
+        self._chain(octant, None)
+
+    def op_from(self, octant: int) -> None:
+        """Draw a FROM."""
+        self._chain(octant, self._place())
+
+    def _chain(self, octant: int, named: Place | None) -> None:
         steps = self.steps_of(self._byte())
         crumbs = self._parts(steps, 2)
         at = begin = self.inside(named) if named else self._here()
@@ -284,7 +280,8 @@ class Decoder:
         self.ink(places)
         self.cursor = self.said.index(*self.after_chain(begin, at))
 
-    def _line(self) -> None:
+    def op_line(self, _: int) -> None:
+        """Draw a LINE."""
         end = self._place()
         begin = self._here()
         self.inside(end)
@@ -297,7 +294,8 @@ class Decoder:
         self.ink(zip(x, y, z, strict=True))
         self.cursor = self.said.index(*self.after_shape(begin, end))
 
-    def _box(self) -> None:
+    def op_box(self, _: int) -> None:
+        """Draw a BOX."""
         end = self._place()
         begin = self._here()
         self.inside(end)
@@ -305,25 +303,29 @@ class Decoder:
         self.ink((x, y, z) for z in zs for y in ys for x in xs)
         self.cursor = self.said.index(*self.after_shape(begin, end))
 
-    def _dots(self) -> None:
+    def op_dots(self, _: int) -> None:
+        """Draw DOTS."""
         places = [self._place() for _ in range(self.steps_of(self._byte()))]
         self.ink(places)
         begin = self.said.place(min(self.cursor, self.said.voxels - 1))
         self.cursor = self.said.index(*self.after_shape(begin, places[-1]))
 
-    def _brick(self, level: int) -> None:
+    def op_brick(self, level: int) -> None:
+        """Draw an OCT."""
         x, y, z = self._place()
         side = 1 << level
         corner = (x * side, y * side, z * side)
-        nodes, places = [corner], []
+        nodes = [corner]
+        places: list[Place] = []
         while side > 1:
-            children = []
+            children: list[Place] = []
             side //= 2
             for node in nodes:
                 mask = self._byte()
                 for bit in range(8):
                     offset = (side * part for part in self.child(bit))
-                    at = tuple(a + b for a, b in zip(node, offset, strict=True))
+                    x, y, z = (a + b for a, b in zip(node, offset, strict=True))
+                    at = (x, y, z)
                     if not mask:
                         places += self._cube(at, side)
                     elif mask >> bit & 1:
@@ -337,7 +339,8 @@ class Decoder:
         part = range(side)
         return [(x + i, y + j, z + k) for k in part for j in part for i in part]
 
-    def _colors(self) -> None:
+    def op_colors(self, _: int) -> None:
+        """Set COLORS of the palette."""
         first = self._byte()
         count = self._byte() + 1
         raw = self._take(3 * count)
@@ -345,3 +348,23 @@ class Decoder:
             raise self.refuse(spec.CODE_OUTSIDE)
         for i in range(count):
             self.page.palette[first + i] = rgb(*raw[3 * i : 3 * i + 3])
+
+
+# First op byte, how many more, the feature that they need, and what draws them.
+_OPS: tuple[tuple[int, int, str, Callable[[Decoder, int], None]], ...] = (
+    (spec.OP_END, 0, "", Decoder.op_end),
+    (spec.OP_PEN, 0, "", Decoder.op_pen),
+    (spec.OP_MOVE, 0, "", Decoder.op_move),
+    (spec.OP_LINE, 0, "LINE", Decoder.op_line),
+    (spec.OP_BOX, 0, "BOX", Decoder.op_box),
+    (spec.OP_DOTS, 0, "DOTS", Decoder.op_dots),
+    (spec.OP_COLORS, 0, "PALETTE", Decoder.op_colors),
+    (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", Decoder.op_step),
+    (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", Decoder.op_from),
+    (spec.OP_ARC, 0, "ARC", Decoder.op_arc),
+    (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", Decoder.op_brick),
+    (spec.OP_SKIP, 31, "", Decoder.op_skip),
+    (spec.OP_RUN, 31, "", Decoder.op_run),
+    (spec.OP_LIT, 31, "", Decoder.op_literal),
+    (spec.OP_DIFF, 31, "DIFF", Decoder.op_differences),
+)

@@ -191,7 +191,8 @@ class BoxOpen(Decoder):
     """BOX includes the larger coordinate on each axis: here it was left out."""
 
     def span(self, a: int, b: int) -> range:
-        return range(min(a, b), max(min(a, b) + 1, max(a, b)))
+        low, high = sorted((a, b))
+        return range(low, max(low + 1, high))
 
 
 class ChildrenReversed(Decoder):
@@ -251,7 +252,7 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
         exclusive ^= term
     yield exclusive, "the terms are combined by exclusive or: the digest is their sum modulo 2^32"
     places = {i: said.place(i) for i in page.pixels}
-    nx, ny, nz = said.grid
+    _, ny, nz = said.grid
     zyx = sum(mix(z + nz * (y + ny * x), page.pixels[i]) for i, (x, y, z) in places.items())
     yield zyx & 0xFFFFFFFF, "the index counts z fastest: x runs fastest, then y, then z"
     if said.pixel_bytes > 1:

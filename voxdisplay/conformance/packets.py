@@ -134,8 +134,8 @@ def damage(stream: bytes, longest: int) -> int:
 # -- what a device answers
 
 
-class NoSuchField(AttributeError):
-    """An answer was asked for what its type does not have: it is of another type than it must be."""
+class NoSuchFieldError(AttributeError):
+    """An answer is of another type than it must be: it does not have what was asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +185,7 @@ class Answer:
         for (field, _, _), value in zip(layout, self._values(), strict=True):
             if field == name:
                 return int(value)
-        raise NoSuchField(f"no field {name!r} in {self}")
+        raise NoSuchFieldError(f"no field {name!r} in {self}")
 
     def _values(self) -> tuple[int, ...]:
         layout = _STRUCTS.get(self.kind)
@@ -200,7 +200,7 @@ class Answer:
 
 
 def describe(packet: bytes) -> str:
-    """Say in words what a body is: ``DATA CLEAR|COMMIT seq 3 frame 1``, and the fields of others."""
+    """Say in words what a body is: ``DATA CLEAR|COMMIT seq 3 frame 1``."""
     kind, flags = packet[0] >> 4, packet[0] & 15
     names = [name for bit, name in _FLAG_NAMES.get(kind, {}).items() if flags & bit]
     rest = flags & ~sum(bit for bit in _FLAG_NAMES.get(kind, {}) if flags & bit)

@@ -246,7 +246,7 @@ class Probe:
             self._tags = iter(_TAGS)
             tag = next(self._tags)
         self.send(packets.status(tag))
-        before = []
+        before: list[Answer] = []
         for answer in self.answers():
             if (answer.kind == spec.TYPE_ACK and answer.last == tag) or (
                 answer.kind == spec.TYPE_ERROR and answer.seq == tag
@@ -292,7 +292,7 @@ class Probe:
         if not holds:
             raise Broken(must, str(came), likely)
 
-    def demand_ack(self, answer: Answer, likely: str = "", **fields: int) -> None:
+    def demand_ack(self, answer: Answer, likely: str = "", /, **fields: int) -> None:
         """Demand an ACK with some fields; ``shown``, ``pending`` and ``asked`` are its flags."""
         if answer.kind != spec.TYPE_ACK:
             raise Broken("ACK", str(answer), likely)
@@ -378,9 +378,9 @@ class Probe:
         until_s = time.monotonic() + self.patience_s
         while time.monotonic() < until_s:
             hear_until_s = time.monotonic() + max(1.2 * self.said.period_s, 0.02)
-            while answer := self.hear(hear_until_s):
-                if answer.kind == spec.TYPE_ACK and _shows(answer, frame):
-                    return answer
+            while heard := self.hear(hear_until_s):
+                if heard.kind == spec.TYPE_ACK and _shows(heard, frame):
+                    return heard
             self.sync()
             if self.state.kind == spec.TYPE_ACK and _shows(self.state, frame):
                 return self.state
@@ -450,7 +450,7 @@ class Probe:
         first = differ[0]
         raise Broken(
             f"pixel {must.pixels.get(first, 0):X}h at {said.place(first)}",
-            f"{pixels.get(first, 0):X}h, and {len(differ)} of {said.voxels} voxels are not as drawn",
+            f"{pixels.get(first, 0):X}h; {len(differ)} of {said.voxels} voxels are not as drawn",
             likely,
         )
 
@@ -459,13 +459,14 @@ class Probe:
     ) -> Iterator[tuple[str, Page]]:
         yield "the picture before is still on display", before
         yield "the display is dark", Page()
-        for start, why in ((before, "CLEAR does not make the back page dark"), (Page(), "KEEP")):
+        for start, why in (
+            (before, "CLEAR does not make the back page dark"),
+            (Page(), "without CLEAR a frame starts as a copy of the front page: here it was dark"),
+        ):
             page = start.copy()
             decoder = Decoder(self.said, page)
             for payload in payloads:
                 decoder.draw(payload)
-            if why == "KEEP":
-                why = "without CLEAR a frame starts as a copy of the front page: here it was dark"
             yield why, page
         yield from mistakes.pages_by_mistake(self.said, base, payloads)
 

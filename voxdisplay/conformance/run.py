@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -11,7 +11,7 @@ from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist
 from voxdisplay.conformance import first_contact
 from voxdisplay.conformance.catalogue import CHECKS, Check
 from voxdisplay.conformance.keeping import keep, put_back
-from voxdisplay.conformance.packets import NoSuchField
+from voxdisplay.conformance.packets import NoSuchFieldError
 from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Silent
 from voxdisplay.conformance.said import FORMATS, Said
 from voxdisplay.errors import TransportError
@@ -110,9 +110,8 @@ def examine(
     opening_s: float = 5.0,
     baud: int = 115200,
     seed: int = 0,
-    greeted: Callable[[Said, bool], None] = lambda said, kept: None,
-    began: Callable[[Check], None] = lambda check: None,
-    ended: Callable[[Result], None] = lambda result: None,
+    greeted: Callable[[Said, bool], object] | None = None,
+    ended: Callable[[Result], object] | None = None,
 ) -> Report:
     """Examine the device at the other end of a pipe.
 
@@ -123,11 +122,11 @@ def examine(
         Sections, names or patterns of checks; all, if there are none.
     timeout_s, opening_s, baud, seed
         As of `Probe`.
-    greeted : callable
+    greeted : callable, optional
         Is told what the device announced, and whether its picture could be kept, before anything
         is drawn.
-    began, ended : callable
-        Are told of each check.
+    ended : callable, optional
+        Is told what came of each check.
 
     Returns
     -------
@@ -139,56 +138,66 @@ def examine(
         If ``only`` names no check.
     """
     selected = chosen(only)
-    report = Report()
-
-    def end(result: Result) -> None:
-        report.results.append(result)
-        ended(result)
-
     probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed)
+    report = Report()
+    stranger = _meet(probe)
+    if stranger:
+        results = _none(stranger, selected)
+    else:
+        report.said = probe.said
+        kept = _quietly(lambda: keep(probe))
+        if greeted:
+            greeted(probe.said, kept is not None)
+        results = _each(probe, selected)
+    for result in results:
+        report.results.append(result)
+        if ended:
+            ended(result)
+    if not stranger:
+        report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
+    return report
+
+
+def _meet(probe: Probe) -> Result | None:
+    """Say hello; give what is wrong if the device cannot be talked to at all."""
+    likely = ""
     try:
         met = probe.greet()
-        likely = "" if met else first_contact.why_silent(probe)
+        if not met:
+            likely = first_contact.why_silent(probe)
     except TransportError as error:
         met, likely = False, str(error)
-    report.said = probe.said if met else None
-    if not met or probe.said.format not in FORMATS or not probe.said.voxels:
-        first = first_contact.CHECK
-        came = str(probe.info) if met else "nothing that could be read"
-        end(
-            Result(
-                first, Verdict.BROKEN, "INFO that can be read", came, likely, log=tuple(probe.log)
-            )
-        )
-        for check in selected:
-            end(Result(check, Verdict.NOT_RUN, reason="the device could not be talked to"))
-        return report
+    if met and probe.said.format in FORMATS and probe.said.voxels:
+        return None
+    came = str(probe.info) if met else "nothing that could be read"
+    must = "an INFO that says what the device is"
+    return Result(first_contact.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
 
-    kept = _quietly(lambda: keep(probe))
-    greeted(probe.said, kept is not None)
+
+def _none(stranger: Result, selected: list[Check]) -> Iterator[Result]:
+    yield stranger
+    for check in selected:
+        yield Result(check, Verdict.NOT_RUN, reason="the device cannot be talked to")
+
+
+def _each(probe: Probe, selected: list[Check]) -> Iterator[Result]:
+    """Make the checks, until the device or the port is gone."""
     deaf, gone = 0, ""
     for check in selected:
         if gone:
-            end(Result(check, Verdict.NOT_RUN, reason=gone))
+            yield Result(check, Verdict.NOT_RUN, reason=gone)
             continue
-        began(check)
         try:
             result = _make(probe, check)
             deaf = 0
         except _Unheard as unheard:
             result = unheard.result
             deaf += 1
-            if deaf == _DEAF:
-                gone = "the device does not answer any more"
+            gone = "the device does not answer any more" if deaf == _DEAF else ""
         except TransportError as error:
             gone = str(error)
-            result = Result(
-                check, Verdict.BROKEN, "the port stays open", gone, log=tuple(probe.log)
-            )
-        end(result)
-    if not gone:
-        report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
-    return report
+            result = _broken(probe, check, Broken("the port stays open", gone))
+        yield result
 
 
 class _Unheard(Exception):  # noqa: N818
@@ -214,7 +223,7 @@ def _make(probe: Probe, check: Check) -> Result:
         result = Result(check, Verdict.NOT_APPLICABLE, reason=str(reason))
     except Broken as broken:
         result = _broken(probe, check, broken)
-    except NoSuchField as field:
+    except NoSuchFieldError as field:
         result = _broken(probe, check, Broken("an answer of another type", str(field)))
     made = tuple(probe.log)
     try:

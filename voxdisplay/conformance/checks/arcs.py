@@ -114,7 +114,8 @@ def arc_behind_ops(probe: Probe) -> None:
 def arc_long(probe: Probe) -> None:
     said = probe.said
     main = said.grid.index(max(said.grid))
-    there, back = [], []
+    there: list[Place] = []
+    back: list[Place] = []
     for at in range(said.grid[main]):
         place = [0, 0, 0]
         place[main] = at
