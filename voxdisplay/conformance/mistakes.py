@@ -6,9 +6,10 @@ picture is that of the device names the fault. Nothing here decides whether a ch
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
-from voxdisplay.conformance.decoder import Decoder, Place
+from voxdisplay.conformance.decoder import Decoder, Place, Refused
 from voxdisplay.conformance.page import Page, mix
 from voxdisplay.conformance.said import Said
 from voxdisplay.wire import spec
@@ -228,6 +229,32 @@ def pages_by_mistake(said: Said, base: Page, payloads: list[bytes]) -> Iterator[
         except Exception:  # noqa: BLE001, S112 - a misreading may stumble over anything
             continue
         yield (mistake.__doc__ or "").strip(), decoder.page
+
+
+def refusals_by_mistake(said: Said, payload: bytes) -> Iterator[tuple[str, int, int]]:
+    """Give the misreadings that refuse a payload: what each says of itself, its code and where."""
+    for mistake in MISTAKES:
+        try:
+            mistake(said, Page()).draw(payload)
+        except Refused as refused:
+            yield (mistake.__doc__ or "").strip(), refused.code, refused.at
+        except Exception:  # noqa: BLE001, S112 - a misreading may stumble over anything
+            continue
+
+
+def other_orders(said: Said, page: Page) -> Iterator[tuple[str, Page]]:
+    """Give a picture as it is if scan order was mistaken."""
+    names = "xyz"
+    for order in itertools.permutations(range(3)):
+        if order == (0, 1, 2):
+            continue
+        a, b, c = order
+        pixels = {}
+        for index, value in page.pixels.items():
+            at = said.place(index)
+            pixels[at[a] + said.grid[a] * (at[b] + said.grid[b] * at[c])] = value
+        runs = f"{names[a]} runs fastest, then {names[b]}, then {names[c]}"
+        yield f"scan order is x fastest, then y, then z: here {runs}", Page(pixels)
 
 
 def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[int, str]]:

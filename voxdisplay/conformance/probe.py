@@ -8,10 +8,11 @@ expects comes from ``decoder`` and ``page``.
 
 from __future__ import annotations
 
+import itertools
 import random
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -234,8 +235,8 @@ class Probe:
         return None
 
     def close(self) -> None:
-        """End the session by a DATA packet that every device refuses."""
-        self.say(packets.data(self.seq, self.frame, b"\x1f"))
+        """End the session by a DATA packet with a reserved flag, number, frame and op."""
+        self.say(packets.data(self.seq + 99, self.frame + 99, b"\x1f", 2))
         must = "NO_SESSION answers all, after a refused DATA"
         self.demand(self.state.kind == spec.TYPE_ERROR, must, self.state)
 
@@ -332,11 +333,19 @@ class Probe:
         come = self.say(packets.data(self.seq, self.frame, payload, flags))
         for answer in come:
             if answer.kind == spec.TYPE_ERROR:
-                raise Broken("the packet is taken", str(answer), _why_refused(answer, payload))
+                raise Broken("the packet is taken", str(answer), self._why_refused(answer, payload))
         self.seq += 1
         if self.state.kind != spec.TYPE_ACK or self.state.next == seq:
             raise Broken(f"the packet with sequence number {seq} is received", str(self.state))
         return come
+
+    def _why_refused(self, error: Answer, payload: bytes) -> str:
+        at = error.offset - packets.HEADER_BYTES
+        found = mistakes.refusals_by_mistake(self.said, payload)
+        likely = _either(why for why, code, where in found if (code, where) == (error.code, at))
+        if not likely and 0 <= at < len(payload):
+            return f"look at how the op {payload[at]:02X} at byte {at} of the payload is read"
+        return likely
 
     def show(self, *payloads: bytes, clear: bool = True, exactly: bool = False) -> Answer:
         """Draw a frame, wait until it is on display, and see that it is what the ops say.
@@ -439,9 +448,8 @@ class Probe:
                 return page.digest(said) == ack.digest
             return page.pixels == pixels
 
-        likely = next(
-            (why for why, page in self._suspects(before, base, payloads) if is_shown(page)), ""
-        )
+        suspects = self._suspects(must, before, base, payloads)
+        likely = _either(why for why, page in suspects if is_shown(page))
         if pixels is None:
             raise Broken(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
         differ = sorted(
@@ -455,10 +463,10 @@ class Probe:
         )
 
     def _suspects(
-        self, before: Page, base: Page, payloads: list[bytes]
+        self, must: Page, before: Page, base: Page, payloads: list[bytes]
     ) -> Iterator[tuple[str, Page]]:
-        yield "the picture before is still on display", before
-        yield "the display is dark", Page()
+        yield from mistakes.pages_by_mistake(self.said, base, payloads)
+        yield from mistakes.other_orders(self.said, must)
         for start, why in (
             (before, "CLEAR does not make the back page dark"),
             (Page(), "without CLEAR a frame starts as a copy of the front page: here it was dark"),
@@ -468,7 +476,8 @@ class Probe:
             for payload in payloads:
                 decoder.draw(payload)
             yield why, page
-        yield from mistakes.pages_by_mistake(self.said, base, payloads)
+        yield "the picture before is still on display", before
+        yield "the display is dark", Page()
 
     # -- reading back
 
@@ -528,15 +537,13 @@ class PageReader(Decoder):
         super()._op(op)
 
 
+def _either(reasons: Iterable[str]) -> str:
+    """Join the first few of several explanations."""
+    return ", or: ".join(itertools.islice(dict.fromkeys(reasons), 3))
+
+
 def _shows(ack: Answer, frame: int) -> bool:
     return bool(ack.flags & SHOWN) and ack.frame == frame
-
-
-def _why_refused(error: Answer, payload: bytes) -> str:
-    at = error.offset - packets.HEADER_BYTES
-    if 0 <= at < len(payload):
-        return f"look at how the op {payload[at]:02X} at byte {at} of the payload is read"
-    return ""
 
 
 def _why_otherwise(error: Answer, code: int, offset: int) -> str:

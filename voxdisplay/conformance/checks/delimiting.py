@@ -50,9 +50,19 @@ def shortest_damage(probe: Probe) -> None:
 
 @check("3", "cobs-overrun", "a code byte that asks for more bytes than there are is damage")
 def cobs_overrun(probe: Probe) -> None:
-    good = packets.stuff(b"\x11\x01\x01\xa0\xa0" + b"\xa0" * 6)
-    for code in (good[0] + 1, 100, 255):
-        demand_damage(probe, bytes((code,)) + good[1:] + b"\0", f"a code byte {code}")
+    for size in (1, 6, 20):
+        segment = bytearray(wire(data(0, 0, ops.run() * size))[:-1])
+        last = 0  # its last group: all bytes are there, and the check value would hold
+        while last + segment[last] < len(segment):
+            last += segment[last]
+        for code in (segment[last] + 1, 100, 255):
+            longer = segment[:last] + bytes((code,)) + segment[last + 1 :]
+            demand_damage(
+                probe,
+                bytes(longer) + b"\0",
+                f"a last code byte of {code} instead of {segment[last]}",
+                "is it noticed that a group has fewer bytes than its code byte says?",
+            )
 
 
 @check("3", "bit-errors", "a packet with one wrong bit is damaged, whichever bit it is")

@@ -35,11 +35,17 @@ Decoder, Operands, Page = unpack._Decoder, operands.Operands, memory.Page
 
 @dataclass(frozen=True)
 class Mutant:
-    """A fault: ``make`` gets pytest's monkeypatch; ``config`` changes the device."""
+    """A fault.
+
+    ``make`` gets pytest's monkeypatch, ``config`` changes the device. ``fails`` are the checks that
+    must notice. No other may, unless the fault ``spreads``: all that is drawn passes through it.
+    ``likely`` is part of what the kit must suspect.
+    """
 
     name: str
     make: Callable
     fails: tuple[str, ...]
+    spreads: bool = False
     likely: str = ""
     config: dict = field(default_factory=dict)
 
@@ -50,10 +56,10 @@ class Mutant:
 MUTANTS: list[Mutant] = []
 
 
-def mutant(*fails: str, likely: str = "", **config: object):
+def mutant(*fails: str, spreads: bool = False, likely: str = "", **config: object):
     def enlist(make: Callable) -> Callable:
         name = make.__name__.strip("_").replace("_", "-")
-        MUTANTS.append(Mutant(name, make, fails, likely, config))
+        MUTANTS.append(Mutant(name, make, fails, spreads, likely, config))
         return make
 
     return enlist
@@ -68,7 +74,18 @@ def around(patch, owner, name, wrapper):
 # -- section 3 and 4
 
 
-@mutant()
+@mutant(
+    "3/shortest-damage",
+    "3/bit-errors",
+    "3/merged-packets",
+    "3/resync",
+    "9/last-at-first",
+    "9/damage-answered",
+    "9/damage-unanswered",
+    "9/damage-stays",
+    "12/noise",
+    "12/mutated",
+)
 def crc_not_checked(patch):
     def end(old, self):
         old(self)
@@ -80,17 +97,17 @@ def crc_not_checked(patch):
     around(patch, Receiver, "_end", end)
 
 
-@mutant()
+@mutant("3/short-segments", "3/bit-errors", "3/cut-packets", "12/noise")
 def short_segments_counted(patch):
     patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 5)
 
 
-@mutant()
+@mutant("3/shortest-damage", "9/status", spreads=True)
 def segment_of_8_forgiven(patch):
     patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 9)
 
 
-@mutant()
+@mutant("3/empty-segments", "9/damage-unanswered", "9/damage-stays", "12/noise", "12/mutated")
 def empty_segments_counted(patch):
     def end(old, self):
         old(self)
@@ -100,18 +117,28 @@ def empty_segments_counted(patch):
     around(patch, Receiver, "_end", end)
 
 
-@mutant()
+@mutant("3/cobs-overrun")
 def cobs_overrun_forgiven(patch):
     def end(old, self):
         self._left = 0
         old(self)
-        if self.damaged and self._length < 7:
-            self.damaged = False
 
     around(patch, Receiver, "_end", end)
 
 
-@mutant()
+@mutant(
+    "3/shortest-damage",
+    "3/cobs-overrun",
+    "3/bit-errors",
+    "3/cut-packets",
+    "3/merged-packets",
+    "3/resync",
+    "3/too-long",
+    "9/damage-answered",
+    "9/damage-unanswered",
+    "12/noise",
+    "12/mutated",
+)
 def damage_not_counted(patch):
     def damage(old, self):
         old(self)
@@ -120,7 +147,7 @@ def damage_not_counted(patch):
     around(patch, Device, "_damage", damage)
 
 
-@mutant()
+@mutant("9/last-at-first", "9/damage-answered", "12/noise", "12/mutated")
 def damage_not_answered(patch):
     def damage(_, self):
         self.damaged += 1
@@ -128,7 +155,7 @@ def damage_not_answered(patch):
     around(patch, Device, "_damage", damage)
 
 
-@mutant()
+@mutant("3/shortest-damage", "9/damage-answered", "3/resync", spreads=True)
 def damage_ends_the_session(patch):
     def damage(old, self):
         old(self)
@@ -137,22 +164,30 @@ def damage_ends_the_session(patch):
     around(patch, Device, "_damage", damage)
 
 
-@mutant()
+@mutant("3/longest-packet", "3/cobs-groups", "7.6/colors", "9.2/returned", "11/overrun")
 def longest_packet_too_long(patch):
     around(patch, Receiver, "__init__", lambda old, self, longest: old(self, longest - 1))
 
 
-@mutant()
+@mutant("3/too-long")
 def too_long_taken(patch):
     around(patch, Receiver, "__init__", lambda old, self, longest: old(self, longest + 1))
 
 
-@mutant()
+@mutant("10/dense-page", "4/answers-checked")
 def answers_in_short_groups(patch):
     patch.setattr(sender, "_GROUP", 100)
 
 
-@mutant()
+@mutant(
+    "10/whole-page",
+    "10/ranges",
+    "10/page-fields",
+    "10/page-frame",
+    "10/back-page",
+    "10/dense-page",
+    "4/answers-checked",
+)
 def answers_with_another_check_value(patch):
     def send(kind, flags, seq, frame, payload):
         packet = bytes((kind << 4 | flags, seq, frame)) + payload
@@ -162,7 +197,7 @@ def answers_with_another_check_value(patch):
     patch.setattr(device, "send", send)
 
 
-@mutant()
+@mutant("3/answers-delimited")
 def debugging_text_between(patch):
     def refuse(old, self, *args):
         self._out += b"refused\r\n\0"
@@ -171,7 +206,7 @@ def debugging_text_between(patch):
     around(patch, Device, "_refuse", refuse)
 
 
-@mutant()
+@mutant("4/reserved-types", "11/session-ends", "11/error-names-packet", "11/error-session")
 def reserved_types_silent(patch):
     def answer(old, self, packet):
         if packet[0] >> 4 in {0, 12}:
@@ -181,12 +216,12 @@ def reserved_types_silent(patch):
     around(patch, Device, "_answer", answer)
 
 
-@mutant()
+@mutant("4/data-flags", "11/order-of-packet")
 def reserved_data_flags_taken(patch):
     patch.setattr(device, "_DATA_FLAGS", 15)
 
 
-@mutant()
+@mutant("4/status-fields", "11/error-names-packet")
 def status_fields_taken(patch):
     def status(old, self, packet, flags, seq, frame):
         old(self, packet, 0, seq, 0)
@@ -194,7 +229,7 @@ def status_fields_taken(patch):
     around(patch, Device, "_status", status)
 
 
-@mutant()
+@mutant("4/read-fields", "11/order-of-read")
 def read_reserved_taken(patch):
     def read(old, self, packet, flags, seq, frame):
         old(self, packet[:3] + b"\0" + packet[4:], flags, seq, frame)
@@ -202,7 +237,7 @@ def read_reserved_taken(patch):
     around(patch, Device, "_read", read)
 
 
-@mutant()
+@mutant("4/answers-reserved")
 def reserved_flag_sent(patch):
     def _send(old, self, kind, flags, *rest):
         old(self, kind, flags | (8 if kind == spec.TYPE_ACK else 0), *rest)
@@ -220,27 +255,27 @@ def _announce(patch, **changes):
     patch.setattr(device, "announce", lambda *args: dataclasses.replace(old(*args), **changes))
 
 
-@mutant()
+@mutant("5/info-fields", "9.2/returned")
 def rx_buffer_too_small(patch):
-    _announce(patch, credit=1024)
+    _announce(patch, credit=300)
 
 
-@mutant()
+@mutant("5/info-fields")
 def unknown_feature(patch):
     _announce(patch, features=0x3FF)
 
 
-@mutant()
+@mutant("5/info-fields")
 def one_page(patch):
     patch.setattr(memory.Memory, "PAGES", 1)
 
 
-@mutant()
+@mutant("5/info-strings")
 def name_no_utf8(patch):
     _announce(patch, strings=b"\x02\xff\xfe\x01x\x00")
 
 
-@mutant()
+@mutant("5/info-strings")
 def strings_cut_off(patch):
     _announce(patch, strings=b"\x02ab\x01x")
 
@@ -254,7 +289,7 @@ def _hello(patch, change):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/new-session", "9.1/around-256", spreads=True)
 def hello_keeps_the_session(patch):
     def change(self, packet, session):
         if session and self.session and packet[3] == 1:
@@ -264,12 +299,12 @@ def hello_keeps_the_session(patch):
     _hello(patch, change)
 
 
-@mutant()
+@mutant("5/front-page-stays", "5/keep-in-new-session", "11/frame-dropped")
 def hello_clears_the_front_page(patch):
     _hello(patch, lambda self, packet, session: self.memory.front.clear())
 
 
-@mutant()
+@mutant("5/new-session", "5/front-page-stays", spreads=True)
 def hello_keeps_shown(patch):
     def change(self, packet, session):
         if session and self.session is not session:
@@ -278,7 +313,7 @@ def hello_keeps_shown(patch):
     _hello(patch, change)
 
 
-@mutant()
+@mutant("5/pending-dropped")
 def hello_shows_what_was_pending(patch):
     def hello(old, self, packet):
         if self.pending:
@@ -288,7 +323,7 @@ def hello_shows_what_was_pending(patch):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/other-major", "5/other-major-first")
 def other_major_opens(patch):
     def hello(old, self, packet):
         old(self, packet[:3] + b"\1" + packet[4:])
@@ -296,7 +331,7 @@ def other_major_opens(patch):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/other-major", "5/other-major-first", "5/session-zero")
 def other_major_unanswered(patch):
     def hello(old, self, packet):
         if len(packet) < 8 or packet[3] == 1:
@@ -305,7 +340,7 @@ def other_major_unanswered(patch):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/hello-ignored")
 def longer_hello_refused(patch):
     def hello(old, self, packet):
         if len(packet) > 8:
@@ -315,7 +350,7 @@ def longer_hello_refused(patch):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/hello-ignored")
 def hello_fields_checked(patch):
     def hello(old, self, packet):
         if packet[1] or packet[7:8] > b"\0":
@@ -325,12 +360,12 @@ def hello_fields_checked(patch):
     around(patch, Device, "_hello", hello)
 
 
-@mutant()
+@mutant("5/hello-short", "11/refused-hello", "11/order-of-packet")
 def short_hello_taken(patch):
     around(patch, Device, "_hello", lambda old, self, packet: old(self, packet.ljust(8, b"\0")))
 
 
-@mutant()
+@mutant("5/session-zero", "11/refused-hello")
 def session_zero_taken(patch):
     def hello(old, self, packet):
         try:
@@ -347,7 +382,7 @@ def session_zero_taken(patch):
 # -- section 6
 
 
-@mutant()
+@mutant("6/only-by-commit", "6/given-up", "6/many-packets", spreads=True)
 def swap_without_commit(patch):
     def mark(old, self, seq, flags):
         old(self, seq, flags)
@@ -357,7 +392,7 @@ def swap_without_commit(patch):
     around(patch, Session, "mark", mark)
 
 
-@mutant()
+@mutant("6/only-whole", "6/two-commits", "9.1/out-of-order")
 def swap_of_what_is_not_whole(patch):
     def mark(old, self, seq, flags):
         old(self, seq, flags)
@@ -367,7 +402,7 @@ def swap_of_what_is_not_whole(patch):
     around(patch, Session, "mark", mark)
 
 
-@mutant()
+@mutant("6/two-commits")
 def highest_commit_counts(patch):
     def mark(old, self, seq, flags):
         if self._commit is not None:
@@ -377,22 +412,22 @@ def highest_commit_counts(patch):
     around(patch, Session, "mark", mark)
 
 
-@mutant()
+@mutant("6/keep", "5/keep-in-new-session", "8/kept", spreads=True)
 def keep_starts_dark(patch):
     around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, True))
 
 
-@mutant()
+@mutant("6/clear", "7/move", spreads=True)
 def clear_does_not_clear(patch):
     around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, False))
 
 
-@mutant()
+@mutant("6/keep", "5/keep-in-new-session", spreads=True)
 def keep_is_the_page_before_last(patch):
     around(patch, memory.Memory, "begin", lambda old, self, dark: dark and old(self, True))
 
 
-@mutant()
+@mutant("6/given-up", "8/given-up")
 def given_up_frame_stays(patch):
     def begin(old, self, frame, flags):
         given_up = self.state is State.FILLING
@@ -413,7 +448,7 @@ def given_up_frame_stays(patch):
     around(patch, Device, "_data", data)
 
 
-@mutant()
+@mutant("6/swap-reported", "6/waits-unchecked")
 def swap_not_reported(patch):
     def tick(_, self):
         if self.session and self.pending:
@@ -426,7 +461,7 @@ def swap_not_reported(patch):
     around(patch, Device, "tick", tick)
 
 
-@mutant(refresh=0)
+@mutant("6/one-ack-at-once", refresh=0)
 def two_acks_at_once(patch):
     def swap(old, self, session):
         old(self, session)
@@ -435,12 +470,12 @@ def two_acks_at_once(patch):
     around(patch, Device, "_swap", swap)
 
 
-@mutant()
+@mutant("6/pending")
 def pending_not_said(patch):
     patch.setattr(device.spec, "ACK_FLAG_PENDING", 0)
 
 
-@mutant()
+@mutant("6/next-waits", "6/waits-unchecked", "6/all-waits", "9.2/room-is-there")
 def next_does_not_wait(patch):
     patch.setattr(Session, "must_wait", lambda *_: False)
 
@@ -452,7 +487,7 @@ def next_does_not_wait(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("6/waits-unchecked")
 def next_is_checked_while_pending(patch):
     def must_wait(old, self, seq, frame):
         if old(self, seq, frame) and frame != (self._newest + 1) % 256:
@@ -471,7 +506,7 @@ def next_is_checked_while_pending(patch):
     around(patch, Device, "_dispatch", dispatch)
 
 
-@mutant()
+@mutant("6/all-waits")
 def hello_overtakes_what_waits(patch):
     def take(old, self, data, at):
         at = old(self, data, at)
@@ -484,7 +519,7 @@ def hello_overtakes_what_waits(patch):
     around(patch, Device, "_take", take)
 
 
-@mutant()
+@mutant("6/first-id", "6/next-id", "6/waits-unchecked", "11/order-of-packet")
 def any_id_begins(patch):
     def judge(old, self, seq, frame, flags):
         verdict = None
@@ -499,7 +534,7 @@ def any_id_begins(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("6/next-while-missing", "6/other-while-missing", "6/first-while-missing")
 def dropped_is_marked_received(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
@@ -510,7 +545,7 @@ def dropped_is_marked_received(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("6/next-while-missing", "6/other-while-missing", "6/first-while-missing")
 def dropped_is_refused(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
@@ -521,7 +556,13 @@ def dropped_is_refused(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant(
+    "6/next-while-missing",
+    "6/other-while-missing",
+    "6/first-while-missing",
+    "9.1/duplicate-unseen",
+    "11/order-of-packet",
+)
 def dropped_ops_are_looked_at(patch):
     def data(old, self, session, packet, flags, seq, frame):
         self._unpacker.draw(packet, Page(self.config.shape.volume, self.config.pixels.size))
@@ -530,7 +571,7 @@ def dropped_ops_are_looked_at(patch):
     around(patch, Device, "_data", data)
 
 
-@mutant()
+@mutant("6/clear-flag-differs", "11/order-of-packet")
 def clear_flag_not_compared(patch):
     def check_own(old, self, seq, flags):
         old(self, seq, flags & ~1 | self._clear)
@@ -538,7 +579,7 @@ def clear_flag_not_compared(patch):
     around(patch, Session, "_check_own", check_own)
 
 
-@mutant()
+@mutant("6/behind-commit")
 def behind_commit_taken(patch):
     def check_own(old, self, seq, flags):
         commit, self._commit = self._commit, None
@@ -548,7 +589,7 @@ def behind_commit_taken(patch):
     around(patch, Session, "_check_own", check_own)
 
 
-@mutant()
+@mutant("6/after-display", "11/order-of-packet")
 def shown_frame_is_drawn_on(patch):
     def check_own(old, self, seq, flags):
         if self.state is not State.EMPTY or self.shown is None:
@@ -557,7 +598,7 @@ def shown_frame_is_drawn_on(patch):
     around(patch, Session, "_check_own", check_own)
 
 
-@mutant()
+@mutant("6/given-up", "11/order-of-packet")
 def clear_before_id(patch):
     def judge(old, self, seq, frame, flags):
         begun = self.state is State.FILLING
@@ -568,7 +609,18 @@ def clear_before_id(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant(
+    "6/only-whole",
+    "6/begins-by-arrival",
+    "6/behind-commit",
+    "6/next-while-missing",
+    "6/other-while-missing",
+    "6/out-of-order-next",
+    "6/two-commits",
+    "9/received",
+    "9.1/window-edges",
+    "9.1/out-of-order",
+)
 def out_of_order_begin_dropped(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
@@ -585,7 +637,14 @@ def _unpacked(patch, name, wrapper):
     around(patch, Decoder, name, wrapper)
 
 
-@mutant(likely="axes y and z are swapped")
+@mutant(
+    "2/scan-order",
+    "7/move",
+    "7.1/octants",
+    "7.8/move-outside",
+    spreads=True,
+    likely="axes y and z are swapped",
+)
 def y_and_z_swapped(patch):
     def place(old, self):
         x, y, z = old(self)
@@ -594,7 +653,7 @@ def y_and_z_swapped(patch):
     around(patch, Operands, "place", place)
 
 
-@mutant()
+@mutant("2/scan-order", "7/move", "7.1/octants", spreads=True)
 def z_runs_fastest(patch):
     def init(old, self, nx, ny, nz):
         old(self, nx, ny, nz)
@@ -609,7 +668,14 @@ def z_runs_fastest(patch):
     )
 
 
-@mutant(likely="byte is n - 1")
+@mutant(
+    "7.1/octants",
+    "7.1/from",
+    "7.1/chain-lengths",
+    "7.1/chain-cursor",
+    "7.8/step-outside",
+    likely="byte is n - 1",
+)
 def step_one_too_few(patch):
     def plot(old, self, indices, pixel):
         old(self, indices, pixel)
@@ -629,7 +695,14 @@ def step_one_too_few(patch):
     around(patch, Decoder, "_walk", walk)
 
 
-@mutant(likely="taken for rising")
+@mutant(
+    "7.1/octants",
+    "7.1/from",
+    "7.1/chain-lengths",
+    "7.1/chain-cursor",
+    "7.8/step-outside",
+    likely="taken for rising",
+)
 def octant_signs(patch):
     around(patch, Grid, "steps", lambda old, self, octant: old(self, octant ^ 7))
     around(
@@ -637,18 +710,20 @@ def octant_signs(patch):
     )
 
 
-@mutant(likely="bit 0 is for axis main + 1")
+@mutant("7.1/octants", "7.1/from", likely="bit 0 is for axis main + 1")
 def crumb_bits_swapped(patch):
     swapped = [bytes((0, 2, 1, 3)[c] for c in row) for row in unpack._CRUMBS]
     patch.setattr(unpack, "_CRUMBS", swapped)
 
 
-@mutant(likely="lowest bits")
+@mutant("7.1/octants", "7.1/from", likely="lowest bits")
 def crumbs_high_first(patch):
     patch.setattr(unpack, "_CRUMBS", [row[::-1] for row in unpack._CRUMBS])
 
 
-@mutant(likely="cursor at the voxel")
+@mutant(
+    "7.1/octants", "7.1/from", "7.1/chain-lengths", "7.1/chain-cursor", likely="cursor at the voxel"
+)
 def chain_start_left_out(patch):
     def walk(old, self, octant, count, raw):
         first = self._cursor
@@ -660,7 +735,7 @@ def chain_start_left_out(patch):
     around(patch, Decoder, "_walk", walk)
 
 
-@mutant(likely="stayed at the first")
+@mutant("7.1/chain-cursor", likely="stayed at the first")
 def chain_cursor_stays(patch):
     def walk(old, self, octant, count, raw):
         first = self._cursor
@@ -670,7 +745,7 @@ def chain_cursor_stays(patch):
     around(patch, Decoder, "_walk", walk)
 
 
-@mutant()
+@mutant("7.8/step-outside")
 def step_wraps_around(patch):
     def leaves(_, self, index, octant, moves):
         steps = self.steps(octant)
@@ -681,12 +756,12 @@ def step_wraps_around(patch):
     around(patch, Grid, "leaves", leaves)
 
 
-@mutant(likely="31 + k")
+@mutant("7.2/counts", "7.8/past-the-end", spreads=True, likely="31 + k")
 def long_count_from_31(patch):
     around(patch, Operands, "count", lambda old, self, c: old(self, c) - (c == 31))
 
 
-@mutant()
+@mutant("11/count-form", "11/first-op-first", "11/order-of-op")
 def any_leb128_taken(patch):
     def count(_, self, operand):
         if operand < 31:
@@ -702,7 +777,7 @@ def any_leb128_taken(patch):
     around(patch, Operands, "count", count)
 
 
-@mutant(likely="left as it was")
+@mutant("7.2/literal-pen", "7.5/difference-pen", likely="left as it was")
 def literal_leaves_pen(patch):
     def write(old, self, count, pixels):
         pen = self._pen
@@ -712,12 +787,23 @@ def literal_leaves_pen(patch):
     around(patch, Decoder, "_write", write)
 
 
-@mutant(pixel_format="mono1", likely="lowest bits")
+@mutant(
+    "7.2/counts",
+    "7.2/to-the-end",
+    "7.2/literal",
+    "7.2/literal-pen",
+    "8/sum",
+    "10/whole-page",
+    "10/ranges",
+    "10/dense-page",
+    pixel_format="mono1",
+    likely="lowest bits",
+)
 def mono_high_bit_first(patch):
     patch.setattr(unpack, "_BITS", [row[::-1] for row in unpack._BITS])
 
 
-@mutant(pixel_format="mono1")
+@mutant("11/pixel", pixel_format="mono1")
 def mono_pen_of_two(patch):
     def pen(old, self, low):
         value = self._in.take(1)
@@ -726,7 +812,21 @@ def mono_pen_of_two(patch):
     _unpacked(patch, "pen", pen)
 
 
-@mutant(pixel_format="rgb565", likely="lowest first")
+@mutant(
+    "2.1/pixels",
+    "7/each-packet-anew",
+    "7/pen",
+    "7/move",
+    "7/later-counts",
+    "7.4/brick-cursor",
+    "7.7/arc-pieces",
+    "7.7/arc-behind-ops",
+    "8/one-voxel",
+    "8/overwritten",
+    spreads=True,
+    pixel_format="rgb565",
+    likely="lowest first",
+)
 def pixels_big_endian(patch):
     def pen(old, self, low):
         old(self, low)
@@ -735,7 +835,7 @@ def pixels_big_endian(patch):
     _unpacked(patch, "pen", pen)
 
 
-@mutant(likely="pen is not reset")
+@mutant("7/each-packet-anew", spreads=True, likely="pen is not reset")
 def pen_not_reset(patch):
     def draw(_, self, packet, page):
         inner = operands.Operands(packet, self.grid.coordinate_size)
@@ -750,7 +850,7 @@ def pen_not_reset(patch):
     around(patch, unpack.Unpacker, "draw", draw)
 
 
-@mutant(likely="cursor is not reset")
+@mutant("7/each-packet-anew", spreads=True, likely="cursor is not reset")
 def cursor_not_reset(patch):
     def draw(_, self, packet, page):
         inner = operands.Operands(packet, self.grid.coordinate_size)
@@ -771,12 +871,12 @@ def cursor_not_reset(patch):
     around(patch, Page, "clear", clear)
 
 
-@mutant()
+@mutant("11/padding")
 def end_padding_taken(patch):
     _unpacked(patch, "end", lambda old, self, low: self._in.rest())
 
 
-@mutant()
+@mutant("11/padding", "11/difference-padding", "11/order-of-op")
 def unused_bits_taken(patch):
     def small(_, self, count, bits_):
         raw = self.take((count * bits_ + 7) // 8)
@@ -786,7 +886,13 @@ def unused_bits_taken(patch):
     around(patch, Operands, "small", small)
 
 
-@mutant()
+@mutant(
+    "6/waits-unchecked",
+    "11/session-ends",
+    "11/error-session",
+    "11/reserved-ops",
+    "11/first-op-first",
+)
 def reserved_ops_skipped(patch):
     def ops(old, features):
         table = old(features)
@@ -796,7 +902,7 @@ def reserved_ops_skipped(patch):
     around(patch, unpack, "_ops", ops)
 
 
-@mutant()
+@mutant("7.8/past-the-end", "11/first-op-first")
 def run_past_the_end_is_cut(patch):
     def room(_, self, count):
         if self._cursor >= self._grid.volume:
@@ -806,7 +912,7 @@ def run_past_the_end_is_cut(patch):
     around(patch, Decoder, "_room", room)
 
 
-@mutant(likely="rounded down")
+@mutant("7.3/lines", "7.3/line-ties", "7.3/shape-cursor", likely="rounded down")
 def line_ties_down(patch):
     def line(old, grid, start, target):
         return (
@@ -830,13 +936,13 @@ def line_ties_down(patch):
     patch.setattr(unpack, "line", lambda *args: _down(*args))
 
 
-@mutant()
+@mutant("7.3/lines", "7.3/line-ties", "7.3/line-of-one")
 def line_without_its_end(patch):
     old = shapes.line
     patch.setattr(unpack, "line", lambda *args: old(*args)[:-1])
 
 
-@mutant(likely="left out")
+@mutant("7.3/shape-cursor", "7.3/boxes", likely="left out")
 def box_without_its_end(patch):
     old = shapes.box
 
@@ -849,7 +955,7 @@ def box_without_its_end(patch):
     patch.setattr(unpack, "box", box)
 
 
-@mutant(likely="here it stayed")
+@mutant("7.3/shape-cursor", "7.3/dots-cursor", likely="here it stayed")
 def shape_cursor_stays(patch):
     def stay(old, self, low):
         before = self._cursor
@@ -860,7 +966,7 @@ def shape_cursor_stays(patch):
         _unpacked(patch, name, stay)
 
 
-@mutant()
+@mutant("7.3/dots", "7.3/dots-cursor", "7.8/shapes-outside")
 def dots_one_too_few(patch):
     def places(old, self, count):
         axes = old(self, count)
@@ -869,7 +975,7 @@ def dots_one_too_few(patch):
     around(patch, Operands, "places", places)
 
 
-@mutant(likely="x and z were swapped")
+@mutant("7.4/levels", "7.4/children", "7.4/full-nodes", likely="x and z were swapped")
 def children_reversed(patch):
     def children(level, mask):
         half = 1 << level >> 1
@@ -882,7 +988,7 @@ def children_reversed(patch):
     patch.setattr(shapes, "_CHILDREN", table)
 
 
-@mutant()
+@mutant("7.4/levels", "7.4/full-nodes", "7.8/bricks-outside", "11/order-of-op")
 def full_node_is_empty(patch):
     table = [list(row) for row in shapes._CHILDREN]
     table[1][0] = ()
@@ -890,7 +996,7 @@ def full_node_is_empty(patch):
     patch.setattr(shapes, "_ROWS", [[] for _ in shapes._ROWS])
 
 
-@mutant(likely="moved to the brick")
+@mutant("7.4/brick-cursor", likely="moved to the brick")
 def brick_moves_the_cursor(patch):
     def brick(old, self, level):
         at = self._in._at
@@ -903,18 +1009,18 @@ def brick_moves_the_cursor(patch):
     _unpacked(patch, "brick", brick)
 
 
-@mutant(likely="lowest bits")
+@mutant("7.5/differences", "7.5/difference-pen", likely="lowest bits")
 def nibbles_high_first(patch):
     patch.setattr(unpack, "_DIFFERENCES", [row[::-1] for row in unpack._DIFFERENCES])
 
 
-@mutant(likely="two's complement")
+@mutant("7.5/differences", "7.5/difference-pen", likely="two's complement")
 def nibbles_unsigned(patch):
     table = [bytes((byte & 15, byte >> 4)) for byte in range(256)]
     patch.setattr(unpack, "_DIFFERENCES", table)
 
 
-@mutant()
+@mutant("7.6/palette-of-a-page")
 def palette_not_copied(patch):
     def copy(old, self, other):
         old(self, other)
@@ -924,7 +1030,19 @@ def palette_not_copied(patch):
     around(patch, Page, "copy", copy)
 
 
-@mutant()
+@mutant(
+    "7.6/colors",
+    "7.6/palette-of-a-page",
+    "8/dark",
+    "8/one-voxel",
+    "8/sum",
+    "8/overwritten",
+    "8/erased",
+    "8/kept",
+    "8/of-the-front",
+    "8/given-up",
+    spreads=True,
+)
 def palette_not_cleared(patch):
     def clear(old, self):
         palette = getattr(self, "palette", None)
@@ -936,17 +1054,17 @@ def palette_not_cleared(patch):
     around(patch, Page, "clear", clear)
 
 
-@mutant(likely="palette is not in the digest")
+@mutant("7.6/colors", "7.6/palette-of-a-page", likely="palette is not in the digest")
 def palette_not_in_the_digest(patch):
     around(patch, Page, "_color_terms", lambda old, self, place: 0)
 
 
-@mutant()
+@mutant("7.7/arc-curves")
 def arc_models_learn_slower(patch):
-    patch.setattr(bits.spec, "ARC_ENOUGH", 7)
+    patch.setattr(bits.spec, "ARC_ENOUGH", 8)
 
 
-@mutant()
+@mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut", "7.7/arc-too-many")
 def arc_forgets_turns(patch):
     def turn(old, self, bits_):
         if self.way and not self.last:
@@ -956,12 +1074,12 @@ def arc_forgets_turns(patch):
     around(patch, arc._Axis, "turn", turn)
 
 
-@mutant()
+@mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut")
 def arc_runs_too_long(patch):
     patch.setattr(arc.spec, "ARC_MAX_RUN", 7)
 
 
-@mutant()
+@mutant("7.7/arc-too-many")
 def arc_padding_taken(patch):
     patch.setattr(bits.Bits, "done", property(lambda self: self._at >= len(self._data)))
 
@@ -978,7 +1096,19 @@ def arc_padding_taken(patch):
 # -- section 8
 
 
-@mutant(likely="adds dark voxels")
+@mutant(
+    "7.6/colors",
+    "7.6/palette-of-a-page",
+    "8/dark",
+    "8/one-voxel",
+    "8/sum",
+    "8/overwritten",
+    "8/erased",
+    "8/kept",
+    "8/of-the-front",
+    "8/given-up",
+    likely="adds dark voxels",
+)
 def digest_adds_dark_voxels(patch):
     def mix(index, value):
         h = (index * 0x9E3779B1 + value * 0x85EBCA77) & 0xFFFFFFFF
@@ -996,7 +1126,7 @@ def digest_adds_dark_voxels(patch):
     patch.setattr(Page, "copy", lambda self, other: self.put(0, bytes(other.pixels)))
 
 
-@mutant()
+@mutant("8/overwritten", "8/erased")
 def digest_forgets_to_take_out(patch):
     around(
         patch,
@@ -1006,7 +1136,17 @@ def digest_forgets_to_take_out(patch):
     )
 
 
-@mutant()
+@mutant(
+    "7.6/colors",
+    "7.6/palette-of-a-page",
+    "8/dark",
+    "8/one-voxel",
+    "8/sum",
+    "8/overwritten",
+    "8/erased",
+    "8/kept",
+    "8/of-the-front",
+)
 def digest_of_the_back_page(patch):
     patch.setattr(
         Device,
@@ -1024,7 +1164,7 @@ def digest_of_the_back_page(patch):
     around(patch, Device, "_acknowledge", acknowledge)
 
 
-@mutant(features=frozenset(("read",)))
+@mutant("8/answers-digest", features=frozenset(("read",)))
 def digest_without_the_feature(patch):
     def init(old, self, config):
         old(self, config)
@@ -1049,7 +1189,18 @@ def _ack(patch, change):
     around(patch, Device, "_send", _send)
 
 
-@mutant()
+@mutant(
+    "6/only-whole",
+    "6/next-while-missing",
+    "6/other-while-missing",
+    "6/out-of-order-next",
+    "9/received",
+    "9.1/window-edges",
+    "9.1/duplicate-answered",
+    "9.1/duplicate-unseen",
+    "9.1/around-256",
+    "9/answers-received",
+)
 def bitmap_shifted(patch):
     def change(self, flags, seq, frame, values):
         values[3] = values[3] << 1 & 0xFFFFFFFF
@@ -1058,7 +1209,15 @@ def bitmap_shifted(patch):
     _ack(patch, change)
 
 
-@mutant()
+@mutant(
+    "6/next-while-missing",
+    "6/other-while-missing",
+    "6/first-while-missing",
+    "9/received",
+    "9.1/window-edges",
+    "9.1/duplicate-answered",
+    "9.1/around-256",
+)
 def last_is_next_minus_one(patch):
     def change(self, flags, seq, frame, values):
         if not flags & 4:
@@ -1068,7 +1227,7 @@ def last_is_next_minus_one(patch):
     _ack(patch, change)
 
 
-@mutant()
+@mutant("9/last-at-first")
 def last_begins_at_0(patch):
     def init(old, self, number):
         old(self, number)
@@ -1077,12 +1236,12 @@ def last_begins_at_0(patch):
     around(patch, Session, "__init__", init)
 
 
-@mutant()
+@mutant("9/status")
 def asked_missing(patch):
     _ack(patch, lambda self, flags, seq, frame, values: (flags & ~4, seq, frame))
 
 
-@mutant()
+@mutant("5/front-page-stays", "9/answers-frame")
 def frame_without_shown(patch):
     def change(self, flags, seq, frame, values):
         return flags, seq, frame if flags & 1 else 7
@@ -1090,7 +1249,7 @@ def frame_without_shown(patch):
     _ack(patch, change)
 
 
-@mutant()
+@mutant("9/answers-boot")
 def other_boot_in_ack(patch):
     def change(self, flags, seq, frame, values):
         values[2] ^= 1
@@ -1099,7 +1258,26 @@ def other_boot_in_ack(patch):
     _ack(patch, change)
 
 
-@mutant()
+@mutant(
+    "4/reserved-types",
+    "4/status-fields",
+    "4/read-fields",
+    "5/hello-repeated",
+    "5/new-session",
+    "5/other-major",
+    "5/hello-ignored",
+    "5/hello-short",
+    "5/session-zero",
+    "9/status",
+    "9/status-length",
+    "9/data-answered",
+    "11/overrun",
+    "10/read-fields",
+    "10/read-outside",
+    "10/read-length",
+    "11/session-ends",
+    spreads=True,
+)
 def session_missing_in_ack(patch):
     def change(self, flags, seq, frame, values):
         values[1] = 0
@@ -1108,12 +1286,12 @@ def session_missing_in_ack(patch):
     _ack(patch, change)
 
 
-@mutant()
+@mutant("9/damage-unanswered", "9/damage-stays")
 def damaged_begins_with_the_session(patch):
     _hello(patch, lambda self, packet, session: setattr(self, "damaged", 0))
 
 
-@mutant(silent=8)
+@mutant("9/silent-acks", silent=8)
 def too_many_silent_acks(patch):
     def data(old, self, *args):
         object.__setattr__(self.config, "silent", 12)
@@ -1122,7 +1300,7 @@ def too_many_silent_acks(patch):
     around(patch, Device, "_data", data)
 
 
-@mutant()
+@mutant("9.1/duplicate-unseen", "9.1/applied-once")
 def duplicates_applied(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
@@ -1139,7 +1317,7 @@ def duplicates_applied(patch):
     around(patch, Device, "_data", data)
 
 
-@mutant()
+@mutant("9.1/window-edges", "9.1/duplicate-answered", "9.1/duplicate-unseen", "9.1/around-256")
 def duplicates_unanswered(patch):
     def data(old, self, session, packet, flags, seq, frame):
         if not session._is_duplicate(seq):
@@ -1148,7 +1326,13 @@ def duplicates_unanswered(patch):
     around(patch, Device, "_data", data)
 
 
-@mutant()
+@mutant(
+    "9.1/window-edges",
+    "9.1/duplicate-answered",
+    "9.1/duplicate-unseen",
+    "9.1/applied-once",
+    "9.1/around-256",
+)
 def old_duplicates_refused(patch):
     def is_duplicate(old, self, seq):
         return self._ahead(seq) < 32 and old(self, seq)
@@ -1156,7 +1340,7 @@ def old_duplicates_refused(patch):
     around(patch, Session, "_is_duplicate", is_duplicate)
 
 
-@mutant()
+@mutant("9/received", "9.1/window-edges", "9.1/around-256")
 def window_of_31(patch):
     def judge(old, self, seq, frame, flags):
         if self._ahead(seq) == 31:
@@ -1166,7 +1350,7 @@ def window_of_31(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("9.1/window-edges", "9.1/around-256")
 def window_of_33(patch):
     def judge(old, self, seq, frame, flags):
         return Verdict.DROP if self._ahead(seq) == 32 else old(self, seq, frame, flags)
@@ -1174,7 +1358,7 @@ def window_of_33(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("9.1/around-256")
 def window_ends_at_255(patch):
     def ahead(_, self, seq):
         return seq - self.next if seq >= self.next else 255
@@ -1182,7 +1366,7 @@ def window_ends_at_255(patch):
     around(patch, Session, "_ahead", ahead)
 
 
-@mutant(likely="not what is left of a total")
+@mutant("9.2/returned", "9.2/not-withdrawn", likely="not what is left of a total")
 def credit_never_returned(patch):
     def change(self, flags, seq, frame, values):
         self.spent = getattr(self, "spent", 0) + 20
@@ -1192,12 +1376,12 @@ def credit_never_returned(patch):
     _ack(patch, change)
 
 
-@mutant(lies=frozenset(("credit",)))
+@mutant("9.2/room-is-there", "9.2/zeros-between", lies=frozenset(("credit",)))
 def credit_of_twice_the_ring(patch):
     del patch
 
 
-@mutant(likely="whatever of it has arrived")
+@mutant("9.2/not-withdrawn", likely="whatever of it has arrived")
 def credit_of_what_is_free(patch):
     def take(old, self, data, at):
         self.left = len(data)
@@ -1224,7 +1408,7 @@ def _read(patch, change):
     around(patch, Device, "_read", read)
 
 
-@mutant(likely="off by one")
+@mutant("10/ranges", "10/back-page", likely="off by one")
 def read_off_by_one(patch):
     old = device.pack
 
@@ -1235,7 +1419,7 @@ def read_off_by_one(patch):
     patch.setattr(device, "pack", pack)
 
 
-@mutant()
+@mutant("10/page-fields")
 def page_without_its_flag(patch):
     def _send(old, self, kind, flags, *rest):
         old(self, kind, 0 if kind == spec.TYPE_PAGE else flags, *rest)
@@ -1243,7 +1427,7 @@ def page_without_its_flag(patch):
     around(patch, Device, "_send", _send)
 
 
-@mutant()
+@mutant("10/page-fields")
 def page_without_its_tag(patch):
     def _send(old, self, kind, flags, seq, *rest):
         old(self, kind, flags, 0 if kind == spec.TYPE_PAGE else seq, *rest)
@@ -1251,7 +1435,7 @@ def page_without_its_tag(patch):
     around(patch, Device, "_send", _send)
 
 
-@mutant()
+@mutant("10/back-page")
 def back_reads_the_front(patch):
     old = device.pack
     patch.setattr(device, "pack", old)
@@ -1283,7 +1467,7 @@ def page_count_of_the_read(patch):
     around(patch, Device, "_read", read)
 
 
-@mutant()
+@mutant("10/read-fields", "11/order-of-read")
 def read_of_nothing_taken(patch):
     def change(self, packet, flags, seq, frame):
         if len(packet) == 12 and not any(packet[8:12]):
@@ -1293,7 +1477,7 @@ def read_of_nothing_taken(patch):
     _read(patch, change)
 
 
-@mutant()
+@mutant("10/read-outside")
 def read_sum_overflows(patch):
     def change(self, packet, flags, seq, frame):
         start = int.from_bytes(packet[4:8], "little")
@@ -1305,12 +1489,12 @@ def read_sum_overflows(patch):
     _read(patch, change)
 
 
-@mutant()
+@mutant("10/read-length", "11/order-of-read")
 def longer_read_taken(patch):
     _read(patch, lambda self, packet, *rest: (packet[:12], *rest))
 
 
-@mutant()
+@mutant("9/status-length", "11/order-of-packet")
 def longer_status_taken(patch):
     def status(old, self, packet, *rest):
         old(self, packet[:3], *rest)
@@ -1328,7 +1512,33 @@ def _refused(patch, change):
     around(patch, Device, "_refuse", refuse)
 
 
-@mutant(likely="header included")
+@mutant(
+    "4/read-fields",
+    "5/session-zero",
+    "6/waits-unchecked",
+    "7.7/arc-cut",
+    "7.7/arc-too-many",
+    "7.7/arc-off-the-grid",
+    "10/read-fields",
+    "10/read-outside",
+    "11/refused-hello",
+    "11/reserved-ops",
+    "11/count-form",
+    "11/truncated",
+    "11/padding",
+    "11/difference-padding",
+    "7.8/move-outside",
+    "7.8/step-outside",
+    "7.8/behind-the-end",
+    "7.8/past-the-end",
+    "7.8/shapes-outside",
+    "7.8/bricks-outside",
+    "7.8/colors-outside",
+    "11/order-of-read",
+    "11/first-op-first",
+    "11/order-of-op",
+    likely="header included",
+)
 def offset_from_the_payload(patch):
     def change(self, seq, frame, refusal):
         if refusal.offset >= 3:
@@ -1338,12 +1548,12 @@ def offset_from_the_payload(patch):
     _refused(patch, change)
 
 
-@mutant()
+@mutant("11/error-names-packet")
 def error_without_names(patch):
     _refused(patch, lambda self, seq, frame, refusal: (seq, 0, refusal))
 
 
-@mutant()
+@mutant("11/overrun", "11/error-session")
 def error_session_0(patch):
     def _send(old, self, kind, flags, seq, frame, payload):
         if kind == spec.TYPE_ERROR:
@@ -1353,7 +1563,13 @@ def error_session_0(patch):
     around(patch, Device, "_send", _send)
 
 
-@mutant()
+@mutant(
+    "5/other-major-first",
+    "9/damage-unanswered",
+    "11/session-ends",
+    "11/error-session",
+    "11/refused-hello",
+)
 def refused_data_keeps_the_session(patch):
     def dispatch(old, self, packet):
         session = self.session
@@ -1364,7 +1580,18 @@ def refused_data_keeps_the_session(patch):
     around(patch, Device, "_dispatch", dispatch)
 
 
-@mutant()
+@mutant(
+    "4/reserved-types",
+    "4/status-fields",
+    "4/read-fields",
+    "9/status-length",
+    "10/read-fields",
+    "10/read-outside",
+    "10/read-length",
+    "11/error-session",
+    "7.8/shapes-outside",
+    "11/order-of-read",
+)
 def refused_status_ends_the_session(patch):
     def dispatch(old, self, packet):
         refused = sum(self.refused.values())
@@ -1375,7 +1602,7 @@ def refused_status_ends_the_session(patch):
     around(patch, Device, "_dispatch", dispatch)
 
 
-@mutant()
+@mutant("11/order-of-op")
 def padding_after_outside(patch):
     def step(old, self, octant):
         self._check_cursor()
@@ -1384,7 +1611,7 @@ def padding_after_outside(patch):
     _unpacked(patch, "step", step)
 
 
-@mutant()
+@mutant("11/order-of-packet")
 def frame_before_sequence(patch):
     def judge(old, self, seq, frame, flags):
         if frame not in {self._newest, (self._newest + 1) % 256} and self._ahead(seq) >= 32:
@@ -1395,7 +1622,7 @@ def frame_before_sequence(patch):
     around(patch, Session, "judge", judge)
 
 
-@mutant()
+@mutant("11/answers-text")
 def text_in_latin1(patch):
     def _send(old, self, kind, flags, seq, frame, payload):
         old(self, kind, flags, seq, frame, payload + (b"\xe4" if kind == spec.TYPE_ERROR else b""))
@@ -1403,7 +1630,7 @@ def text_in_latin1(patch):
     around(patch, Device, "_send", _send)
 
 
-@mutant()
+@mutant("11/overrun")
 def overrun_ends_the_session(patch):
     def store(old, self, data):
         before = self.refused.get(spec.CODE_OVERRUN, 0)
@@ -1415,7 +1642,7 @@ def overrun_ends_the_session(patch):
     around(patch, Device, "_store", store)
 
 
-@mutant()
+@mutant("11/overrun")
 def overrun_not_said(patch):
     _old = Device._refuse
 
@@ -1439,7 +1666,37 @@ def restarts_on_long_noise(patch):
     around(patch, Device, "_damage", damage)
 
 
-@mutant()
+@mutant(
+    "9.1/nothing-of-the-refused",
+    "9.2/returned",
+    "9.2/not-withdrawn",
+    "9.2/room-is-there",
+    "9.2/zeros-between",
+    "11/overrun",
+    "10/whole-page",
+    "10/ranges",
+    "10/page-fields",
+    "10/page-frame",
+    "10/back-page",
+    "10/dense-page",
+    "11/frame-dropped",
+    "11/reserved-ops",
+    "11/count-form",
+    "11/truncated",
+    "11/padding",
+    "11/difference-padding",
+    "7.8/move-outside",
+    "7.8/step-outside",
+    "7.8/behind-the-end",
+    "7.8/past-the-end",
+    "7.8/shapes-outside",
+    "7.8/bricks-outside",
+    "7.8/colors-outside",
+    "11/order-of-packet",
+    "11/first-op-first",
+    "11/order-of-op",
+    "11/flags-of-commit",
+)
 def dies_of_a_reserved_op(patch):
     def draw(old, self, packet, page):
         if packet[3:4] == b"\xa0" and packet[4:5] == b"\x1f":
@@ -1451,7 +1708,21 @@ def dies_of_a_reserved_op(patch):
     around(patch, unpack.Unpacker, "draw", draw)
 
 
-@mutant()
+@mutant(
+    "3/shortest-damage",
+    "3/cobs-overrun",
+    "3/bit-errors",
+    "3/cut-packets",
+    "3/merged-packets",
+    "3/resync",
+    "3/too-long",
+    "9/last-at-first",
+    "9/damage-answered",
+    "9/damage-unanswered",
+    "9/damage-stays",
+    "12/noise",
+    "12/mutated",
+)
 def half_a_packet_stays(patch):
     def begin(old, self):
         torn = getattr(self, "torn", False)
@@ -1466,3 +1737,7 @@ def half_a_packet_stays(patch):
         self.torn = self.damaged
 
     around(patch, Receiver, "_end", end)
+
+
+# Checks that no fault above makes fail.
+UNPROVEN: set[str] = set()
