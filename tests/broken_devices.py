@@ -289,7 +289,7 @@ def _hello(patch, change):
     around(patch, Device, "_hello", hello)
 
 
-@mutant("5/new-session", "9.1/around-256", spreads=True)
+@mutant("5/new-session", spreads=True)
 def hello_keeps_the_session(patch):
     def change(self, packet, session):
         if session and self.session and packet[3] == 1:
@@ -722,7 +722,11 @@ def crumbs_high_first(patch):
 
 
 @mutant(
-    "7.1/octants", "7.1/from", "7.1/chain-lengths", "7.1/chain-cursor", likely="cursor at the voxel"
+    "7.1/octants",
+    "7.1/from",
+    "7.1/chain-lengths",
+    "7.1/chain-cursor",
+    likely="before its first step",
 )
 def chain_start_left_out(patch):
     def walk(old, self, octant, count, raw):
@@ -1408,7 +1412,7 @@ def _read(patch, change):
     around(patch, Device, "_read", read)
 
 
-@mutant("10/ranges", "10/back-page", likely="off by one")
+@mutant("10/ranges", "10/back-page", likely="off by")
 def read_off_by_one(patch):
     old = device.pack
 
@@ -1660,7 +1664,7 @@ def overrun_not_said(patch):
 def restarts_on_long_noise(patch):
     def damage(old, self):
         old(self)
-        if self._receiver.size > 1000:
+        if self._receiver.size > 200:
             self.power_cycle()
 
     around(patch, Device, "_damage", damage)

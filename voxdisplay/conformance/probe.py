@@ -119,6 +119,7 @@ class Probe:
         seed: int = 0,
     ) -> None:
         self.rng = random.Random(seed)
+        self._seed = seed
         self.hearing = Hearing()
         self.session = 0
         self.seq = self.frame = 0
@@ -131,6 +132,12 @@ class Probe:
         self._heard: deque[Answer] = deque()
         self._unanswered_bytes = 0
         self._tags: Iterator[int] = iter(())
+
+    def begin(self, name: str) -> None:
+        """Forget what was before: a check goes the same way whichever others are made."""
+        self.rng = random.Random(f"{self._seed} {name}")
+        self.log = []
+        self.front = None
 
     # -- bytes
 

@@ -213,8 +213,7 @@ def _make(probe: Probe, check: Check) -> Result:
     obstacle = check.obstacle(probe.said)
     if obstacle:
         return Result(check, Verdict.NOT_APPLICABLE, reason=obstacle)
-    probe.log = []
-    probe.front = None
+    probe.begin(check.id)
     result = Result(check, Verdict.HOLDS)
     try:
         probe.open()

@@ -83,8 +83,9 @@ def hello_repeated(probe: Probe) -> None:
 
 @check("5", "new-session", "a HELLO begins a session: next 0, nothing received, nothing shown")
 def new_session(probe: Probe) -> None:
-    for seq in (0, 1, 4):
-        probe.ask(data(seq, 0))
+    probe.show(b"")
+    for seq in (1, 2, 5):
+        probe.ask(data(seq, 1))
     probe.open()
     probe.sync()
     probe.demand_ack(probe.state, session=probe.session, next=0, received=0, shown=0, pending=0)
