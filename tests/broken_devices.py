@@ -6,6 +6,7 @@ no other, may fail.
 
 from __future__ import annotations
 
+import dataclasses
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -249,8 +250,6 @@ def reserved_flag_sent(patch):
 
 
 def _announce(patch, **changes):
-    import dataclasses
-
     old = info.announce
     patch.setattr(device, "announce", lambda *args: dataclasses.replace(old(*args), **changes))
 
@@ -918,26 +917,17 @@ def run_past_the_end_is_cut(patch):
 
 @mutant("7.3/lines", "7.3/line-ties", "7.3/shape-cursor", likely="rounded down")
 def line_ties_down(patch):
-    def line(old, grid, start, target):
-        return (
-            old(grid, grid.index(*target), grid.place(start))[::-1]
-            if False
-            else _down(grid, start, target)
-        )
-
-    def _down(grid, start, target):
-        p = grid.place(start)
-        d = [b - a for a, b in zip(p, target, strict=True)]
+    def line(grid, start, target):
+        begin = grid.place(start)
+        d = [b - a for a, b in zip(begin, target, strict=True)]
         n = max(map(abs, d))
-        return array(
-            "Q",
-            {
-                grid.index(*(a - ((-2 * k * da + n) // (2 * n) if n else 0) for a, da in zip(p, d)))
-                for k in range(n + 1)
-            },
-        )
+        places = [
+            [a - (n - 2 * k * da) // (2 * n) for a, da in zip(begin, d, strict=True)]
+            for k in range(n + 1 if n else 0)
+        ] or [begin]
+        return array("Q", [grid.index(*place) for place in places])
 
-    patch.setattr(unpack, "line", lambda *args: _down(*args))
+    patch.setattr(unpack, "line", line)
 
 
 @mutant("7.3/lines", "7.3/line-ties", "7.3/line-of-one")
@@ -1618,9 +1608,9 @@ def padding_after_outside(patch):
 @mutant("11/order-of-packet")
 def frame_before_sequence(patch):
     def judge(old, self, seq, frame, flags):
-        if frame not in {self._newest, (self._newest + 1) % 256} and self._ahead(seq) >= 32:
-            if not self._is_duplicate(seq):
-                raise Refusal(spec.CODE_FRAME, 2, "")
+        is_known = frame in {self._newest, (self._newest + 1) % 256} or self._is_duplicate(seq)
+        if not is_known and self._ahead(seq) >= 32:
+            raise Refusal(spec.CODE_FRAME, 2, "")
         return old(self, seq, frame, flags)
 
     around(patch, Session, "judge", judge)
@@ -1743,5 +1733,159 @@ def half_a_packet_stays(patch):
     around(patch, Receiver, "_end", end)
 
 
-# Checks that no fault above makes fail.
-UNPROVEN: set[str] = set()
+@mutant("10/read-refused", features=frozenset(("digest",)))
+def read_answered_unannounced(patch):
+    def init(old, self, config):
+        old(self, config)
+        self._features |= 1 << spec.FEATURE_READ
+
+    around(patch, Device, "__init__", init)
+
+
+@mutant("11/pixel-padding", "11/padding", "11/order-of-op", pixel_format="mono1")
+def unused_bits_of_pixels_taken(patch):
+    unused_bits_taken(patch)
+
+
+@mutant("3/any-pieces")
+def pieces_are_packets(patch):
+    around(
+        patch, Device, "receive", lambda old, self, data: data.endswith(b"\0") and old(self, data)
+    )
+
+
+@mutant("4/answers-length")
+def page_too_long(patch):
+    old = device.pack
+    patch.setattr(device, "pack", lambda *args: old(*args[:-1], args[-1] + 20))
+
+
+@mutant("4/answers-whole")
+def unknown_answers(patch):
+    def refuse(old, self, *args):
+        self._send(12, 0, 0, 0, b"refused")
+        old(self, *args)
+
+    around(patch, Device, "_refuse", refuse)
+
+
+@mutant("5/filling-dropped")
+def hello_shows_what_was_begun(patch):
+    def hello(old, self, packet):
+        if self.session and self.session.state is State.FILLING:
+            self.memory.swap()
+        old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant("5/info-same")
+def info_changes(patch):
+    def hello(old, self, packet):
+        credit = self._announcement.credit + 1
+        self._announcement = dataclasses.replace(self._announcement, credit=credit)
+        old(self, packet)
+
+    around(patch, Device, "_hello", hello)
+
+
+@mutant("6/empty-packets", spreads=True)
+def empty_data_refused(patch):
+    def data(old, self, session, packet, *rest):
+        if len(packet) == 3:
+            raise Refusal(spec.CODE_LENGTH, 0, "")
+        old(self, session, packet, *rest)
+
+    around(patch, Device, "_data", data)
+
+
+@mutant("6/ids-wrap")
+def ids_wrap_at_255(patch):
+    def judge(old, self, seq, frame, flags):
+        if frame == 255 and self._newest == 254 and self.shown is None:
+            raise Refusal(spec.CODE_FRAME, 2, "")
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant("6/one-after-another", spreads=True)
+def fifth_swap_shows_the_wrong_page(patch):
+    def swap(old, self):
+        self.count = getattr(self, "count", 0) + 1
+        if self.count % 5:
+            old(self)
+
+    around(patch, memory.Memory, "swap", swap)
+
+
+@mutant("6/own-while-pending")
+def own_while_pending_dropped(patch):
+    def judge(old, self, seq, frame, flags):
+        if self.state is State.PENDING and frame == self._newest:
+            return Verdict.DROP
+        return old(self, seq, frame, flags)
+
+    around(patch, Session, "judge", judge)
+
+
+@mutant("7.7/arc-dot", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-behind-ops")
+def arc_start_left_out(patch):
+    def pieces(old, *args):
+        for pen, voxels in old(*args):
+            yield pen, voxels[1:]
+
+    around(patch, unpack, "arc", pieces)
+
+
+@mutant("7.7/arc-empty")
+def empty_arc_refused(patch):
+    def pieces(old, operands_, *args):
+        found = list(old(operands_, *args))
+        if not found:
+            raise operands_.refusal(spec.CODE_TRUNCATED, "")
+        return found
+
+    around(patch, unpack, "arc", pieces)
+
+
+@mutant("7.7/arc-long")
+def arc_runs_without_end(patch):
+    patch.setattr(arc.spec, "ARC_MAX_RUN", 1 << 30)
+
+
+@mutant("9/answers-pending", refresh=0)
+def pending_although_at_once(patch):
+    _ack(patch, lambda self, flags, seq, frame, values: (flags | 2, seq, frame))
+
+
+@mutant("9/each-status")
+def status_in_a_hurry_unanswered(patch):
+    def status(old, self, packet, flags, seq, frame):
+        if seq != 2:
+            old(self, packet, flags, seq, frame)
+
+    around(patch, Device, "_status", status)
+
+
+@mutant("7/begins-at-0", spreads=True)
+def pen_begins_at_1(patch):
+    def init(old, self, *args):
+        old(self, *args)
+        self._pen = b"\1"
+
+    around(patch, Decoder, "__init__", init)
+
+
+@mutant("7/end")
+def end_needs_padding(patch):
+    def end(old, self, low):
+        if len(self._in._packet) == self._in._at:
+            raise self._in.refusal(spec.CODE_TRUNCATED, "")
+        old(self, low)
+
+    _unpacked(patch, "end", end)
+
+
+# What is drawn at random finds what the others find: no fault is its own.
+UNPROVEN = {"7/anything", "11/anything"}

@@ -227,17 +227,17 @@ class Pipe:
         pass
 
 
-def gone(pipe):
+def gone(_pipe):
     raise TransportClosed("it was pulled out")
 
 
 @pytest.mark.parametrize(
     "say",
     [
-        lambda pipe: b"",
-        lambda pipe: b"\x55" * 997,
-        lambda pipe: bytes(1000),
-        lambda pipe: packets.wire(packets.body(8, payload=bytes(19))) * 50,
+        lambda _pipe: b"",
+        lambda _pipe: b"\x55" * 997,
+        lambda _pipe: bytes(1000),
+        lambda _pipe: packets.wire(packets.body(8, payload=bytes(19))) * 50,
         gone,
     ],
     ids=["silent", "babbling", "zeros", "answering-unasked", "gone"],

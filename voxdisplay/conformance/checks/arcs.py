@@ -113,17 +113,16 @@ def arc_behind_ops(probe: Probe) -> None:
 )
 def arc_long(probe: Probe) -> None:
     said = probe.said
-    main = said.grid.index(max(said.grid))
-    there: list[Place] = []
-    back: list[Place] = []
-    for at in range(said.grid[main]):
-        place = [0, 0, 0]
-        place[main] = at
-        there.append((place[0], place[1], place[2]))
-        back.insert(0, (place[0], place[1], place[2]))
-    places = there
-    for _ in range(min(20, 1200 // len(there))):
-        places = places + (back if places[-1] == there[-1] else there)[1:]
+    main, other, _ = sorted(range(3), key=lambda axis: -said.grid[axis])
+    at = [0, 0, 0]
+    way, places = 1, [(0, 0, 0)]
+    for step in range(1, 1700):
+        if not 0 <= at[main] + way < said.grid[main]:
+            way = -way
+        at[main] += way
+        if step % 280 == 0 and said.grid[other] > 1:  # longer than the longest run that counts
+            at[other] ^= 1
+        places.append((at[0], at[1], at[2]))
     probe.show(fitting(said, places))
 
 
