@@ -1,6 +1,7 @@
 """The conformance kit: our emulator passes it, devices that break the document do not."""
 
 import json
+import struct
 import time
 
 import broken_devices
@@ -265,6 +266,48 @@ def test_a_device_that_falls_silent_is_given_up():
     assert by_verdict(report, Verdict.BROKEN)
     assert len(by_verdict(report, Verdict.NOT_RUN)) > 100
     assert report.left.startswith("unknown")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"nx": 0}, {"format": 9}, {"max_payload": 20}],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_an_impossible_info_ends_it(changes):
+    fields = {"format": 2, "nx": 3, "ny": 5, "nz": 7, "max_payload": 96} | changes
+    body = struct.pack(
+        "<BHHBBHHHBBHIII",
+        *(1, 0x1234, 7, 0, fields["format"], fields["nx"], fields["ny"], fields["nz"]),
+        *(2, 0, fields["max_payload"], 512, 0, 0),
+    )
+
+    class Odd(Pipe):
+        def write(self, data, _timeout_s):
+            session = packets.unwire(data.strip(b"\0"))
+            if session:
+                self.answer = body[:1] + session[4:6] + body[3:] + bytes(3)
+
+    pipe = Odd(lambda pipe: packets.wire(packets.body(9, payload=pipe.__dict__.pop("answer", b""))))
+    pipe.answer = body + bytes(3)
+    report = examine(pipe, timeout_s=0.05, opening_s=0.3)
+    assert not report.holds
+    assert report.results[0].check.id == "5/answers"
+    assert by_verdict(report, Verdict.NOT_RUN)
+
+
+def test_an_interrupted_examination_puts_the_picture_back():
+    port = device(refresh=0)
+    said = Said.of(_info(port))
+    port.write(packets.wire(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
+    before = Bench(port._wire.device).snapshot().pixels
+    assert before.count(0xFF) == 3 < said.voxels
+
+    def enough(_result):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        examine(port, ["7/move"], timeout_s=2, ended=enough)
+    assert Bench(port._wire.device).snapshot().pixels == before
 
 
 # -- the list

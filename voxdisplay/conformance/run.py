@@ -16,6 +16,7 @@ from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Sil
 from voxdisplay.conformance.said import FORMATS, Said
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport
+from voxdisplay.wire import spec
 
 _T = TypeVar("_T")
 _DEAF = 3  # checks in a row without any answer, and the device is given up
@@ -142,18 +143,21 @@ def examine(
     report = Report()
     stranger = _meet(probe)
     if stranger:
-        results = _none(stranger, selected)
-    else:
-        report.said = probe.said
-        kept = _quietly(lambda: keep(probe))
-        if greeted:
-            greeted(probe.said, kept is not None)
-        results = _each(probe, selected)
-    for result in results:
-        report.results.append(result)
+        report.results += _none(stranger, selected)
         if ended:
-            ended(result)
-    if not stranger:
+            for result in report.results:
+                ended(result)
+        return report
+    report.said = probe.said
+    kept = _quietly(lambda: keep(probe))
+    if greeted:
+        greeted(probe.said, kept is not None)
+    try:
+        for result in _each(probe, selected):
+            report.results.append(result)
+            if ended:
+                ended(result)
+    finally:  # also when somebody has seen enough
         report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
     return report
 
@@ -167,7 +171,9 @@ def _meet(probe: Probe) -> Result | None:
             likely = first_contact.why_silent(probe)
     except TransportError as error:
         met, likely = False, str(error)
-    if met and probe.said.format in FORMATS and probe.said.voxels:
+    said = probe.said
+    is_sound = said.format in FORMATS and said.voxels and said.max_payload >= spec.LIMIT_MIN_PAYLOAD
+    if met and is_sound:
         return None
     came = str(probe.info) if met else "nothing that could be read"
     must = "an INFO that says what the device is"
