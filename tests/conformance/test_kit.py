@@ -36,7 +36,7 @@ DEVICES = {
     "one-voxel": {"grid": (1, 1, 1), "pixel_format": "rgb565"},
     "bare": {"features": frozenset(), "pixel_format": "rgb888"},
     "digest-only": {"features": frozenset(("digest", "line"))},
-    "read-only": {"features": frozenset(("read", "diff")), "refresh": 30_000},
+    "read-only": {"features": frozenset(("read", "diff"))},
 }
 # Some of every section, to see that a fault elsewhere leaves them alone.
 BYSTANDERS = (

@@ -62,6 +62,8 @@ def broken(result: Result, *, transcript: bool) -> Iterator[str]:
     check = result.check
     yield f"BROKEN {check.id}"
     yield f"  section {check.section}: {check.demands}"
+    if result.sent:
+        yield clean(f"  sent:    {str(result.sent).removeprefix('-> ')}")
     yield clean(f"  must be: {result.must}")
     yield clean(f"  was:     {result.came}")
     if result.likely:
@@ -119,6 +121,7 @@ def _result_json(result: Result) -> dict[str, Any]:
         "name": result.check.name,
         "demands": result.check.demands,
         "verdict": _key(result.verdict),
+        "sent_hex": result.sent.data.hex(" ").upper() if is_broken and result.sent else None,
         "must": result.must or None,
         "was": result.came or None,
         "likely": result.likely or None,

@@ -55,6 +55,14 @@ class Result:
     reason: str = ""
     log: tuple[Line, ...] = ()
 
+    @property
+    def sent(self) -> Line | None:
+        """The latest packet that was sent and did not only ask."""
+        asking = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
+        lines = [line for line in self.log if line.sent]
+        told = [line for line in lines if line.data and line.data[0] not in asking]
+        return (told or lines or [None])[-1]
+
 
 @dataclass(slots=True)
 class Report:

@@ -27,10 +27,10 @@ def long_axis(said: Said) -> str:
 )
 def scan_order(probe: Probe) -> None:
     said = probe.said
-    for axis in range(3):
-        place = [0, 0, 0]
-        place[axis] = said.grid[axis] - 1
-        probe.show(ops.move(said, place) + ops.run())
+    ends = [(said.nx - 1, 0, 0), (0, said.ny - 1, 0), (0, 0, said.nz - 1)]
+    probe.show(b"".join(ops.move(said, place) + ops.run() for place in ends))
+    for end in ends:
+        probe.show(ops.move(said, end) + ops.run())
     far = [side - 1 for side in said.grid]
     for axis in range(3):
         place = list(far)
