@@ -205,7 +205,7 @@ class Probe:
         """Open a new session, and see that it is still the same device that answers."""
         self.session = self.session % 65535 + 1
         self.seq = self.frame = 0
-        self.raw(b"\0")
+        self.raw(b"\0", "00, which ends whatever was")
         self.send(packets.hello(self.session))
         info = self._await_info()
         if info is None:
@@ -311,8 +311,9 @@ class Probe:
                 was = f"{name.upper()} {'set' if is_so else 'clear'}"
                 must = f"{name.upper()} {'set' if value else 'clear'}"
             else:
-                is_so, must, was = getattr(answer, name), f"{name} {value}", ""
-                was = f"{name} {is_so}"
+                is_so = getattr(answer, name)
+                form = "08X" if name in {"received", "digest"} else ""
+                must, was = f"{name} {value:{form}}", f"{name} {is_so:{form}}"
             if is_so != value:
                 raise Broken(f"ACK with {must}", f"{was} in {answer}", likely)
 

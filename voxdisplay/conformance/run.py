@@ -60,8 +60,8 @@ class Result:
         """The latest packet that was sent and did not only ask."""
         asking = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
         lines = [line for line in self.log if line.sent]
-        told = [line for line in lines if line.data and line.data[0] not in asking]
-        return (told or lines or [None])[-1]
+        told = [line for line in lines if line.data[0] not in asking]
+        return (told or lines)[-1] if lines else None
 
 
 @dataclass(slots=True)
