@@ -103,7 +103,7 @@ def short_segments_counted(patch):
     patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 5)
 
 
-@mutant("3/shortest-damage", "9/status", spreads=True)
+@mutant("3/shortest-damage", spreads=True)
 def segment_of_8_forgiven(patch):
     patch.setattr(receiver.spec, "LIMIT_MIN_SEGMENT", 9)
 
@@ -118,7 +118,7 @@ def empty_segments_counted(patch):
     around(patch, Receiver, "_end", end)
 
 
-@mutant("3/cobs-overrun")
+@mutant("3/cobs-overrun", "3/bit-errors")
 def cobs_overrun_forgiven(patch):
     def end(old, self):
         self._left = 0
@@ -676,20 +676,13 @@ def z_runs_fastest(patch):
     likely="byte is n - 1",
 )
 def step_one_too_few(patch):
-    def plot(old, self, indices, pixel):
-        old(self, indices, pixel)
-
-    around(patch, Page, "plot", plot)
-
-    def walk(_, self, octant, count, raw):
-        self._check_cursor()
-        path = b"".join([unpack._CRUMBS[byte] for byte in raw])[:count]
-        at, voxels = self._cursor, [self._cursor]
-        for crumb in path[:-1]:
-            at += self._device.steps[octant][crumb]
-            voxels.append(at)
-        self._page.plot(array("Q", voxels), self._pen)
-        self._cursor = at
+    def walk(old, self, octant, count, raw):
+        if count == 1:
+            self._check_cursor()
+            self._page.plot(array("Q", [self._cursor]), self._pen)
+            return
+        crumbs = int.from_bytes(raw, "little") & (1 << 2 * count - 2) - 1
+        old(self, octant, count - 1, crumbs.to_bytes(len(raw), "little")[: (count + 2) // 4])
 
     around(patch, Decoder, "_walk", walk)
 
@@ -1053,12 +1046,12 @@ def palette_not_in_the_digest(patch):
     around(patch, Page, "_color_terms", lambda old, self, place: 0)
 
 
-@mutant("7.7/arc-curves")
+@mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-too-many", "7.7/arc-cut", "7.7/arc-long")
 def arc_models_learn_slower(patch):
     patch.setattr(bits.spec, "ARC_ENOUGH", 8)
 
 
-@mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut", "7.7/arc-too-many")
+@mutant("7.7/arc-long", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut", "7.7/arc-too-many")
 def arc_forgets_turns(patch):
     def turn(old, self, bits_):
         if self.way and not self.last:
@@ -1068,7 +1061,7 @@ def arc_forgets_turns(patch):
     around(patch, arc._Axis, "turn", turn)
 
 
-@mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut")
+@mutant("7.7/arc-long", "7.7/arc-too-many", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut")
 def arc_runs_too_long(patch):
     patch.setattr(arc.spec, "ARC_MAX_RUN", 7)
 
@@ -1583,7 +1576,6 @@ def refused_data_keeps_the_session(patch):
     "10/read-outside",
     "10/read-length",
     "11/error-session",
-    "7.8/shapes-outside",
     "11/order-of-read",
 )
 def refused_status_ends_the_session(patch):
@@ -1650,7 +1642,7 @@ def overrun_not_said(patch):
 # -- section 12
 
 
-@mutant(likely="crashed")
+@mutant("3/too-long", "11/overrun", likely="crashed")
 def restarts_on_long_noise(patch):
     def damage(old, self):
         old(self)
@@ -1754,7 +1746,7 @@ def pieces_are_packets(patch):
     )
 
 
-@mutant("4/answers-length")
+@mutant("4/answers-length", max_payload=64, name="a")
 def page_too_long(patch):
     old = device.pack
     patch.setattr(device, "pack", lambda *args: old(*args[:-1], args[-1] + 20))
@@ -1854,7 +1846,7 @@ def arc_runs_without_end(patch):
     patch.setattr(arc.spec, "ARC_MAX_RUN", 1 << 30)
 
 
-@mutant("9/answers-pending", refresh=0)
+@mutant("9/answers-pending", spreads=True, refresh=0)
 def pending_although_at_once(patch):
     _ack(patch, lambda self, flags, seq, frame, values: (flags | 2, seq, frame))
 
@@ -1877,7 +1869,7 @@ def pen_begins_at_1(patch):
     around(patch, Decoder, "__init__", init)
 
 
-@mutant("7/end")
+@mutant("7/end", "3/cobs-groups")
 def end_needs_padding(patch):
     def end(old, self, low):
         if len(self._in._packet) == self._in._at:

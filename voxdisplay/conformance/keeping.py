@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.probe import Broken, NotApplicable, Probe
+from voxdisplay.conformance.probe import Broken, Probe
 from voxdisplay.wire import spec
 
 _MOST_S = 20.0
@@ -35,13 +35,13 @@ def keep(probe: Probe) -> Kept | None:
             return None
         digest = probe.state.digest
         while at < said.voxels:
-            page = probe.ask(packets.read(at, said.voxels - at))
-            if page.kind != spec.TYPE_PAGE or not page.count or time.monotonic() > until_s:
+            page = probe.ask_page(packets.read(at, said.voxels - at))
+            probe.unpack(page, at, said.voxels - at)  # is it a picture at all?
+            if time.monotonic() > until_s:
                 return None
-            probe.read_range(at, page.count)  # is it a picture at all?
             payloads.append(ops.skip(at) + page.tail)
             at += page.count
-    except (Broken, NotApplicable):
+    except Broken:
         return None
     return Kept(tuple(payloads), digest)
 

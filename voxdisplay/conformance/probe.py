@@ -211,7 +211,7 @@ class Probe:
         if info is None:
             raise Silent("INFO answers HELLO", "nothing", "did it stumble over what came before?")
         if info.boot != self.said.boot:
-            self.said = Said.of(info)
+            self.info, self.said = info, Said.of(info)
             self.hearing.said = self.said
             raise Broken(
                 "the device goes on",
@@ -492,6 +492,10 @@ class Probe:
     def read_range(self, start: int, count: int, flags: int = 0) -> tuple[dict[int, int], int]:
         """READ once; give the pixels that are not dark, and how many voxels were covered."""
         page = self.ask_page(packets.read(start, count, 77, flags))
+        return self.unpack(page, start, count), page.count
+
+    def unpack(self, page: Answer, start: int, count: int) -> dict[int, int]:
+        """Give the pixels of a PAGE that are not dark; demand that it answers such a READ."""
         decoder = PageReader(self.said, start)
         try:
             decoder.draw(page.tail)
@@ -507,7 +511,7 @@ class Probe:
                 f"count {page.count}, and ops for {decoder.cursor - start}",
                 "is `count` that of the ops, not that of the READ?",
             )
-        return decoder.page.pixels, page.count
+        return decoder.page.pixels
 
     def ask_page(self, packet: bytes) -> Answer:
         """Send a READ that must be answered with PAGE."""

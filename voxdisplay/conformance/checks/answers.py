@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from voxdisplay.conformance import packets
 from voxdisplay.conformance.catalogue import check
+from voxdisplay.conformance.checks.reading import dense
 from voxdisplay.conformance.probe import Probe
 
 
@@ -32,6 +34,8 @@ def answers_whole(probe: Probe) -> None:
 
 @check("4", "answers-length", "nothing that the device sends is longer than max_payload allows")
 def answers_length(probe: Probe) -> None:
+    if probe.said.has("READ"):  # a longest answer at least
+        probe.ask_page(packets.read(0, dense(probe)))
     demand_none(probe, "length", f"at most {probe.said.max_payload} bytes of payload")
 
 

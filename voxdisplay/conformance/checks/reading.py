@@ -21,6 +21,19 @@ def picture(probe: Probe) -> None:
     probe.show(ops.literal(said, begin), ops.skip(said.voxels - most) + ops.literal(said, end))
 
 
+def dense(probe: Probe) -> int:
+    """Show something that no PAGE holds whole, as far as the grid has room; give its voxels."""
+    said, rng = probe.said, probe.rng
+    most = min(said.voxels, 2 * said.max_payload, 4096)
+    per_packet = (said.max_payload - 16) // said.pixel_bytes
+    payloads = []
+    for at in range(0, most, per_packet):
+        values = [ops.some_value(said, rng) for _ in range(min(per_packet, most - at))]
+        payloads.append(ops.skip(at) + ops.literal(said, values))
+    probe.show(*payloads)
+    return most
+
+
 def demand_range(probe: Probe, start: int, count: int, flags: int = 0) -> None:
     """Read a range to its end; demand the pixels that are in the front page."""
     must = probe.front.pixels if probe.front else {}
@@ -112,15 +125,7 @@ def back_page(probe: Probe) -> None:
 
 @check("10", "dense-page", "what does not fit one PAGE is covered in part", READ)
 def dense_page(probe: Probe) -> None:
-    said, rng = probe.said, probe.rng
-    most = min(said.voxels, 2 * said.max_payload, 4096)
-    per_packet = (said.max_payload - 16) // said.pixel_bytes
-    payloads = []
-    for at in range(0, most, per_packet):
-        values = [ops.some_value(said, rng) for _ in range(min(per_packet, most - at))]
-        payloads.append(ops.skip(at) + ops.literal(said, values))
-    probe.show(*payloads)
-    demand_range(probe, 0, most)
+    demand_range(probe, 0, dense(probe))
 
 
 @check("10", "read-fields", "a READ of no voxel is refused: FIELD at 8", READ)
