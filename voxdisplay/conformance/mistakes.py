@@ -261,6 +261,14 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
     """Give digests that are computed wrongly, and how."""
     right = page.digest(said)
     old = before.digest(said)
+    if said.has("PALETTE"):
+        without = Page(page.pixels)
+        yield without.digest(said), "the palette is not in the digest"
+        whole = sum(mix(said.voxels + i, 0x1000000 + c) for i, c in enumerate(page.palette))
+        yield (
+            (without.digest(said) + whole) & 0xFFFFFFFF,
+            "entries of the default palette count too",
+        )
     if said.voxels <= 1 << 20:
         dark = sum(mix(i, 0) for i in range(said.voxels) if i not in page.pixels)
         yield (
@@ -284,14 +292,6 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
             for i, v in page.pixels.items()
         )
         yield big & 0xFFFFFFFF, "the digest takes a pixel's bytes highest first"
-    if said.has("PALETTE"):
-        without = Page(page.pixels)
-        yield without.digest(said), "the palette is not in the digest"
-        whole = sum(mix(said.voxels + i, 0x1000000 + c) for i, c in enumerate(page.palette))
-        yield (
-            (without.digest(said) + whole) & 0xFFFFFFFF,
-            "entries of the default palette count too",
-        )
     h = [i * spec.DIGEST_MUL_INDEX + v * spec.DIGEST_MUL_VALUE for i, v in page.pixels.items()]
     yield sum(h) & 0xFFFFFFFF, "the digest leaves out all steps of mix but the first"
     lit = [mix(i, value) for i, value in page.pixels.items()]

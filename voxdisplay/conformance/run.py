@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
@@ -244,12 +244,11 @@ def _make(probe: Probe, check: Check) -> Result:
     except Silent as silent:
         worse = _broken(probe, check, silent)
         raise _Unheard(result if result.verdict is Verdict.BROKEN else worse) from silent
-    except Broken as broken:
+    except Broken as restarted:
         if result.verdict is not Verdict.BROKEN:
-            return _broken(probe, check, broken)
-    return Result(
-        check, result.verdict, result.must, result.came, result.likely, result.reason, made
-    )
+            return _broken(probe, check, restarted)
+        result = replace(result, likely=restarted.likely)
+    return replace(result, log=made)
 
 
 def _broken(probe: Probe, check: Check, broken: Broken) -> Result:

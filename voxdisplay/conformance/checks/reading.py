@@ -40,23 +40,22 @@ def demand_range(probe: Probe, start: int, count: int, flags: int = 0) -> None:
     end = start + count
     while start < end:
         got, covered = probe.read_range(start, end - start, flags)
-        for index in range(start, start + covered) if covered < ops.MANY else sorted({*got, *must}):
-            if start <= index < start + covered:
-                probe.demand(
-                    got.get(index, 0) == must.get(index, 0),
-                    f"pixel {must.get(index, 0):X}h at index {index}",
-                    f"{got.get(index, 0):X}h",
-                    _likely(probe, got, index),
-                )
+        part = range(start, start + covered)
+        for index in part if covered < ops.MANY else sorted(i for i in {*got, *must} if i in part):
+            probe.demand(
+                got.get(index, 0) == must.get(index, 0),
+                f"pixel {must.get(index, 0):X}h at index {index}",
+                f"{got.get(index, 0):X}h",
+                _likely(must, got, part),
+            )
         start += covered
 
 
-def _likely(probe: Probe, got: dict[int, int], index: int) -> str:
-    must = probe.front.pixels if probe.front else {}
+def _likely(must: dict[int, int], got: dict[int, int], part: range) -> str:
     for shift in (-1, 1):
-        if got and all(must.get(i + shift) == value for i, value in got.items()):
-            return f"the range is off by {-shift}: `start` is the index of the first voxel"
-    return "" if index in got else "are the bytes of a pixel and their order right?"
+        if all(must.get(i + shift, 0) == got.get(i, 0) for i in part[: ops.MANY]):
+            return f"all is off by {abs(shift)}: `start` is the index of the first voxel"
+    return "are the bytes of a pixel, and the order of pixels in a LIT, right?"
 
 
 @check("10", "whole-page", "the front page can be read whole", READ)
