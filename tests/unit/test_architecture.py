@@ -27,6 +27,7 @@ MAY_IMPORT = {
     "link": {"errors", "link", "wire"},
     "transport": {"errors", "transport", "wire.spec"},
     "device": {"errors", "grid", "pixel", "wire"},
+    "conformance": {"conformance", "errors", "transport", "wire.spec"},
     "view": {"errors", "grid", "pixel", "view"},
     "plan": {"frame", "wire"},
     "baud": {"errors", "probe", "transport"},

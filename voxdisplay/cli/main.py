@@ -9,6 +9,7 @@ from typing import Final
 import click
 
 from voxdisplay import __version__
+from voxdisplay.cli.conformance import conformance
 from voxdisplay.cli.device import clear, info, read
 from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
 from voxdisplay.cli.plan import plan_command
@@ -65,7 +66,7 @@ def cli(*, debug: bool) -> None:
 
 
 _SHOW = (push, preview, view, test_pattern, clear)
-_ASK = (voxelize, plan_command, info, ports, read)
+_ASK = (voxelize, plan_command, info, ports, read, conformance)
 for command in (*_SHOW, *_ASK):
     cli.add_command(command)
 

@@ -57,6 +57,17 @@ def _complete_port(context: click.Context, parameter: click.Parameter, typed: st
     return [found.port for found in all_ports() if found.port.startswith(typed)]
 
 
+port_option = click.option(
+    "--port",
+    "-p",
+    envvar="VOXDISPLAY_PORT",
+    metavar="PORT",
+    shell_complete=_complete_port,
+    help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
+    "a pyserial URL. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
+)
+
+
 def port_options(function: _C) -> _C:
     """Add ``--port``, ``--baud`` and ``--timeout``."""
     for option in (
@@ -78,15 +89,7 @@ def port_options(function: _C) -> _C:
             help="Bits per second of a serial line; auto: the fastest at which the display "
             "answers, which takes some seconds to find.",
         ),
-        click.option(
-            "--port",
-            "-p",
-            envvar="VOXDISPLAY_PORT",
-            metavar="PORT",
-            shell_complete=_complete_port,
-            help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
-            "a pyserial URL. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
-        ),
+        port_option,
     ):
         function = option(function)
     return function

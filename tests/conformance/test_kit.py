@@ -1,0 +1,378 @@
+"""The conformance kit: our emulator passes it, devices that break the document do not."""
+
+import json
+import random
+import struct
+import time
+
+import broken_devices
+import document
+import pytest
+
+from firmware_sim.bench import Bench
+from firmware_sim.config import Config
+from firmware_sim.device import Device
+from firmware_sim.in_process import InProcessPort
+from firmware_sim.wire import Wire
+from voxdisplay.conformance import CHECKS, ops, packets
+from voxdisplay.conformance.decoder import Decoder, Refused
+from voxdisplay.conformance.mistakes import MISTAKES
+from voxdisplay.conformance.page import Page
+from voxdisplay.conformance.run import Verdict, chosen, examine
+from voxdisplay.conformance.said import FEATURES, Said
+from voxdisplay.errors import TransportClosed
+from voxdisplay.wire import spec
+
+SMALL = {"grid": (3, 5, 7), "pixel_format": "index8", "refresh": 200_000, "max_payload": 256}
+DEVICES = {
+    "at-once": {"refresh": 0},
+    "mono": {"grid": (17, 64, 40), "pixel_format": "mono1", "silent": 8},
+    "wide": {
+        "grid": (300, 4, 3),
+        "pixel_format": "rgb888",
+        "max_payload": 64,
+        "rx_buffer": 137,
+        "name": "a",
+    },
+    "one-voxel": {"grid": (1, 1, 1), "pixel_format": "rgb565"},
+    "bare": {"features": frozenset(), "pixel_format": "rgb888"},
+    "digest-only": {"features": frozenset(("digest", "line"))},
+    "read-only": {"features": frozenset(("read", "diff"))},
+}
+# Some of every section, to see that a fault elsewhere leaves them alone.
+BYSTANDERS = (
+    "3/resync", "4/data-flags", "5/info-same", "6/given-up", "7/pen", "7.3/lines", "8/one-voxel",
+    "9/data-answered", "9.1/duplicate-answered", "10/ranges", "11/session-ends",
+)  # fmt: skip
+
+
+def device(**config):
+    config = {**SMALL, "rx_buffer": 2048, "boot": 7} | config
+    port = InProcessPort(Wire(Device(Config(**config))))
+    port.port = "a device in this process"
+    return port
+
+
+def by_verdict(report, verdict):
+    return {result.check.id for result in report.results if result.verdict is verdict}
+
+
+def explain(report):
+    return "\n".join(
+        f"{result.check.id}: must be {result.must}, was {result.came}, likely {result.likely}"
+        for result in report.results
+        if result.verdict is Verdict.BROKEN
+    )
+
+
+# -- a third reading of the document
+
+
+def said_of(vector):
+    pixel_format = getattr(spec, f"FORMAT_{vector['format']}")
+    allowed = dict(vector.lines).get("features")
+    names = allowed.split("|") if allowed else list(FEATURES)
+    if pixel_format != spec.FORMAT_INDEX8:
+        names = [name for name in names if name not in {"DIFF", "PALETTE"}]
+    bits = sum(1 << FEATURES[name] for name in names)
+    return Said(pixel_format, *vector.grid, features=bits)
+
+
+@pytest.mark.parametrize("vector", document.vectors("ops"), ids=str)
+def test_what_ops_draw(vector):
+    said, page = said_of(vector), Page()
+    Decoder(said, page).draw(vector.hex("ops"))
+    lit = {place: int.from_bytes(pixel, "little") for place, pixel in vector.voxels().items()}
+    assert {said.place(index): value for index, value in page.pixels.items()} == lit
+    assert page.digest(said) == vector.integer("digest")
+
+
+@pytest.mark.parametrize("vector", document.vectors("refused"), ids=str)
+def test_what_is_refused(vector):
+    decoder = Decoder(said_of(vector), Page())
+    if vector["code"].startswith("FINE"):
+        decoder.draw(vector.hex("ops"))
+        return
+    with pytest.raises(Refused) as refused:
+        decoder.draw(vector.hex("ops"))
+    assert refused.value.code == getattr(spec, f"CODE_{vector['code']}")
+    assert refused.value.at + packets.HEADER_BYTES == vector.integer("offset")
+
+
+@pytest.mark.parametrize("vector", document.vectors("cobs"), ids=str)
+def test_cobs(vector):
+    assert packets.stuff(vector.hex("decoded")) == vector.hex("encoded")
+    assert packets.unstuff(vector.hex("encoded")) == vector.hex("decoded")
+
+
+@pytest.mark.parametrize("vector", document.vectors("packet"), ids=str)
+def test_packets(vector):
+    whole = vector.hex("packet")
+    assert packets.wire(whole[:-4]) == vector.hex("wire")
+    assert packets.unwire(vector.hex("wire")[:-1]) == whole[:-4]
+
+
+# -- a device that keeps to the document
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_the_emulator_holds(name):
+    report = examine(device(**DEVICES[name]), timeout_s=2)
+    assert report.holds, explain(report)
+    assert len(report.results) == len(CHECKS)
+    assert report.left.startswith("dark" if name in {"bare", "digest-only"} else "as it was")
+
+
+def test_over_a_real_tty(emulator, run):
+    other = emulator("--pty", "--size", "3x5x7", "--format", "index8", "--refresh", "200")
+    checked = run("conformance", "--port", other.port, "--json")
+    outcome = json.loads(checked.stdout)
+    assert checked.returncode == 0, outcome
+    assert outcome["conforms"] is True
+    assert outcome["counts"]["holds"] > 150
+    assert "it will be as it was" in checked.stderr
+
+
+@pytest.mark.parametrize("name", ["at-once", "mono", "wide"])
+def test_the_picture_is_put_back(name):
+    port = device(**DEVICES[name])
+    said = Said.of(_info(port))
+    drawn = ops.literal(said, [1, 0, 1]) + ops.skip(said.voxels - 4) + ops.run()
+    port.write(packets.wire(packets.data(0, 0, drawn, packets.CLEAR | packets.COMMIT)), 1)
+    time.sleep(said.period_s)
+    while not Bench(port._wire.device).snapshot().pixels.strip(b"\0"):
+        port.read(0.01)
+    before = Bench(port._wire.device).snapshot().pixels
+    report = examine(port, ["7/pen", "6/clear"], timeout_s=2)
+    assert report.holds, explain(report)
+    assert report.left == "as it was"
+    assert Bench(port._wire.device).snapshot().pixels == before
+
+
+def _info(port):
+    port.write(b"\0" + packets.wire(packets.hello(9)), 1)
+    (segment, rest) = port.read(1).split(b"\0")
+    assert not rest
+    return packets.Answer(packets.unwire(segment))
+
+
+# -- devices that do not
+
+
+@pytest.mark.parametrize("fault", broken_devices.MUTANTS, ids=str)
+def test_a_fault_is_found_where_it_is(fault, monkeypatch):
+    fault.make(monkeypatch)
+    bystanders = [] if fault.spreads else BYSTANDERS
+    report = examine(
+        device(**fault.config), [*fault.fails, *bystanders], timeout_s=0.3, opening_s=2
+    )
+    broken = by_verdict(report, Verdict.BROKEN)
+    assert broken == set(fault.fails), explain(report)
+    said = " ".join(result.likely for result in report.results)
+    assert fault.likely in said, said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", broken_devices.MUTANTS, ids=str)
+def test_a_fault_is_found_nowhere_else(fault, monkeypatch):
+    fault.make(monkeypatch)
+    report = examine(device(**fault.config), timeout_s=0.3, opening_s=2)
+    broken = by_verdict(report, Verdict.BROKEN)
+    random_ones = {"7/anything", "11/anything", "12/mutated", "12/noise"}
+    assert set(fault.fails) <= broken
+    assert fault.spreads or broken - random_ones <= set(fault.fails), explain(report)
+
+
+def test_every_check_finds_a_fault():
+    found = {name for fault in broken_devices.MUTANTS for name in fault.fails}
+    unproven = {check.id for check in CHECKS} - found
+    assert unproven == broken_devices.UNPROVEN
+
+
+def test_a_wrong_check_value_is_named(monkeypatch):
+    monkeypatch.setattr(broken_devices.crc, "_TABLE", _castagnoli())
+    report = examine(device(), ["3"], timeout_s=0.1, opening_s=0.3)
+    assert report.said is None
+    assert "CRC-32C" in report.results[0].likely
+    assert {result.verdict for result in report.results[1:]} == {Verdict.NOT_RUN}
+
+
+def _castagnoli():
+    monkey = broken_devices.crc
+    poly = monkey.spec.CRC_POLY
+    try:
+        monkey.spec.CRC_POLY = 0x1EDC6F41
+        return monkey._table()
+    finally:
+        monkey.spec.CRC_POLY = poly
+
+
+class Pipe:
+    """A pipe with something at its other end that is no device."""
+
+    port = "nothing"
+
+    def __init__(self, say):
+        self._say = say
+        self.read_bytes = 0
+
+    def read(self, timeout_s):
+        if not (said := self._say(self)):
+            time.sleep(min(timeout_s, 0.05))
+        self.read_bytes += len(said)
+        return said
+
+    def write(self, data, timeout_s):
+        pass
+
+    def close(self):
+        pass
+
+
+def gone(_pipe):
+    raise TransportClosed("it was pulled out")
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        lambda _pipe: b"",
+        lambda _pipe: b"\x55" * 997,
+        lambda _pipe: bytes(1000),
+        lambda _pipe: packets.wire(packets.body(8, payload=bytes(19))) * 50,
+        gone,
+    ],
+    ids=["silent", "babbling", "zeros", "answering-unasked", "gone"],
+)
+def test_what_is_no_device_ends_soon(say):
+    report = examine(Pipe(say), timeout_s=0.05, opening_s=0.1)
+    assert not report.holds
+    assert report.said is None
+    assert len(report.results) == len(CHECKS) + 1
+
+
+class Fickle(Pipe):
+    """Answers HELLO well, and everything else by chance."""
+
+    def __init__(self, seed):
+        super().__init__(lambda pipe: pipe.out.pop(0) if pipe.out else b"")
+        self.rng = random.Random(seed)
+        self.out = []
+        self.inner = device(refresh=0)
+
+    def write(self, data, timeout_s):
+        self.inner.write(data, timeout_s)
+        self.out += filter(None, [self.inner.read(0)])
+        for segment in data.split(b"\0"):
+            asked = packets.unwire(segment) if len(segment) >= 8 else None
+            if asked and asked[0] >> 4 != spec.TYPE_HELLO and self.rng.random() < 0.5:
+                kind = self.rng.choice([8, 8, 9, 10, 11, 3])
+                seq = self.rng.choice([asked[1], self.rng.randrange(256)])
+                rest = self.rng.randbytes(self.rng.randint(0, 40))
+                answer = bytes((kind << 4 | self.rng.randrange(16), seq, 0, asked[1])) + rest
+                self.out.append(packets.wire(answer) + self.rng.choice([b"", b"\0", b"noise\0"]))
+        self.rng.shuffle(self.out)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_a_device_answers_the_kit_ends_well(seed):
+    report = examine(Fickle(seed), timeout_s=0.01, opening_s=1)
+    assert not report.holds
+    assert len(report.results) >= len(CHECKS)
+
+
+def test_a_device_that_falls_silent_is_given_up():
+    port = device()
+    inner = port.write
+    written = 0
+
+    def write(data, timeout_s):
+        nonlocal written
+        written += 1
+        if written < 60:
+            inner(data, timeout_s)
+
+    port.write = write
+    report = examine(port, timeout_s=0.02, opening_s=0.5)
+    assert by_verdict(report, Verdict.BROKEN)
+    assert len(by_verdict(report, Verdict.NOT_RUN)) > 100
+    assert report.left.startswith("unknown")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"nx": 0}, {"format": 9}, {"max_payload": 20}],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_an_impossible_info_ends_it(changes):
+    fields = {"format": 2, "nx": 3, "ny": 5, "nz": 7, "max_payload": 96} | changes
+    body = struct.pack(
+        "<BHHBBHHHBBHIII",
+        *(1, 0x1234, 7, 0, fields["format"], fields["nx"], fields["ny"], fields["nz"]),
+        *(2, 0, fields["max_payload"], 512, 0, 0),
+    )
+
+    class Odd(Pipe):
+        def write(self, data, _timeout_s):
+            session = packets.unwire(data.strip(b"\0"))
+            if session:
+                self.answer = body[:1] + session[4:6] + body[3:] + bytes(3)
+
+    pipe = Odd(lambda pipe: packets.wire(packets.body(9, payload=pipe.__dict__.pop("answer", b""))))
+    pipe.answer = body + bytes(3)
+    report = examine(pipe, timeout_s=0.05, opening_s=0.3)
+    assert not report.holds
+    assert report.results[0].check.id == "5/answers"
+    assert by_verdict(report, Verdict.NOT_RUN)
+
+
+def test_an_interrupted_examination_puts_the_picture_back():
+    port = device(refresh=0)
+    said = Said.of(_info(port))
+    port.write(packets.wire(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
+    before = Bench(port._wire.device).snapshot().pixels
+    assert before.count(0xFF) == 3 < said.voxels
+
+    def enough(_result):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        examine(port, ["7/move"], timeout_s=2, ended=enough)
+    assert Bench(port._wire.device).snapshot().pixels == before
+
+
+# -- the list
+
+
+def test_checks_have_names_of_their_own():
+    assert len({check.id for check in CHECKS}) == len(CHECKS)
+    assert all(check.demands and check.section for check in CHECKS)
+
+
+def test_choosing():
+    assert {check.section for check in chosen(["7"])} >= {"7", "7.1", "7.8"}
+    assert [check.id for check in chosen(["7.3/line-ties"])] == ["7.3/line-ties"]
+    assert {check.name for check in chosen(["line-*"])} == {"line-ties", "line-of-one"}
+    assert "10/ranges" not in {check.id for check in chosen(["9"])}
+    with pytest.raises(ValueError, match="no check is named by 'nothing'"):
+        chosen(["nothing"])
+
+
+def test_every_mistake_says_what_it_is():
+    assert all(mistake.__doc__ for mistake in MISTAKES)
+
+
+def test_the_command_lists_and_refuses(run):
+    listed = run("conformance", "--list", "--only", "7.3")
+    assert "7.3/line-ties" in listed.stdout
+    assert run("conformance", "--only", "no-such").returncode == 2
+    assert run("conformance", "--port", "tcp://127.0.0.1:1").returncode == 3
+
+
+def test_the_command_reports_a_failure(run):
+    # The device announces a longer payload than it takes.
+    port = "sim:?size=3x5x7&format=mono1&refresh=0&lie=payload"
+    failed = run("conformance", "--port", port, "--only", "3", "--timeout", "0.2")
+    assert failed.returncode == 1, failed.stderr
+    assert "BROKEN 3/longest-packet" in failed.stdout
+    assert "must be:" in failed.stdout

@@ -1,0 +1,119 @@
+"""Sections 7.4 to 7.6: OCT, DIFF and COLORS."""
+
+from __future__ import annotations
+
+from voxdisplay.conformance import ops
+from voxdisplay.conformance.catalogue import check, feature, seen, voxels
+from voxdisplay.conformance.probe import Probe
+from voxdisplay.wire import spec
+
+
+def _payload(probe: Probe, level: int, density: float) -> bytes:
+    """Give a brick that fits a packet."""
+    while True:
+        op = ops.some_brick(probe.said, probe.rng, level, density)
+        if len(op) <= probe.said.max_payload:
+            return op
+        density /= 2
+
+
+@check("7.4", "levels", "OCT draws a brick of each level, from its masks", feature("OCT"), seen)
+def levels(probe: Probe) -> None:
+    for level in range(spec.LIMIT_MAX_LEVEL + 1):
+        for density in (0.05, 0.5):
+            probe.show(_payload(probe, level, density))
+
+
+@check(
+    "7.4", "children", "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)", feature("OCT"), seen
+)
+def children(probe: Probe) -> None:
+    for level in (1, 2, 3, 4):
+        side = 1 << level - 1
+        for bit in range(8):
+            child = (side * (bit & 1), side * (bit >> 1 & 1), side * (bit >> 2))
+            if all(at < n for at, n in zip(child, probe.said.grid, strict=True)):
+                probe.show(ops.brick(probe.said, level, (0, 0, 0), [child]))
+
+
+@check(
+    "7.4", "full-nodes", "a mask 00 is a node of which all voxels are written", feature("OCT"), seen
+)
+def full_nodes(probe: Probe) -> None:
+    said = probe.said
+    for level in range(1, spec.LIMIT_MAX_LEVEL + 1):
+        if 1 << level <= min(said.grid):
+            probe.show(bytes((spec.OP_OCT | level,)) + ops.xyz(said, (0, 0, 0)) + b"\0")
+        probe.show(_payload(probe, level, 1.0))
+
+
+@check(
+    "7.4", "brick-cursor", "OCT leaves cursor and pen as they are", feature("OCT"), seen, voxels(2)
+)
+def brick_cursor(probe: Probe) -> None:
+    said = probe.said
+    brick = ops.brick(said, 0, (0, 0, 0), [])
+    probe.show(ops.skip(said.voxels - 1) + ops.pen(said, 1) + brick + ops.run())
+    probe.show(ops.skip(said.voxels) + brick)
+
+
+@check("7.5", "differences", "DIFF adds -8 to 7 to the pen, modulo 256", feature("DIFF"), seen)
+def differences(probe: Probe) -> None:
+    said, rng = probe.said, probe.rng
+    most = min(said.voxels, 200, 2 * (said.max_payload - 8))
+    for n in sorted({1, 2, 3, 31, 32, 33, most - 1, most}):
+        if 0 < n <= most:
+            values = [rng.randint(-8, 7) for _ in range(n)]
+            probe.show(ops.pen(said, rng.randrange(256)) + ops.differences(values))
+    up = min(most, 40)
+    probe.show(ops.pen(said, 250) + ops.differences([7] * up))
+    probe.show(ops.pen(said, 5) + ops.differences([-8] * up))
+
+
+@check(
+    "7.5",
+    "difference-pen",
+    "after DIFF the pen is the last pixel",
+    feature("DIFF"),
+    seen,
+    voxels(4),
+)
+def difference_pen(probe: Probe) -> None:
+    said = probe.said
+    probe.show(ops.pen(said, 9) + ops.differences([3, -1]) + ops.run(2))
+    probe.show(ops.literal(said, [20]) + ops.differences([1, 2, 3]))
+
+
+@check(
+    "7.6",
+    "colors",
+    "COLORS sets entries of the page's palette",
+    feature("PALETTE"),
+    feature("DIGEST"),
+)
+def colors(probe: Probe) -> None:
+    rng = probe.rng
+    for first, n in (
+        (0, 1),
+        (255, 1),
+        (7, 3),
+        (250, 6),
+        (0, min(256, probe.said.max_payload // 3 - 1)),
+    ):
+        values = [(rng.randrange(256), rng.randrange(256), rng.randrange(256)) for _ in range(n)]
+        probe.show(ops.colors(first, values) + ops.run(), exactly=True)
+
+
+@check(
+    "7.6",
+    "palette-of-a-page",
+    "CLEAR gives a page the default palette, KEEP a copy of the front page's",
+    feature("PALETTE"),
+    feature("DIGEST"),
+)
+def palette_of_a_page(probe: Probe) -> None:
+    probe.show(ops.colors(2, [(1, 2, 3)]) + ops.run(), exactly=True)
+    probe.show(ops.colors(4, [(4, 5, 6)]), clear=False, exactly=True)
+    probe.show(b"", clear=False, exactly=True)
+    probe.show(ops.run(), exactly=True)
+    probe.show(ops.colors(2, [(1, 2, 3)]), clear=False, exactly=True)

@@ -1,0 +1,423 @@
+"""Section 11, and 7.8: what is refused, with which code, where, and what becomes of the session."""
+
+from __future__ import annotations
+
+from voxdisplay.conformance import ops
+from voxdisplay.conformance.catalogue import check, feature, formats, seen, voxels
+from voxdisplay.conformance.decoder import Decoder, Refused
+from voxdisplay.conformance.packets import CLEAR, COMMIT, body, data, hello, read, status
+from voxdisplay.conformance.page import Page
+from voxdisplay.conformance.probe import Probe
+from voxdisplay.wire import spec
+
+_HUGE = 100_000
+
+
+class _TooMuch(Exception):  # noqa: N818
+    """Ops that would take the kit too long."""
+
+
+class _Cautious(Decoder):
+    def count_of(self, low: int) -> int:
+        count = super().count_of(low)
+        if self.cursor + count <= self.said.voxels and count > _HUGE:
+            raise _TooMuch
+        return count
+
+
+def prefixed(probe: Probe, ops_: bytes, code: int) -> None:
+    """Demand a refusal, at the first op and behind another one."""
+    probe.refuse_ops(ops_, code)
+    before = ops.pen(probe.said, 1)
+    probe.refuse_ops(before + ops_, code, len(before))
+
+
+@check("11", "session-ends", "a refused DATA ends the session: NO_SESSION answers all but HELLO")
+def session_ends(probe: Probe) -> None:
+    probe.ask(data(0, 0, b"\x1f"))
+    for packet in (status(9), data(0, 0), data(1, 0, b"\x1f"), read(0, 1), body(0), body(15, 3, 1)):
+        answer = probe.ask(packet)
+        right = answer.kind == spec.TYPE_ERROR
+        right = right and (answer.code, answer.offset) == (spec.CODE_NO_SESSION, 0)
+        probe.demand(
+            right, "ERROR NO_SESSION at offset 0", answer, "a refused DATA ends the session"
+        )
+    probe.open()
+    probe.sync()
+    probe.demand_ack(probe.state, session=probe.session, next=0)
+
+
+@check(
+    "11",
+    "frame-dropped",
+    "what is not on display is dropped when a DATA is refused",
+    seen,
+    voxels(2),
+)
+def frame_dropped(probe: Probe) -> None:
+    probe.show(ops.dot(probe.said, 0))
+    must = probe.front or Page()
+    probe.draw(ops.dot(probe.said, 1), clear=False)
+    probe.ask(data(2, 1, b"\x1f", 0))
+    probe.open()
+    probe.let_ticks_pass()
+    probe.sync()
+    probe.demand_ack(probe.state, shown=0, pending=0)
+    probe.look(probe.state, must)
+    probe.show(b"", clear=False)
+
+
+@check("11", "error-names-packet", "seq and frame of an ERROR are those of the refused packet")
+def error_names_packet(probe: Probe) -> None:
+    for packet in (body(0, 0, 77, 9), body(spec.TYPE_STATUS, 1, 78, 0), data(99, 98)):
+        error = probe.ask(packet)
+        probe.demand(error.kind == spec.TYPE_ERROR, "ERROR", error)
+        same = (error.seq, error.frame) == (packet[1], packet[2])
+        probe.demand(same, f"seq {packet[1]} and frame {packet[2]} in ERROR", error)
+
+
+@check(
+    "11", "error-session", "an ERROR has the session in which it was refused, or 0 if none is open"
+)
+def error_session(probe: Probe) -> None:
+    for packet in (body(0), data(0, 0, b"\x1f")):
+        error = probe.ask(packet)
+        must = (spec.TYPE_ERROR, probe.session)
+        probe.demand((error.kind, error.session) == must, f"session {probe.session:04X}h", error)
+    error = probe.ask(status(9))
+    probe.demand((error.kind, error.session) == (spec.TYPE_ERROR, 0), "session 0", error)
+
+
+@check("11", "refused-hello", "a HELLO is judged alike with and without a session")
+def refused_hello(probe: Probe) -> None:
+    probe.close()
+    probe.refuse(hello(0), spec.CODE_FIELD, 4)
+    probe.refuse(body(spec.TYPE_HELLO, payload=b"\1\1"), spec.CODE_LENGTH, 0)
+
+
+@check("11", "reserved-ops", "an op that is reserved or not announced is refused: OP")
+def reserved_ops(probe: Probe) -> None:
+    said = probe.said
+    shapes = {
+        spec.OP_LINE: "LINE",
+        spec.OP_BOX: "BOX",
+        spec.OP_DOTS: "DOTS",
+        spec.OP_COLORS: "PALETTE",
+        spec.OP_ARC: "ARC",
+    }
+    for op in range(256):
+        kind, low = op & 0xE0, op & 0x1F
+        if op in shapes:
+            reserved = not said.has(shapes[op])
+        elif kind in {spec.OP_STEP, spec.OP_FROM}:
+            reserved = low > spec.LIMIT_MAX_OCTANT
+        elif kind == spec.OP_OCT:
+            reserved = low > spec.LIMIT_MAX_LEVEL or (not said.has("OCT") and low < 2)
+        elif kind == spec.OP_DIFF:
+            reserved = not said.has("DIFF") and low in {0, 31}
+        else:
+            reserved = spec.OP_COLORS < op < spec.OP_STEP
+        if reserved:
+            probe.refuse_ops(ops.run() + bytes((op, 1, 0, 0, 0, 0, 0)), spec.CODE_OP, 1)
+
+
+@check(
+    "11", "count-form", "a LEB128 not in its shortest form, too long or too large is refused: COUNT"
+)
+def count_form(probe: Probe) -> None:
+    for tail in (b"\x80\0", b"\x9f\x80\0", b"\xff" * 5 + b"\1", b"\xe0\xff\xff\xff\x0f"):
+        for op in (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT):
+            prefixed(probe, bytes((op | 31,)) + tail, spec.CODE_COUNT)
+
+
+@check("11", "truncated", "an op that the payload cuts off is refused: TRUNCATED, at its op byte")
+def truncated(probe: Probe) -> None:
+    said = probe.said
+    place = ops.xyz(said, (0, 0, 0))
+    whole = [
+        ops.pen(said, 1),
+        ops.move(said, (0, 0, 0)),
+        bytes((spec.OP_STEP, 4, 0, 0)),
+        bytes((spec.OP_FROM,)) + place + b"\4\0\0",
+        ops.literal(said, [1] * 9),
+        bytes((spec.OP_RUN | 31, 0x9F, 0x80))[:2] + b"\1",
+        bytes((spec.OP_SKIP | 31, 0xFF, 0xFF, 0xFF, 0x7F)),
+    ]
+    more = {
+        "LINE": bytes((spec.OP_LINE,)) + place,
+        "BOX": bytes((spec.OP_BOX,)) + place,
+        "DOTS": bytes((spec.OP_DOTS, 1)) + place + place,
+        "OCT": bytes((spec.OP_OCT | 2,)) + place + b"\3\1\1",
+        "DIFF": bytes((spec.OP_DIFF | 4, 0, 0, 0)),
+        "PALETTE": ops.colors(3, [(1, 2, 3), (4, 5, 6)]),
+    }
+    whole += [op for name, op in more.items() if said.has(name)]
+    for op in whole:
+        for size in range(1, len(op)):
+            probe.refuse_ops(op[:size], spec.CODE_TRUNCATED)
+        probe.refuse_ops(ops.run() + op[:-1], spec.CODE_TRUNCATED, 1)
+
+
+@check("11", "padding", "unused bits of crumbs and bytes behind END that are not 0: PADDING")
+def padding(probe: Probe) -> None:
+    said = probe.said
+    place = ops.xyz(said, (0, 0, 0))
+    prefixed(probe, b"\0\0\0\1", spec.CODE_PADDING)
+    prefixed(probe, b"\0\x80", spec.CODE_PADDING)
+    for steps in (1, 2, 3, 5):
+        raw = bytearray(-(-steps // 4))
+        raw[-1] = 1 << 2 * (steps % 4)
+        prefixed(probe, bytes((spec.OP_STEP, steps - 1)) + raw, spec.CODE_PADDING)
+        prefixed(
+            probe, bytes((spec.OP_FROM,)) + place + bytes((steps - 1,)) + raw, spec.CODE_PADDING
+        )
+    raw = bytearray((spec.OP_STEP, 0, 0x80))
+    prefixed(probe, bytes(raw), spec.CODE_PADDING)
+
+
+@check("11", "pixel-padding", "so are those of a MONO1 pixel run", formats(spec.FORMAT_MONO1))
+def pixel_padding(probe: Probe) -> None:
+    for n, last in ((1, 2), (7, 0x80), (9, 2), (12, 0x10)):
+        raw = bytes(-(-n // 8) - 1) + bytes((last,))
+        prefixed(probe, bytes((spec.OP_LIT | n - 1,)) + raw, spec.CODE_PADDING)
+
+
+@check("11", "difference-padding", "so is that of a DIFF of odd count", feature("DIFF"))
+def difference_padding(probe: Probe) -> None:
+    for raw in (b"\x10", b"\x01\xf0"):
+        prefixed(probe, bytes((spec.OP_DIFF | 2 * len(raw) - 2,)) + raw, spec.CODE_PADDING)
+
+
+@check(
+    "11", "pixel", "a pixel that MONO1 does not have is refused: PIXEL", formats(spec.FORMAT_MONO1)
+)
+def pixel(probe: Probe) -> None:
+    for value in (2, 3, 128, 255):
+        prefixed(probe, bytes((spec.OP_PEN, value)), spec.CODE_PIXEL)
+
+
+@check("7.8", "move-outside", "the target of a MOVE is on the grid: OUTSIDE")
+def move_outside(probe: Probe) -> None:
+    said = probe.said
+    top = (1 << 8 * said.coordinate_bytes) - 1
+    for axis, side in enumerate(said.grid):
+        for at in {side, top}:
+            place = [0, 0, 0]
+            place[axis] = at
+            if side <= at <= top:
+                prefixed(probe, ops.move(said, place), spec.CODE_OUTSIDE)
+                prefixed(
+                    probe,
+                    bytes((spec.OP_FROM,)) + ops.xyz(said, place) + b"\0\0",
+                    spec.CODE_OUTSIDE,
+                )
+
+
+@check(
+    "7.8", "step-outside", "a step that leaves the grid on any axis is outside, whatever its index"
+)
+def step_outside(probe: Probe) -> None:
+    said = probe.said
+    for octant in range(spec.LIMIT_MAX_OCTANT + 1):
+        main = octant >> 3
+        for bit in (None, 0, 1):
+            axis = main if bit is None else (main + 1 + bit) % 3
+            at = [side // 2 for side in said.grid]
+            at[main] = said.grid[main] - 1 if octant >> main & 1 else 0
+            at[axis] = 0 if octant >> axis & 1 else said.grid[axis] - 1
+            crumb = 0 if bit is None else 1 << bit
+            start = ops.move(said, at)
+            probe.refuse_ops(
+                start + bytes((spec.OP_STEP | octant, 0, crumb)), spec.CODE_OUTSIDE, len(start)
+            )
+
+
+@check(
+    "7.8", "behind-the-end", "a cursor of V is no voxel: a chain, and any count, is outside there"
+)
+def behind_the_end(probe: Probe) -> None:
+    said = probe.said
+    end = ops.skip(said.voxels)
+    place = ops.xyz(said, (0, 0, 0))
+    tries = {
+        "": [ops.run(), ops.skip(1), ops.literal(said, [1]), bytes((spec.OP_STEP, 0, 0))],
+        "LINE": [bytes((spec.OP_LINE,)) + place],
+        "BOX": [bytes((spec.OP_BOX,)) + place],
+        "DIFF": [ops.differences([1])],
+    }
+    for name, several in tries.items():
+        for op in several if not name or said.has(name) else []:
+            probe.refuse_ops(end + op, spec.CODE_OUTSIDE, len(end))
+
+
+@check("7.8", "past-the-end", "nothing goes past the last voxel")
+def past_the_end(probe: Probe) -> None:
+    said = probe.said
+    begin = ops.skip(said.voxels - 1)
+    at = len(begin)
+    for op in (ops.run(2), ops.skip(2), ops.literal(said, [1, 1]), ops.run((1 << 32) - 1)):
+        probe.refuse_ops(begin + op, spec.CODE_OUTSIDE, at)
+    probe.refuse_ops(ops.run(said.voxels + 1), spec.CODE_OUTSIDE)
+    probe.refuse_ops(ops.skip(said.voxels + 1), spec.CODE_OUTSIDE)
+    if said.has("DIFF"):
+        probe.refuse_ops(begin + ops.differences([1, 1]), spec.CODE_OUTSIDE, at)
+
+
+@check("7.8", "shapes-outside", "LINE, BOX and DOTS stay on the grid")
+def shapes_outside(probe: Probe) -> None:
+    said = probe.said
+    for axis, side in enumerate(said.grid):
+        place = [0, 0, 0]
+        place[axis] = side
+        if side >= 1 << 8 * said.coordinate_bytes:
+            continue
+        named = ops.xyz(said, place)
+        if said.has("LINE"):
+            prefixed(probe, bytes((spec.OP_LINE,)) + named, spec.CODE_OUTSIDE)
+        if said.has("BOX"):
+            prefixed(probe, bytes((spec.OP_BOX,)) + named, spec.CODE_OUTSIDE)
+        if said.has("DOTS"):
+            dots = bytes((spec.OP_DOTS, 1)) + ops.xyz(said, (0, 0, 0)) + named
+            prefixed(probe, dots, spec.CODE_OUTSIDE)
+
+
+@check("7.8", "bricks-outside", "what a brick writes is on the grid", feature("OCT"))
+def bricks_outside(probe: Probe) -> None:
+    said = probe.said
+    top = (1 << 8 * said.coordinate_bytes) - 1
+    for axis, side in enumerate(said.grid):
+        for level in range(spec.LIMIT_MAX_LEVEL + 1):
+            place = [0, 0, 0]
+            place[axis] = -(-side >> level)
+            head = bytes((spec.OP_OCT | level,)) + ops.xyz(said, place)
+            if place[axis] <= top:
+                prefixed(probe, head + (b"\0" if level else b""), spec.CODE_OUTSIDE)
+            place[axis] = (side - 1) >> level
+            head = bytes((spec.OP_OCT | level,)) + ops.xyz(said, place)
+            if side % (1 << level):
+                prefixed(probe, head + b"\0", spec.CODE_OUTSIDE)
+
+
+@check("7.8", "colors-outside", "entries behind the palette are outside", feature("PALETTE"))
+def colors_outside(probe: Probe) -> None:
+    prefixed(probe, ops.colors(255, [(1, 2, 3), (1, 2, 3)]), spec.CODE_OUTSIDE)
+    prefixed(probe, ops.colors(240, [(1, 2, 3)] * 17), spec.CODE_OUTSIDE)
+
+
+@check("11", "order-of-packet", "a packet is checked in the order of the table of section 11")
+def order_of_packet(probe: Probe) -> None:
+    bad = b"\x1f"
+    for packet, code, offset in (
+        (data(99, 9, bad, 2), spec.CODE_FIELD, 0),
+        (data(99, 9, bad), spec.CODE_SEQUENCE, 1),
+        (data(0, 9, bad, COMMIT), spec.CODE_FRAME, 2),
+        (body(spec.TYPE_STATUS, 1, 9, 1, b"\1"), spec.CODE_LENGTH, 0),
+        (hello(0, more=b"\0"), spec.CODE_LENGTH, 0),
+    ):
+        probe.open()
+        probe.refuse(packet, code, offset)
+    probe.open()
+    probe.draw(b"")
+    probe.refuse(data(1, 5, bad, 0), spec.CODE_FRAME, 2)
+    probe.open()
+    probe.draw(b"", commit=True)
+    probe.await_shown(0, [probe.state])
+    probe.sync()
+    probe.refuse(data(1, 0, bad, 0), spec.CODE_FRAME, 2)
+    probe.open()
+    probe.draw(b"")
+    probe.refuse(data(1, 0, bad, 0), spec.CODE_FRAME, 0)
+
+
+@check("11", "order-of-read", "so is a READ", feature("READ"))
+def order_of_read(probe: Probe) -> None:
+    v = probe.said.voxels
+    framed = bytearray(read(v, 0, 9, 2, reserved=1))
+    framed[2] = 1
+    probe.refuse(bytes(framed) + b"\0", spec.CODE_LENGTH, 0)
+    probe.refuse(bytes(framed), spec.CODE_FIELD, 0)
+    framed[0] &= 0xF0
+    probe.refuse(bytes(framed), spec.CODE_FIELD, 2)
+    framed[2] = 0
+    probe.refuse(bytes(framed), spec.CODE_FIELD, 3)
+    probe.refuse(read(v, 0), spec.CODE_FIELD, 8)
+    probe.refuse(read(v, 1), spec.CODE_OUTSIDE, 4)
+
+
+@check(
+    "11", "first-op-first", "ops are checked from first to last, and the first fault is reported"
+)
+def first_op_first(probe: Probe) -> None:
+    said = probe.said
+    outside = ops.run(said.voxels + 1)
+    probe.refuse_ops(outside + b"\x1f", spec.CODE_OUTSIDE)
+    probe.refuse_ops(b"\x1f" + outside, spec.CODE_OP)
+    probe.refuse_ops(ops.run() + outside + b"\0\1", spec.CODE_OUTSIDE, 1)
+    probe.refuse_ops(ops.run() + bytes((spec.OP_RUN | 31, 0x80, 0)) + b"\x1f", spec.CODE_COUNT, 1)
+
+
+@check("11", "order-of-op", "within an op the faults come in the table's order")
+def order_of_op(probe: Probe) -> None:
+    said = probe.said
+    end = ops.skip(said.voxels)
+    at = len(end)
+    probe.refuse_ops(end + bytes((spec.OP_STEP, 0, 0x04)), spec.CODE_PADDING, at)
+    probe.refuse_ops(end + bytes((spec.OP_STEP, 8, 0x04)), spec.CODE_TRUNCATED, at)
+    probe.refuse_ops(end + bytes((spec.OP_LIT | 31, 0x80, 0)), spec.CODE_COUNT, at)
+    probe.refuse_ops(end + bytes((spec.OP_LIT | 31, 5)), spec.CODE_TRUNCATED, at)
+    if said.format == spec.FORMAT_MONO1:
+        probe.refuse_ops(end + bytes((spec.OP_LIT, 2)), spec.CODE_PADDING, at)
+    if said.has("DIFF"):
+        probe.refuse_ops(end + bytes((spec.OP_DIFF, 0x10)), spec.CODE_PADDING, at)
+    if said.has("OCT"):
+        far = (1 << 8 * said.coordinate_bytes) - 1
+        head = bytes((spec.OP_OCT | 2,)) + ops.xyz(said, (far, far, far))
+        probe.refuse_ops(head, spec.CODE_TRUNCATED)
+        probe.refuse_ops(head + b"\3\0", spec.CODE_TRUNCATED)
+        probe.refuse_ops(head + b"\3\0\0", spec.CODE_OUTSIDE)
+    if said.has("PALETTE"):
+        probe.refuse_ops(ops.colors(255, [(1, 2, 3)] * 2)[:-1], spec.CODE_TRUNCATED)
+
+
+@check(
+    "11", "anything", "whatever the ops, they are drawn or refused as sections 7 and 11 say", seen
+)
+def anything(probe: Probe) -> None:
+    said, rng = probe.said, probe.rng
+    done = 0
+    while done < 60:
+        payload = bytearray(ops.program(said, rng, min(said.max_payload, 60)))
+        for _ in range(rng.randint(1, 3)):
+            payload[rng.randrange(len(payload))] = rng.randrange(256)
+        cut = (
+            bytes(payload[: rng.randint(1, len(payload))]) if rng.random() < 0.3 else bytes(payload)
+        )
+        try:
+            _Cautious(said, Page()).draw(cut)
+        except _TooMuch:
+            continue
+        except Refused as refused:
+            if not _is_unclear(cut, refused):
+                probe.refuse_ops(cut, refused.code, refused.at)
+                done += 1
+        else:
+            probe.open()
+            probe.show(cut)
+            done += 1
+
+
+def _is_unclear(payload: bytes, refused: Refused) -> bool:
+    """Tell whether a LEB128 is both too long and cut off: the document names no order for that."""
+    tail = payload[refused.at + 1 :]
+    return len(tail) == 5 and all(byte & 128 for byte in tail)
+
+
+@check("11", "flags-of-commit", "a refused COMMIT shows nothing", seen)
+def flags_of_commit(probe: Probe) -> None:
+    probe.show(b"")
+    probe.ask(data(1, 1, ops.run() + b"\x1f", CLEAR | COMMIT))
+    probe.open()
+    probe.let_ticks_pass()
+    probe.sync()
+    probe.demand_ack(probe.state, shown=0, pending=0)
+    probe.look(probe.state, Page())

@@ -1,0 +1,67 @@
+"""What was on display before the examination, and its way back there.
+
+The ops of a PAGE are ops of a DATA packet, too: behind a SKIP to where they begin they draw the
+same pixels (sections 7 and 10). The palette cannot be read, so that it is not brought back.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from voxdisplay.conformance import ops, packets
+from voxdisplay.conformance.probe import Broken, Probe
+from voxdisplay.wire import spec
+
+_MOST_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A picture as the device told it: payloads that draw it, and its digest."""
+
+    payloads: tuple[bytes, ...]
+    digest: int
+
+
+def keep(probe: Probe) -> Kept | None:
+    """Read what is on display; None if that cannot be, or takes too long."""
+    said = probe.said
+    until_s = time.monotonic() + _MOST_S
+    payloads, at = [], 0
+    try:
+        probe.sync()
+        if not said.has("READ") or probe.state.kind != spec.TYPE_ACK:
+            return None
+        digest = probe.state.digest
+        while at < said.voxels:
+            page = probe.ask_page(packets.read(at, said.voxels - at))
+            probe.unpack(page, at, said.voxels - at)  # is it a picture at all?
+            if time.monotonic() > until_s:
+                return None
+            payloads.append(ops.skip(at) + page.tail)
+            at += page.count
+    except Broken:
+        return None
+    return Kept(tuple(payloads), digest)
+
+
+def put_back(probe: Probe, kept: Kept | None) -> str:
+    """Show what was kept, or nothing; say what is on display now."""
+    try:
+        probe.open()
+        if kept:
+            try:
+                for number, payload in enumerate(kept.payloads, 1):
+                    probe.draw(payload, commit=number == len(kept.payloads))
+                ack = probe.await_shown(0, [probe.state])
+            except Broken:
+                probe.open()
+            else:
+                same = ack.digest == kept.digest
+                return "as it was" if same else "as it was, but for the palette or the digest"
+        probe.draw(b"", commit=True)
+        probe.await_shown(0, [probe.state])
+    except Broken:
+        return "unknown: the device did not answer any more"
+    return "dark"

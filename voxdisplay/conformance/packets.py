@@ -1,0 +1,225 @@
+"""Packets as bytes, and bytes as packets, as plainly as sections 3 and 4 of protocol.md say it.
+
+A host's packet is written as its *body*: header and payload, as in the dialogues of section 17.5.
+The kit must be able to send what is wrong, so nothing here keeps anybody from it.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from voxdisplay.wire import spec
+
+CLEAR, COMMIT = spec.DATA_FLAG_CLEAR, spec.DATA_FLAG_COMMIT
+BACK = spec.READ_FLAG_BACK
+SHOWN, PENDING, ASKED = spec.ACK_FLAG_SHOWN, spec.ACK_FLAG_PENDING, spec.ACK_FLAG_ASKED
+
+HEADER_BYTES = 3
+CHECK_BYTES = 4
+_SIZES = {1: "B", 2: "H", 4: "I"}
+LAYOUTS = {
+    spec.TYPE_ACK: spec.LAYOUT_ACK,
+    spec.TYPE_INFO: spec.LAYOUT_INFO,
+    spec.TYPE_PAGE: spec.LAYOUT_PAGE,
+    spec.TYPE_ERROR: spec.LAYOUT_ERROR,
+}
+_STRUCTS = {
+    kind: struct.Struct("<" + "".join(_SIZES[size] for _, _, size in layout))
+    for kind, layout in LAYOUTS.items()
+}
+TYPE_NAMES = {
+    value: name.removeprefix("TYPE_") for name, value in vars(spec).items() if name[:5] == "TYPE_"
+}
+CODE_NAMES = {
+    value: name.removeprefix("CODE_") for name, value in vars(spec).items() if name[:5] == "CODE_"
+}
+_FLAG_NAMES = {
+    spec.TYPE_DATA: {CLEAR: "CLEAR", COMMIT: "COMMIT"},
+    spec.TYPE_READ: {BACK: "BACK"},
+    spec.TYPE_PAGE: {BACK: "BACK"},
+    spec.TYPE_ACK: {SHOWN: "SHOWN", PENDING: "PENDING", ASKED: "ASKED"},
+}
+
+
+# -- what a host sends
+
+
+def body(kind: int, flags: int = 0, seq: int = 0, frame: int = 0, payload: bytes = b"") -> bytes:
+    """Give header and payload of any packet."""
+    return bytes((kind << 4 | flags, seq & 255, frame & 255)) + payload
+
+
+def hello(session: int, major: int = spec.VERSION_MAJOR, more: bytes = b"\0\0") -> bytes:
+    """Give a HELLO; ``more`` is all that follows its session."""
+    return body(spec.TYPE_HELLO, payload=struct.pack("<BH", major, session) + more)
+
+
+def data(seq: int, frame: int, ops: bytes = b"", flags: int = CLEAR) -> bytes:
+    """Give a DATA packet."""
+    return body(spec.TYPE_DATA, flags, seq, frame, ops)
+
+
+def status(tag: int) -> bytes:
+    """Give a STATUS."""
+    return body(spec.TYPE_STATUS, seq=tag)
+
+
+def read(start: int, count: int, tag: int = 0, flags: int = 0, reserved: int = 0) -> bytes:
+    """Give a READ."""
+    return body(spec.TYPE_READ, flags, tag, payload=struct.pack("<BII", reserved, start, count))
+
+
+# -- the wire
+
+
+def stuff(packet: bytes) -> bytes:
+    """Encode by COBS, without the 00 that ends a packet."""
+    out, group = bytearray(), bytearray()
+    for byte in packet:
+        if len(group) == 254:
+            out += b"\xff" + group
+            group.clear()
+        if byte:
+            group.append(byte)
+        else:
+            out += bytes((len(group) + 1,)) + group
+            group.clear()
+    return bytes(out) + bytes((len(group) + 1,)) + group
+
+
+def unstuff(segment: bytes) -> bytes | None:
+    """Decode COBS; None if a code byte asks for more bytes than there are."""
+    out, at = bytearray(), 0
+    while at < len(segment):
+        code = segment[at]
+        if at + code > len(segment):
+            return None
+        out += segment[at + 1 : at + code]
+        at += code
+        if code < 255 and at < len(segment):
+            out.append(0)
+    return bytes(out)
+
+
+def wire(packet: bytes) -> bytes:
+    """Give what goes on the wire for a body: with its check value, COBS, and the 00."""
+    return stuff(packet + zlib.crc32(packet).to_bytes(CHECK_BYTES, "little")) + b"\0"
+
+
+def wire_size(payload: int) -> int:
+    """Give the most bytes that a payload of this size may have on the wire."""
+    size = payload + spec.LIMIT_OVERHEAD
+    return size + -(-size // 254) + 1
+
+
+def unwire(segment: bytes, longest: int = spec.LIMIT_MAX_PAYLOAD) -> bytes | None:
+    """Give the body in a segment of at least 8 bytes; None if it is damaged."""
+    packet = unstuff(segment)
+    if packet is None or not spec.LIMIT_OVERHEAD <= len(packet) <= longest + spec.LIMIT_OVERHEAD:
+        return None
+    inner = packet[:-CHECK_BYTES]
+    return inner if zlib.crc32(inner) == int.from_bytes(packet[-CHECK_BYTES:], "little") else None
+
+
+def damage(stream: bytes, longest: int) -> int:
+    """Count the damaged segments of a stream that ends with 00, as section 3 defines them."""
+    return sum(
+        len(segment) >= spec.LIMIT_MIN_SEGMENT and unwire(segment, longest) is None
+        for segment in stream.split(b"\0")
+    )
+
+
+# -- what a device answers
+
+
+class NoSuchFieldError(AttributeError):
+    """An answer is of another type than it must be: it does not have what was asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A packet of a device. The fields of its type's layout are attributes, too.
+
+    Of an ACK, ``next`` is another name for ``seq``.
+    """
+
+    body: bytes
+
+    @property
+    def kind(self) -> int:
+        """Type, section 4."""
+        return self.body[0] >> 4
+
+    @property
+    def flags(self) -> int:
+        """Flags of the type."""
+        return self.body[0] & 15
+
+    @property
+    def seq(self) -> int:
+        """Byte 1 of the header."""
+        return self.body[1]
+
+    @property
+    def frame(self) -> int:
+        """Byte 2 of the header."""
+        return self.body[2]
+
+    @property
+    def tail(self) -> bytes:
+        """What follows the fields of the layout."""
+        return self.body[HEADER_BYTES + _STRUCTS[self.kind].size :]
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is of a device's type and long enough for that type's fields."""
+        layout = _STRUCTS.get(self.kind)
+        return layout is not None and len(self.body) >= HEADER_BYTES + layout.size
+
+    def __getattr__(self, name: str) -> int:
+        if name == "next":
+            return self.seq
+        layout = LAYOUTS.get(self.kind, ())
+        for (field, _, _), value in zip(layout, self._values(), strict=True):
+            if field == name:
+                return int(value)
+        raise NoSuchFieldError(f"no field {name!r} in {self}")
+
+    def _values(self) -> tuple[int, ...]:
+        layout = _STRUCTS.get(self.kind)
+        return layout.unpack_from(self.body, HEADER_BYTES) if layout else ()
+
+    def is_a(self, kind: int) -> bool:
+        """Tell whether it is of a type."""
+        return self.kind == kind
+
+    def __str__(self) -> str:
+        return describe(self.body)
+
+
+def describe(packet: bytes) -> str:
+    """Say in words what a body is: ``DATA CLEAR|COMMIT seq 3 frame 1``."""
+    kind, flags = packet[0] >> 4, packet[0] & 15
+    names = [name for bit, name in _FLAG_NAMES.get(kind, {}).items() if flags & bit]
+    rest = flags & ~sum(bit for bit in _FLAG_NAMES.get(kind, {}) if flags & bit)
+    words = [TYPE_NAMES.get(kind, f"type {kind}")]
+    if names or rest:
+        words.append("|".join(names + ([f"flags {rest:X}"] if rest else [])))
+    words.append(f"{'next' if kind == spec.TYPE_ACK else 'seq'} {packet[1]} frame {packet[2]}")
+    answer = Answer(packet)
+    if answer.whole:
+        for (field, _, size), value in zip(LAYOUTS[kind], answer._values(), strict=True):  # noqa: SLF001
+            if field == "code":
+                words.append(f"code {CODE_NAMES.get(value, value)}")
+            elif field != "reserved":
+                is_hex = field in {"session", "boot", "received", "digest", "features"}
+                words.append(f"{field} {value:0{2 * size}X}h" if is_hex else f"{field} {value}")
+        if kind == spec.TYPE_ERROR and answer.tail:
+            words.append(repr(answer.tail[:60].decode(errors="replace")))
+    elif kind == spec.TYPE_HELLO and len(packet) >= HEADER_BYTES + 3:
+        words.append(f"major {packet[3]} session {packet[5]:02X}{packet[4]:02X}h")
+    elif kind == spec.TYPE_READ and len(packet) >= HEADER_BYTES + 9:
+        words.append("start {} count {}".format(*struct.unpack_from("<II", packet, 4)))
+    return " ".join(words)

@@ -1,0 +1,135 @@
+"""What came of an examination, as lines for a person and as one object for a script."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+from operator import attrgetter
+from typing import Any
+
+from voxdisplay.conformance.catalogue import SECTIONS
+from voxdisplay.conformance.probe import Line
+from voxdisplay.conformance.run import Report, Result, Verdict
+from voxdisplay.conformance.said import FEATURES, FORMATS
+
+_LAST_LINES = 8  # of a transcript, unless all is shown
+
+
+def lines(report: Report, *, transcripts: bool) -> Iterator[str]:
+    """Say what is broken, what came of each section, and how it stands as a whole.
+
+    Parameters
+    ----------
+    report : Report
+    transcripts : bool
+        Whether the last packets of each broken check are shown.
+    """
+    for result in report.results:
+        if result.verdict is Verdict.BROKEN:
+            yield from broken(result, transcript=transcripts)
+    ordered = sorted(report.results, key=lambda result: result.check.order)
+    for section, group in groupby(ordered, key=lambda result: result.check.section):
+        counts = _counts([result.verdict for result in group])
+        yield f"{section:>4}  {SECTIONS.get(section, ''):<20}  {counts}"
+    skipped = (result for result in ordered if result.verdict is Verdict.NOT_APPLICABLE)
+    for reason, group in groupby(sorted(skipped, key=attrgetter("reason")), attrgetter("reason")):
+        yield clean(f"not applicable, {reason}: {', '.join(result.check.id for result in group)}")
+    yield _conclusion(report)
+    yield f"on display now: {report.left}"
+
+
+def _counts(verdicts: list[Verdict]) -> str:
+    numbers = {verdict: verdicts.count(verdict) for verdict in Verdict}
+    words = {Verdict.HOLDS: "hold" if numbers[Verdict.HOLDS] > 1 else "holds"}
+    return ", ".join(
+        f"{number} {words.get(verdict, verdict.value)}"
+        for verdict, number in numbers.items()
+        if number
+    )
+
+
+def _conclusion(report: Report) -> str:
+    held = report.count(Verdict.HOLDS)
+    if report.holds:
+        return f"all that was looked at holds: {held} checks"
+    not_run = report.count(Verdict.NOT_RUN)
+    missed = f", {not_run} not run" if not_run else ""
+    return f"{report.count(Verdict.BROKEN)} broken, {held} hold{missed}"
+
+
+def broken(result: Result, *, transcript: bool) -> Iterator[str]:
+    """Say what is wrong: what must be, what was, and what went over the wire."""
+    check = result.check
+    yield f"BROKEN {check.id}"
+    yield f"  section {check.section}: {check.demands}"
+    if result.sent:
+        yield clean(f"  sent:    {str(result.sent).removeprefix('-> ')}")
+    yield clean(f"  must be: {result.must}")
+    yield clean(f"  was:     {result.came}")
+    if result.likely:
+        yield clean(f"  likely:  {result.likely}")
+    if transcript:
+        if len(result.log) > _LAST_LINES:
+            yield f"    ... {len(result.log) - _LAST_LINES} before; -v shows all"
+        yield from transcript_lines(result.log[-_LAST_LINES:])
+    yield ""
+
+
+def transcript_lines(log: tuple[Line, ...]) -> Iterator[str]:
+    """Show what went (->) and came (<-): packets without COBS and check value, as section 17.5."""
+    for line in log:
+        yield clean(f"    {line}")
+
+
+def clean(text: str) -> str:
+    """Keep a device's text from steering a terminal."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def as_json(port: str, report: Report) -> dict[str, Any]:
+    """Give all of it for a script; transcripts of what is broken."""
+    said = report.said
+    return {
+        "port": port,
+        "device": said
+        and {
+            "name": said.name,
+            "firmware": said.firmware,
+            "serial": said.serial,
+            "size": list(said.grid),
+            "format": FORMATS.get(said.format, str(said.format)).lower(),
+            "refresh_hz": said.refresh / 1000,
+            "max_payload_bytes": said.max_payload,
+            "rx_buffer_bytes": said.rx_buffer,
+            "features": [name.lower() for name in FEATURES if said.has(name)],
+        },
+        "conforms": report.holds,
+        "counts": {_key(verdict): report.count(verdict) for verdict in Verdict},
+        "on_display": report.left,
+        "checks": [_result_json(result) for result in report.results],
+    }
+
+
+def _key(verdict: Verdict) -> str:
+    return verdict.value.replace(" ", "_")
+
+
+def _result_json(result: Result) -> dict[str, Any]:
+    is_broken = result.verdict is Verdict.BROKEN
+    return {
+        "section": result.check.section,
+        "name": result.check.name,
+        "demands": result.check.demands,
+        "verdict": _key(result.verdict),
+        "sent_hex": result.sent.data.hex(" ").upper() if is_broken and result.sent else None,
+        "must": result.must or None,
+        "was": result.came or None,
+        "likely": result.likely or None,
+        "reason": result.reason or None,
+        "transcript": [
+            {"sent": line.sent, "hex": line.data.hex(" ").upper(), "text": line.text}
+            for line in result.log
+        ]
+        if is_broken
+        else None,
+    }

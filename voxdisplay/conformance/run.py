@@ -1,0 +1,265 @@
+"""One check after the other, and what came of each. Prints nothing."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
+from voxdisplay.conformance import first_contact
+from voxdisplay.conformance.catalogue import CHECKS, Check
+from voxdisplay.conformance.keeping import keep, put_back
+from voxdisplay.conformance.packets import NoSuchFieldError
+from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Silent
+from voxdisplay.conformance.said import FORMATS, Said
+from voxdisplay.errors import TransportError
+from voxdisplay.transport import Transport
+from voxdisplay.wire import spec
+
+_T = TypeVar("_T")
+_DEAF = 3  # checks in a row without any answer, and the device is given up
+
+
+class Verdict(enum.Enum):
+    """What came of a check."""
+
+    HOLDS = "holds"
+    BROKEN = "broken"
+    NOT_APPLICABLE = "not applicable"
+    NOT_RUN = "not run"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came of one check.
+
+    Attributes
+    ----------
+    check : Check
+    verdict : Verdict
+    must, came, likely : str
+        If it is broken: what the document demands here, what was, and the probable mistake.
+    reason : str
+        If it was not made: why.
+    log : tuple of Line
+        What went over the wire, oldest first.
+    """
+
+    check: Check
+    verdict: Verdict
+    must: str = ""
+    came: str = ""
+    likely: str = ""
+    reason: str = ""
+    log: tuple[Line, ...] = ()
+
+    @property
+    def sent(self) -> Line | None:
+        """The latest packet that was sent and did not only ask."""
+        asking = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
+        lines = [line for line in self.log if line.sent]
+        told = [line for line in lines if line.data[0] not in asking]
+        return (told or lines)[-1] if lines else None
+
+
+@dataclass(slots=True)
+class Report:
+    """What came of an examination.
+
+    Attributes
+    ----------
+    said : Said or None
+        What the device announced, None if it did not answer.
+    results : list of Result
+        In the order of the checks.
+    left : str
+        What is on display now.
+    """
+
+    said: Said | None = None
+    results: list[Result] = field(default_factory=list)
+    left: str = "unknown"
+
+    def count(self, verdict: Verdict) -> int:
+        """Count the checks of which this came."""
+        return sum(result.verdict is verdict for result in self.results)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check that concerns the device was made, and holds."""
+        return not self.count(Verdict.BROKEN) and not self.count(Verdict.NOT_RUN)
+
+
+def chosen(patterns: Iterable[str]) -> list[Check]:
+    """Give the checks that any of the patterns names; all, if there is no pattern.
+
+    Raises
+    ------
+    ValueError
+        If a pattern names none.
+    """
+    patterns = list(patterns)
+    for pattern in patterns:
+        if not any(check.matches(pattern) for check in CHECKS):
+            raise ValueError(f"no check is named by {pattern!r}")
+    return [
+        check
+        for check in CHECKS
+        if not patterns or any(check.matches(pattern) for pattern in patterns)
+    ]
+
+
+def examine(
+    pipe: Transport,
+    only: Iterable[str] = (),
+    *,
+    timeout_s: float = 1.0,
+    opening_s: float = 5.0,
+    baud: int = 115200,
+    seed: int = 0,
+    greeted: Callable[[Said, bool], object] | None = None,
+    ended: Callable[[Result], object] | None = None,
+) -> Report:
+    """Examine the device at the other end of a pipe.
+
+    Parameters
+    ----------
+    pipe : Transport
+    only : iterable of str
+        Sections, names or patterns of checks; all, if there are none.
+    timeout_s, opening_s, baud, seed
+        As of `Probe`.
+    greeted : callable, optional
+        Is told what the device announced, and whether its picture could be kept, before anything
+        is drawn.
+    ended : callable, optional
+        Is told what came of each check.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    ValueError
+        If ``only`` names no check.
+    """
+    selected = chosen(only)
+    probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed)
+    report = Report()
+    stranger = _meet(probe)
+    if stranger:
+        report.results += _none(stranger, selected)
+        if ended:
+            for result in report.results:
+                ended(result)
+        return report
+    report.said = probe.said
+    kept = _quietly(lambda: keep(probe))
+    if greeted:
+        greeted(probe.said, kept is not None)
+    try:
+        for result in _each(probe, selected):
+            report.results.append(result)
+            if ended:
+                ended(result)
+    finally:  # also when somebody has seen enough
+        report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
+    return report
+
+
+def _meet(probe: Probe) -> Result | None:
+    """Say hello; give what is wrong if the device cannot be talked to at all."""
+    likely = ""
+    try:
+        met = probe.greet()
+        if not met:
+            likely = first_contact.why_silent(probe)
+    except TransportError as error:
+        met, likely = False, str(error)
+    said = probe.said
+    is_sound = said.format in FORMATS and said.voxels and said.max_payload >= spec.LIMIT_MIN_PAYLOAD
+    if met and is_sound:
+        return None
+    came = str(probe.info) if met else "nothing that could be read"
+    must = "an INFO that says what the device is"
+    return Result(first_contact.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
+
+
+def _none(stranger: Result, selected: list[Check]) -> Iterator[Result]:
+    yield stranger
+    for check in selected:
+        yield Result(check, Verdict.NOT_RUN, reason="the device cannot be talked to")
+
+
+def _each(probe: Probe, selected: list[Check]) -> Iterator[Result]:
+    """Make the checks, until the device or the port is gone."""
+    deaf, gone = 0, ""
+    for check in selected:
+        if gone:
+            yield Result(check, Verdict.NOT_RUN, reason=gone)
+            continue
+        try:
+            result = _make(probe, check)
+            deaf = 0
+        except _Unheard as unheard:
+            result = unheard.result
+            deaf += 1
+            gone = "the device does not answer any more" if deaf == _DEAF else ""
+        except TransportError as error:
+            gone = str(error)
+            result = _broken(probe, check, Broken("the port stays open", gone))
+        yield result
+
+
+class _Unheard(Exception):  # noqa: N818
+    """The device does not even answer HELLO."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__()
+        self.result = result
+
+
+def _make(probe: Probe, check: Check) -> Result:
+    """Make one check, in a session of its own; afterwards the device must answer HELLO."""
+    obstacle = check.obstacle(probe.said)
+    if obstacle:
+        return Result(check, Verdict.NOT_APPLICABLE, reason=obstacle)
+    probe.begin(check.id)
+    result = Result(check, Verdict.HOLDS)
+    try:
+        probe.open()
+        check.run(probe)
+    except NotApplicable as reason:
+        result = Result(check, Verdict.NOT_APPLICABLE, reason=str(reason))
+    except Broken as broken:
+        result = _broken(probe, check, broken)
+    except NoSuchFieldError as field:
+        result = _broken(probe, check, Broken("an answer of another type", str(field)))
+    made = tuple(probe.log)
+    try:
+        probe.open()
+    except Silent as silent:
+        worse = _broken(probe, check, silent)
+        raise _Unheard(result if result.verdict is Verdict.BROKEN else worse) from silent
+    except Broken as restarted:
+        if result.verdict is not Verdict.BROKEN:
+            return _broken(probe, check, restarted)
+        result = replace(result, likely=restarted.likely)
+    return replace(result, log=made)
+
+
+def _broken(probe: Probe, check: Check, broken: Broken) -> Result:
+    return Result(
+        check, Verdict.BROKEN, broken.must, broken.came, broken.likely, log=tuple(probe.log)
+    )
+
+
+def _quietly(do: Callable[[], _T]) -> _T | None:
+    """Do something that a lost port may end."""
+    try:
+        return do()
+    except TransportError:
+        return None

@@ -1,0 +1,114 @@
+"""What a device says of itself in INFO, and what follows from it. Judges nothing.
+
+The strings are cut short rather than refused: a check of its own looks at them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from voxdisplay.conformance import packets
+from voxdisplay.wire import spec
+
+FEATURES = {
+    name.removeprefix("FEATURE_"): bit
+    for name, bit in vars(spec).items()
+    if name.startswith("FEATURE_")
+}
+FORMATS = {
+    value: name.removeprefix("FORMAT_")
+    for name, value in vars(spec).items()
+    if name.startswith("FORMAT_")
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A device's announcement; the names are those of INFO."""
+
+    format: int
+    nx: int
+    ny: int
+    nz: int
+    pages: int = 2
+    max_payload: int = 1024
+    rx_buffer: int = 16384
+    refresh: int = 0
+    features: int = 0
+    boot: int = 0
+    name: str = ""
+    firmware: str = ""
+    serial: str = ""
+
+    @classmethod
+    def of(cls, info: packets.Answer) -> Said:
+        """Take it from an INFO."""
+        texts, at = [], 0
+        for _ in range(3):
+            size = info.tail[at] if at < len(info.tail) else 0
+            texts.append(info.tail[at + 1 : at + 1 + size].decode(errors="replace"))
+            at += 1 + size
+        names = ("format", "nx", "ny", "nz", "pages", "max_payload", "rx_buffer", "refresh")
+        values = {name: getattr(info, name) for name in (*names, "features", "boot")}
+        return cls(**values, name=texts[0], firmware=texts[1], serial=texts[2])
+
+    def has(self, feature: str) -> bool:
+        """Tell whether a feature is announced, by its name in section 5."""
+        return bool(self.features >> FEATURES[feature] & 1)
+
+    @property
+    def grid(self) -> tuple[int, int, int]:
+        """Voxels along x, y and z."""
+        return self.nx, self.ny, self.nz
+
+    @property
+    def voxels(self) -> int:
+        """V of section 2."""
+        return self.nx * self.ny * self.nz
+
+    @property
+    def pixel_bytes(self) -> int:
+        """Bytes of a pixel."""
+        return spec.PIXEL_BYTES[self.format]
+
+    @property
+    def full(self) -> int:
+        """The value of the full pixel."""
+        return 1 if self.format == spec.FORMAT_MONO1 else (1 << 8 * self.pixel_bytes) - 1
+
+    @property
+    def coordinate_bytes(self) -> int:
+        """Bytes of a coordinate."""
+        return 2 if max(self.grid) > 256 else 1
+
+    @property
+    def period_s(self) -> float:
+        """Seconds from a refresh tick to the next; 0 if a swap happens at once."""
+        return 1000 / self.refresh if self.refresh else 0.0
+
+    @property
+    def longest_wire(self) -> int:
+        """Bytes that the longest packet may have on the wire."""
+        return packets.wire_size(self.max_payload)
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether it can be found out at all what is on display."""
+        return self.has("READ") or self.has("DIGEST")
+
+    def index(self, x: int, y: int, z: int) -> int:
+        """Give the place of a voxel in scan order."""
+        return x + self.nx * (y + self.ny * z)
+
+    def place(self, index: int) -> tuple[int, int, int]:
+        """Give the coordinates of an index."""
+        return index % self.nx, index // self.nx % self.ny, index // self.nx // self.ny
+
+    def __str__(self) -> str:
+        features = " ".join(name for name in FEATURES if self.has(name)) or "no features"
+        refresh = f"{self.refresh / 1000:g} Hz" if self.refresh else "swaps at once"
+        return (
+            f"{self.name or 'a display'} {self.firmware}".strip()
+            + f", {self.nx}x{self.ny}x{self.nz} {FORMATS.get(self.format, self.format)}, {refresh},"
+            f" payloads up to {self.max_payload} bytes, credit {self.rx_buffer}; {features}"
+        )
