@@ -1,0 +1,164 @@
+"""tools/annotate.py: a good capture breaks nothing, and one that was tampered with says where."""
+
+import json
+import subprocess
+import sys
+
+import document
+import pytest
+from conftest import ROOT
+
+SCENE = {"type": "segment", "from": [0.5, 0.5, 0.5], "to": [2.5, 4.5, 6.5], "color": "red"}
+# ACK: kind, next, frame, last, session, boot, received, credit, digest, damaged
+DIGEST_AT = 16
+
+
+def annotate(file, *options):
+    command = [sys.executable, ROOT / "tools" / "annotate.py", file, *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory):
+    """The lines of a capture of a push that reads back."""
+    folder = tmp_path_factory.mktemp("capture")
+    scene, file = folder / "scene.json", folder / "capture.jsonl"
+    scene.write_text(json.dumps(SCENE))
+    command = [sys.executable, "-m", "voxdisplay", "push", scene, "--verify", "--capture", file]
+    command += ["--port", "sim:?size=3x5x7&format=index8&features=read,digest"]
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
+    return file.read_text().splitlines()
+
+
+def tampered(lines, kind, change):
+    """The capture with the first packet of a type changed: header and payload, as a bytearray."""
+    out, done = [], False
+    for line in lines:
+        entry = json.loads(line)
+        if "hex" in entry and not done:
+            data = bytes.fromhex(entry["hex"])
+            pieces = []
+            for segment in data.split(b"\0")[:-1]:
+                body = bytearray(document.cobs_decode(segment)[:-4])
+                if body and body[0] >> 4 == kind and not done:
+                    done = True
+                    change(body)
+                pieces.append(document.on_wire(bytes(body)) if body else b"\0")
+            entry["hex"] = b"".join(pieces).hex()
+        out.append(json.dumps(entry))
+    assert done
+    return out
+
+
+def explained(tmp_path, lines, *options):
+    file = tmp_path / "capture.jsonl"
+    file.write_text("\n".join(lines))
+    return annotate(file, *options)
+
+
+def test_every_packet_and_op_is_explained(tmp_path, captured):
+    said = explained(tmp_path, captured)
+    assert said.returncode == 0, said.stdout + said.stderr
+    for word in ("HELLO", "INFO", "DATA CLEAR|COMMIT", "ACK", "SHOWN", "READ", "PAGE", "3x5x7"):
+        assert word in said.stdout
+    assert "is on display: 7 voxels lit" in said.stdout
+    assert "the pixels are those of the frame on display" in said.stdout
+    assert "nothing breaks protocol.md" in said.stdout
+
+
+def test_for_scripts(tmp_path, captured):
+    rows = [
+        json.loads(line) for line in explained(tmp_path, captured, "--json").stdout.split("\n")[:-1]
+    ]
+    assert {row["to"] for row in rows} == {"host", "device"}
+    assert all(note["section"] is None for row in rows for note in row["notes"])
+    assert sum(row["wire_bytes"] for row in rows if row["to"] == "device") > 30
+
+
+def test_a_bad_line_breaks_nothing(tmp_path):
+    file = tmp_path / "capture.jsonl"
+    command = [
+        sys.executable,
+        "-m",
+        "voxdisplay",
+        "push",
+        "examples/trefoil.json",
+        "--capture",
+        file,
+    ]
+    command += ["--port", "sim:?fault=flip:1e-3&seed=2&max_payload=200"]
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
+    said = annotate(file)
+    assert said.returncode == 0, said.stdout
+    assert "sent again" in said.stdout
+    assert "damaged segment" in said.stdout
+
+
+def set_byte(at, value):
+    return lambda body: body.__setitem__(at, value)
+
+
+def flip(at):
+    return lambda body: body.__setitem__(at, body[at] ^ 1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "section", "text"),
+    [
+        (1, set_byte(1, 3), "9.1", "out of turn"),
+        (1, set_byte(2, 5), "6", "frame 5 follows"),
+        (1, set_byte(3, 0x07), "11", "must be refused: OP"),
+        (3, lambda body: body.__setitem__(slice(4, 6), bytes(2)), "5", "session 0"),
+        (5, set_byte(3, 1), "10", "reserved bits"),
+        (8, set_byte(1, 9), "9", "never sent"),
+        (10, set_byte(8, 200), "10", "covers 200 voxels"),
+        (10, flip(13), "10", "shown was"),
+    ],
+)
+def test_what_breaks_the_document_is_said(tmp_path, captured, kind, change, section, text):
+    said = explained(tmp_path, tampered(captured, kind, change), "--quiet")
+    assert said.returncode == 1, said.stdout
+    assert f"section {section}:" in said.stdout
+    assert text in said.stdout
+
+
+def test_a_digest_is_computed_again(tmp_path, captured):
+    said = explained(tmp_path, tampered(only_shown(captured), 8, flip(DIGEST_AT)), "--quiet")
+    assert "section 8: the digest is" in said.stdout
+
+
+def only_shown(lines):
+    """Drop the ACKs before the swap."""
+    out = []
+    for line in lines:
+        entry = json.loads(line)
+        if entry.get("to") == "host":
+            kept = []
+            for segment in bytes.fromhex(entry["hex"]).split(b"\0")[:-1]:
+                body = document.cobs_decode(segment)[:-4]
+                if body and not (body[0] >> 4 == 8 and not body[0] & 1):
+                    kept.append(document.on_wire(body))
+            entry["hex"] = b"".join(kept).hex()
+        out.append(json.dumps(entry))
+    return out
+
+
+def test_credit_is_counted(tmp_path, captured):
+    """INFO with a small buffer: what the host then sends is too much for it."""
+
+    def small(body):
+        body[20:24] = (70).to_bytes(4, "little")
+
+    said = explained(tmp_path, tampered(captured, 9, small), "--quiet")
+    assert "section 9.2: credit is exceeded" in said.stdout
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", '{"voxdisplay_capture": 9}', "[1]", '{"voxdisplay_capture": 1}\n{"s": 0}']
+)
+def test_what_is_no_capture(tmp_path, text):
+    file = tmp_path / "no.jsonl"
+    file.write_text(text)
+    said = annotate(file)
+    assert said.returncode == (0 if not text else 2)
+    assert "Traceback" not in said.stderr
