@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,6 +13,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+# A shell starts what runs in the background with SIGINT ignored, and children inherit that: the
+# programs that tests interrupt would not hear it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # For a program that hangs; nothing is measured by it. An emulated machine needs more patience.
 DEADLINE_S = 60 * int(os.environ.get("TEST_PATIENCE", "1"))
 
