@@ -1,6 +1,7 @@
 """How much may be on its way, and how long packets should be."""
 
 import pytest
+from rig import Rig, random_frame
 
 from voxdisplay.link.loss import FIRST_PAYLOAD, OVERHEAD_BYTES, SHORTEST_PAYLOAD, Loss
 from voxdisplay.link.pace import LEAST_BYTES, LEAST_PACKETS, MOST_PACKETS, Pace
@@ -96,3 +97,19 @@ def test_the_rate_is_told_once_the_line_was_busy():
     assert pace.bytes_per_s is None
     deliver(pace, 10, 1000, at_once=5, trip_s=0.5)
     assert pace.bytes_per_s == pytest.approx(10_000, rel=0.2)
+
+
+def test_a_device_that_starts_again_counts_damage_from_0():
+    rig = Rig(max_payload=300, rx_buffer=4096)
+    rig.present(random_frame(rig.rng))
+    rig.run()
+    rig.device.receive(b"\0" + b"\x0b0123456789\0" * 3)  # three damaged segments
+    rig.present(random_frame(rig.rng))
+    rig.run()
+    before = rig.link.payload_bytes
+    rig.power_cycle()
+    rig.present(random_frame(rig.rng))
+    rig.run()
+    assert rig.restarts == 1
+    assert rig.link.payload_bytes >= before > SHORTEST_PAYLOAD
+    assert rig.link.counters.device_damaged < 10

@@ -229,6 +229,7 @@ class Link:
         self._shown_ticket = 0
         self.info = None
         self._window = Window(0)
+        self._loss.forget_count()
         self._next_frame_id = 0
         for frame in self._frames:
             frame.frame_id, frame.entered = -1, 0
@@ -244,6 +245,7 @@ class Link:
     def renew(self, now: float) -> None:
         """Begin a new session over a new pipe; frames that are not shown yet are sent again."""
         self.stream = PacketStream()
+        self._pace = Pace()  # another line, perhaps
         self._reopen(now)
         self._silence.rest(now)
 

@@ -50,6 +50,10 @@ class Loss:
         self._lost += fresh
         return fresh
 
+    def forget_count(self) -> None:
+        """Note that the device may count from 0 again: it may have started anew."""
+        self._damaged = None
+
     @property
     def best_payload(self) -> int:
         """Bytes of payload that waste least, for all that is known."""
