@@ -132,12 +132,13 @@ class SceneError(VoxDisplayError, ValueError):
     message : str
         What is wrong.
     path : str
-        Where, as a JSON path such as ``$.objects[0].x``; ``$`` is the whole file.
+        Where, as a JSON path such as ``$.objects[0].x``; ``$`` is the whole file, and nothing a
+        file that could not be read.
 
     """
 
     def __init__(self, message: str, *, path: str = "$", hint: str | None = None) -> None:
-        super().__init__(f"{path}: {message}", hint=hint)
+        super().__init__(f"{path}: {message}" if path else message, hint=hint)
         self.path = path
 
 

@@ -291,7 +291,7 @@ class TestHostile:
 class TestLoad:
     def test_missing(self, tmp_path: Path) -> None:
         (tmp_path / "curve.json").write_text("{}")
-        with pytest.raises(SceneError, match=r"no such file: .*curv\.json") as caught:
+        with pytest.raises(SceneError, match=r"^no such file: .*curv\.json") as caught:
             load_scene(tmp_path / "curv.json")
         assert caught.value.hint == "did you mean 'curve.json'?"
         with pytest.raises(SceneError, match="no such file") as caught:

@@ -51,10 +51,11 @@ def load_scene(path: str | Path) -> Scene:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise SceneError(f"no such file: {excerpt(str(path))}", hint=_similar(path)) from None
+        what = f"no such file: {excerpt(str(path))}"
+        raise SceneError(what, path="", hint=_similar(path)) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         what = error.strerror if isinstance(error, OSError) else error
-        raise SceneError(f"cannot read {excerpt(str(path))}: {what}") from error
+        raise SceneError(f"cannot read {excerpt(str(path))}: {what}", path="") from error
     return read_scene(data, folder=path.parent)
 
 
