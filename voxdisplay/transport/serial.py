@@ -172,7 +172,15 @@ class SerialTransport:
 
 
 def _open(port: str, baud: int) -> serial.SerialBase:
-    line = serial.serial_for_url(port, baudrate=baud, timeout=_POLL_S, do_not_open=True)
+    settings: dict[str, Any] = {"baudrate": baud, "timeout": _POLL_S}
+    line: serial.SerialBase
+    if port.lower().startswith("rfc2217:"):
+        from voxdisplay.transport import rfc2217  # noqa: PLC0415 - only what is needed
+
+        line = rfc2217.Serial(None, **settings)
+        line.port = port
+    else:
+        line = serial.serial_for_url(port, do_not_open=True, **settings)
     if isinstance(line, serial.Serial):  # the system's own, perhaps behind spy://
         line.exclusive = True
     line.open()
@@ -211,4 +219,4 @@ def _descriptor(line: serial.SerialBase) -> int | None:
 
 
 def _is_rfc2217(line: serial.SerialBase) -> bool:
-    return type(line).__module__ == "serial.rfc2217"
+    return type(line).__module__ == "voxdisplay.transport.rfc2217"
