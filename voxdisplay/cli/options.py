@@ -6,12 +6,12 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import RATES
+from voxdisplay.baud import DEFAULT_BAUD, RATES, Baud
 from voxdisplay.transport.discovery import all_ports
 
 if TYPE_CHECKING:
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 _C = TypeVar("_C", bound=Callable[..., Any])
 DEFAULT_PORT = "sim:"
-
-
-Baud: TypeAlias = int | Literal["auto"]
 
 
 class BaudType(click.ParamType[Baud]):
@@ -68,29 +65,33 @@ port_option = click.option(
 )
 
 
+baud_option = click.option(
+    "--baud",
+    type=BaudType(),
+    default=str(DEFAULT_BAUD),
+    metavar="RATE",
+    show_default=True,
+    help="Bits per second of a serial line; auto: the fastest at which the display answers, which "
+    "takes some seconds to find.",
+)
+
+
+def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
+    """Give ``--timeout``, with the default of a command that waits for many devices or answers."""
+    return click.option(
+        "--timeout",
+        "timeout_s",
+        type=click.FloatRange(min=0.1),
+        default=default_s,
+        metavar="SECONDS",
+        show_default=True,
+        help="How long the device may be silent.",
+    )
+
+
 def port_options(function: _C) -> _C:
     """Add ``--port``, ``--baud`` and ``--timeout``."""
-    for option in (
-        click.option(
-            "--timeout",
-            "timeout_s",
-            type=click.FloatRange(min=0.1),
-            default=5.0,
-            metavar="SECONDS",
-            show_default=True,
-            help="How long the device may be silent.",
-        ),
-        click.option(
-            "--baud",
-            type=BaudType(),
-            default="115200",
-            metavar="RATE",
-            show_default=True,
-            help="Bits per second of a serial line; auto: the fastest at which the display "
-            "answers, which takes some seconds to find.",
-        ),
-        port_option,
-    ):
+    for option in (timeout_option(), baud_option, port_option):
         function = option(function)
     return function
 
