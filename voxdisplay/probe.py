@@ -54,7 +54,8 @@ def greet(transport: Transport, timeout_s: float) -> Info:
 def said_before(error: TransportClosed, noise: bytes) -> TransportClosed:
     """Give the error for a pipe that ended before HELLO was answered: with what came instead."""
     if not noise:
-        return error
+        hint = "it had not answered HELLO: is it the display's port, and has no other program it?"
+        return TransportClosed(str(error), hint=error.hint or hint)
     return TransportClosed(
         f"{error}; what it had said is no packet: {noise[:24]!r}",
         hint="is this the display's port? Something else answers there",

@@ -84,6 +84,8 @@ def test_files_that_cannot_be_read(run, tmp_path):
         (["push", "x", "--fitt", "none"], ["--fit"]),
         (["push", "x", "--fit", "cover"], ["contain"]),
         (["push", "x", "--timeout", "0"], ["--timeout"]),
+        (["push", "x", "--timeout", "nan"], ["--timeout", "is no time"]),
+        (["push", "x", "--reconnect", "inf"], ["--reconnect"]),
         (["voxelize", PAPER, "-o", "x.obj"], [".npy"]),
         (["voxelize", PAPER, "--clip", "0x5x7"], ["128x128x128"]),
         (["voxelize", PAPER, "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),

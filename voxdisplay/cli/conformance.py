@@ -9,6 +9,7 @@ import click
 from voxdisplay.baud import DEFAULT_BAUD, Baud, open_at
 from voxdisplay.cli.options import (
     DEFAULT_PORT,
+    SecondsType,
     baud_option,
     json_option,
     note,
@@ -41,7 +42,7 @@ _EXIT_BROKEN = 1
 @click.option(
     "--opening",
     "opening_s",
-    type=click.FloatRange(min=0.1),
+    type=SecondsType(0.1),
     default=5.0,
     metavar="SECONDS",
     show_default=True,
@@ -85,7 +86,7 @@ def conformance(
     if as_list:
         _list(selected, as_json=as_json)
         return
-    if not port:
+    if port is None:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
     pipe = open_at(port, baud, opening_s, note)

@@ -60,7 +60,7 @@ class SerialTransport:
             self._serial: Any = _open(port, baud)  # of many kinds, with more than they share
         except _GONE as error:
             raise explain(port, error) from error
-        except ValueError as error:  # a URL that pyserial does not know, or an impossible baud
+        except (ValueError, OverflowError) as error:  # a URL that is unknown, or an absurd rate
             raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
         self._closed = False
         self._descriptor = _descriptor(self._serial)
@@ -94,6 +94,8 @@ class SerialTransport:
             self._serial.baudrate = baud
         except _GONE as error:
             raise ValueError(f"{self.port} has no rate of {baud} Bd: {reason(error)}") from error
+        except OverflowError as error:  # the system has no number for it
+            raise ValueError(f"{self.port} has no rate of {baud} Bd") from error
         self.baud = baud
 
     def read(self, timeout_s: float) -> bytes:
