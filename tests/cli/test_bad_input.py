@@ -1,8 +1,11 @@
 """Bad scenes: an error that names place and remedy, exit code 2, never a traceback."""
 
 import json
+import subprocess
 
 import pytest
+
+from voxdisplay.cli import main
 
 PAPER = "examples/paper-curve.json"
 
@@ -43,10 +46,13 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_bad_scenes(run, scene, name):
+def test_bad_scenes(capsys, scene, name):
     content, words = SCENES[name]
-    refused(run("push", scene(content), "--port", "sim:"), *words)
-    refused(run("voxelize", scene(content)), *words)
+    path = str(scene(content))
+    for arguments in (["push", path, "--port", "sim:"], ["voxelize", path]):
+        code = main(arguments)
+        said = capsys.readouterr()
+        refused(subprocess.CompletedProcess(arguments, code, said.out, said.err), *words)
 
 
 TEXTS = {
