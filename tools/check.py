@@ -15,6 +15,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 # What must be covered in all its branches: the wire and both of its ends.
 COVERED = ["voxdisplay/wire", "voxdisplay/link", "firmware_sim"]
+# Two processes, whatever the machine has: tests wait for other programs, which want a core, too.
+# Each begins with half of the tests; who has none left takes from the other.
+SHARED = ["-n", "2", "--dist", "worksteal"]
 
 
 def steps(*, fast: bool, fix: bool) -> dict[str, list[str]]:
@@ -25,7 +28,8 @@ def steps(*, fast: bool, fix: bool) -> dict[str, list[str]]:
         tests = ["-m", "pytest", "-q", "tests/conformance", "tests/unit/test_architecture.py"]
     else:
         coverage = [f"--cov={package}" for package in COVERED]
-        tests = ["-m", "pytest", "-m", "not slow and not kernel", "--cov-branch", *coverage]
+        tests = ["-m", "pytest", *SHARED, "-m", "not slow and not kernel"]
+        tests += ["--durations=25", "--cov-branch", *coverage]
         tests += ["--cov-report=term-missing:skip-covered", "--cov-fail-under=100"]
     return {
         "format": [*ruff_format, "."],

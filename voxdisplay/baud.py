@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.probe import greet
@@ -18,12 +18,23 @@ from voxdisplay.transport import Transport, open_transport
 if TYPE_CHECKING:
     from voxdisplay.transport.serial import SerialTransport
 
+Baud: TypeAlias = int | Literal["auto"]
 DEFAULT_BAUD: Final = 115_200
 RATES: Final = (
     12_000_000, 8_000_000, 6_000_000, 4_000_000, 3_000_000, 2_000_000, 1_500_000, 1_000_000,
     921_600, 500_000, 460_800, 230_400, 115_200, 57_600, 38_400, 19_200, 9_600,
 )  # fmt: skip
 _EACH_S = 0.35  # long enough for two HELLOs, should the first one's answer begin with noise
+ALL_RATES_S: Final = len(RATES) * _EACH_S
+
+
+def open_at(
+    port: str, baud: Baud, timeout_s: float, note: Callable[[str], None] = lambda _text: None
+) -> Transport:
+    """Open a port at a rate, or at the best one: see `open_at_best_rate`."""
+    if baud == "auto":
+        return open_at_best_rate(port, timeout_s, note)
+    return open_transport(port, baud=baud)
 
 
 def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) -> Transport:

@@ -18,7 +18,7 @@ from typing import Literal, Self, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.baud import DEFAULT_BAUD, open_at_best_rate
+from voxdisplay.baud import DEFAULT_BAUD, open_at
 from voxdisplay.device import DeviceInfo, device_error, device_info
 from voxdisplay.errors import (
     DesyncError,
@@ -43,7 +43,7 @@ from voxdisplay.link import (
 from voxdisplay.pixel import Pixels
 from voxdisplay.probe import new_session, said_before
 from voxdisplay.reconnect import Reconnect
-from voxdisplay.transport import Transport, open_transport
+from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 from voxdisplay.wire.packet import Info, Page
 from voxdisplay.wire.spans import decode_spans
@@ -129,12 +129,7 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
 
     """
     note = note or (lambda _text: None)
-    if not isinstance(port, str):
-        transport = port
-    elif baud == "auto":
-        transport = open_at_best_rate(port, timeout_s, note)
-    else:
-        transport = open_transport(port, baud=baud)
+    transport = open_at(port, baud, timeout_s, note) if isinstance(port, str) else port
     try:
         reconnect = None
         if reconnect_s:

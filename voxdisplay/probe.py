@@ -6,18 +6,12 @@ What a device shows does not change by it, though any session that it had ends. 
 from __future__ import annotations
 
 import secrets
-import threading
 import time
-from collections.abc import Iterable
-from typing import TypeAlias
 
-from voxdisplay.device import DeviceInfo, device_info
-from voxdisplay.errors import TransportClosed, VoxDisplayError
+from voxdisplay.errors import TransportClosed
 from voxdisplay.link import Link
-from voxdisplay.transport import Transport, open_transport
+from voxdisplay.transport import Transport
 from voxdisplay.wire.packet import Info
-
-Answer: TypeAlias = DeviceInfo | str  # who is there, or why nobody is
 
 _LONGEST_WAIT_S = 0.25
 
@@ -60,55 +54,9 @@ def greet(transport: Transport, timeout_s: float) -> Info:
 def said_before(error: TransportClosed, noise: bytes) -> TransportClosed:
     """Give the error for a pipe that ended before HELLO was answered: with what came instead."""
     if not noise:
-        return error
+        hint = "it had not answered HELLO: is it the display's port, and has no other program it?"
+        return TransportClosed(str(error), hint=error.hint or hint)
     return TransportClosed(
         f"{error}; what it had said is no packet: {noise[:24]!r}",
         hint="is this the display's port? Something else answers there",
     )
-
-
-def probe_all(
-    ports: Iterable[str], *, baud: int, timeout_s: float, slack_s: float
-) -> dict[str, Answer]:
-    """Ask at all ports at once who is there.
-
-    Parameters
-    ----------
-    ports : iterable of str
-    baud : int
-        Bits per second of serial lines.
-    timeout_s : float
-        How long to ask.
-    slack_s : float
-        How much longer opening a port may take.
-
-    Returns
-    -------
-    dict of str to DeviceInfo or str
-        What each device says of itself, or what is wrong, in the order of the ports.
-
-    """
-    answers: dict[str, Answer] = dict.fromkeys(ports, "it could not be opened in time")
-
-    def ask(port: str) -> None:
-        try:
-            answers[port] = _probe(port, baud, timeout_s)
-        except VoxDisplayError as error:
-            answers[port] = str(error)
-
-    # One that hangs in the system's call must not keep the program.
-    askers = [threading.Thread(target=ask, args=(port,), daemon=True) for port in answers]
-    for asker in askers:
-        asker.start()
-    end_s = time.monotonic() + timeout_s + slack_s
-    for asker in askers:
-        asker.join(max(0.0, end_s - time.monotonic()))
-    return dict(answers)
-
-
-def _probe(port: str, baud: int, timeout_s: float) -> DeviceInfo:
-    transport = open_transport(port, baud=baud)
-    try:
-        return device_info(greet(transport, timeout_s))
-    finally:
-        transport.close()

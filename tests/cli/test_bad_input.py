@@ -1,8 +1,11 @@
 """Bad scenes: an error that names place and remedy, exit code 2, never a traceback."""
 
 import json
+import subprocess
 
 import pytest
+
+from voxdisplay.cli import main
 
 PAPER = "examples/paper-curve.json"
 
@@ -43,10 +46,13 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_bad_scenes(run, scene, name):
+def test_bad_scenes(capsys, scene, name):
     content, words = SCENES[name]
-    refused(run("push", scene(content), "--port", "sim:"), *words)
-    refused(run("voxelize", scene(content)), *words)
+    path = str(scene(content))
+    for arguments in (["push", path, "--port", "sim:"], ["voxelize", path]):
+        code = main(arguments)
+        said = capsys.readouterr()
+        refused(subprocess.CompletedProcess(arguments, code, said.out, said.err), *words)
 
 
 TEXTS = {
@@ -84,6 +90,8 @@ def test_files_that_cannot_be_read(run, tmp_path):
         (["push", "x", "--fitt", "none"], ["--fit"]),
         (["push", "x", "--fit", "cover"], ["contain"]),
         (["push", "x", "--timeout", "0"], ["--timeout"]),
+        (["push", "x", "--timeout", "nan"], ["--timeout", "is no time"]),
+        (["push", "x", "--reconnect", "inf"], ["--reconnect"]),
         (["voxelize", PAPER, "-o", "x.obj"], [".npy"]),
         (["voxelize", PAPER, "--clip", "0x5x7"], ["128x128x128"]),
         (["voxelize", PAPER, "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),

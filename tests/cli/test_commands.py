@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from voxdisplay.cli.main import cli
+
 PUSH_KEYS = {
     "port", "device", "frame", "voxels", "packets", "wire_bytes", "retransmitted", "elapsed_s",
     "digest", "verified",
@@ -195,3 +197,12 @@ def test_a_capture_that_cannot_be_written_is_said_before_anything_is_sent(run, t
     pushed = run("push", PAPER, "--port", "sim:", "--capture", tmp_path / "no" / "capture.jsonl")
     assert pushed.returncode == 2
     assert "No such file" in pushed.stderr
+
+
+def test_an_option_of_a_port_means_the_same_everywhere():
+    told = {"baud": set(), "timeout_s": set()}
+    for name in ("push", "info", "view", "ports", "conformance"):
+        for option in cli.commands[name].params:
+            if option.name in told:
+                told[option.name].add((option.help, str(option.type), option.metavar))
+    assert [len(words) for words in told.values()] == [1, 1]

@@ -151,6 +151,13 @@ def test_push_ends_with_a_picture_of_what_was_read_back(terminal):
     assert max(len(line) for line in plain(text).splitlines() if HALF in line) <= 59
 
 
+def test_a_picture_on_a_line_whose_rate_was_asked_for(terminal):
+    for command in (["test-pattern"], ["push", TREFOIL]):
+        code, text = terminal(*command, "--port", SMALL, "--baud", "auto").finish()
+        assert code == 0, text
+        assert HALF in text
+
+
 @pytest.mark.parametrize(
     ("more", "how"),
     [

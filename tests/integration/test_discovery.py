@@ -10,11 +10,11 @@ from types import SimpleNamespace
 import pytest
 from plugged import Plug
 
-from voxdisplay import probe
+from voxdisplay import baud
 from voxdisplay.cli import main
 from voxdisplay.cli import ports as command
-from voxdisplay.probe import probe_all
 from voxdisplay.reconnect import Reconnect
+from voxdisplay.roll_call import probe_all
 from voxdisplay.transport import discovery
 from voxdisplay.transport.discovery import FoundPort, all_ports, find_port, serial_ports
 
@@ -127,6 +127,14 @@ def test_probe_for_a_script(there, capsys):
 
 
 @pytest.mark.usefixtures("there")
+def test_probe_at_any_rate(capsys, monkeypatch):
+    monkeypatch.setattr(baud, "RATES", (230_400, 115_200))
+    assert main(["ports", "--probe", "--timeout", "0.1", "--baud", "auto"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert "DISPLAY: cube 7.2" in said[3]
+
+
+@pytest.mark.usefixtures("there")
 def test_without_probe_nothing_is_opened(capsys, monkeypatch):
     monkeypatch.setattr(command, "probe_all", None)
     assert main(["ports", "--json"]) == 0
@@ -135,11 +143,11 @@ def test_without_probe_nothing_is_opened(capsys, monkeypatch):
 
 
 def test_a_port_that_hangs_when_it_is_opened_does_not_keep_the_rest(monkeypatch, there):
-    never, opened = threading.Event(), probe.open_transport
+    never, opened = threading.Event(), baud.open_transport
     monkeypatch.setattr(
-        probe,
+        baud,
         "open_transport",
-        lambda port, **baud: opened("" if port == "hangs" and never.wait(60) else port, **baud),
+        lambda port, **rate: opened("" if port == "hangs" and never.wait(60) else port, **rate),
     )
     answers = probe_all(["hangs", there[0]], baud=115200, timeout_s=0.2, slack_s=0.1)
     assert answers["hangs"] == "it could not be opened in time"

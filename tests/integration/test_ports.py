@@ -76,8 +76,12 @@ def test_a_port_that_does_not_exist(run):
 
 
 @pytest.mark.parametrize(
-    "port", ["tcp://127.0.0.1:1", "tcp://nonsense", "socket://127.0.0.1:1", "nothing://x"]
-)
+    "port",
+    [
+        "tcp://127.0.0.1:1", "TCP://127.0.0.1:1", "tcp://nonsense", "socket://127.0.0.1:1",
+        "nothing://x",
+    ],
+)  # fmt: skip
 def test_ports_that_cannot_be_opened(run, port):
     assert port in pushed(run, port, code=3)
 
@@ -87,6 +91,26 @@ def test_ports_that_cannot_be_opened(run, port):
 )
 def test_emulators_that_there_are_not(run, port, word):
     assert word in pushed(run, port, code=3)
+
+
+@pytest.mark.parametrize("port", ["tcp://::1:5000", "tcp://x:99999", f"tcp://{'a' * 70}:5000"])
+def test_tcp_ports_that_are_mistyped(run, port):
+    assert "write it like tcp://127.0.0.1:5000 or tcp://[::1]:5000" in pushed(run, port, code=3)
+
+
+def test_a_port_that_a_script_left_empty(run):
+    assert "no port was named" in pushed(run, "", code=3)
+
+
+def test_a_link_that_leads_nowhere(run, tmp_path):
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    assert f"{loop} names nothing" in pushed(run, str(loop), code=3)
+
+
+def test_a_rate_that_the_system_has_no_number_for(run, line):
+    said = pushed(run, line.port, "--baud", "4294967295", code=3)
+    assert f"{line.port} cannot be opened" in said
 
 
 def test_a_busy_port(run, line):
@@ -197,6 +221,18 @@ def test_a_web_server_that_hangs_up(run):
             said = pushed(run, port.replace("tcp", kind), code=3)
             assert "HTTP/1.1 400 Bad Request" in said
             assert "Something else answers there" in said
+
+
+class HangsUp(socketserver.BaseRequestHandler):
+    def handle(self):
+        self.request.recv(4096)
+
+
+def test_a_server_that_hangs_up_without_a_word(run):
+    """As one does that serves one client at a time."""
+    with server(HangsUp) as port:
+        said = pushed(run, port, code=3)
+    assert "it had not answered HELLO: is it the display's port" in said
 
 
 def test_a_server_that_greets(run):

@@ -31,7 +31,8 @@ MAY_IMPORT = {
     "view": {"errors", "grid", "pixel", "view"},
     "plan": {"frame", "wire"},
     "baud": {"errors", "probe", "transport"},
-    "probe": {"device", "errors", "link", "transport", "wire"},
+    "probe": {"errors", "link", "transport", "wire"},
+    "roll_call": {"baud", "device", "errors", "probe"},
     "reconnect": {"errors", "probe", "transport"},
     "display": {
         "baud",

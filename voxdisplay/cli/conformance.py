@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from voxdisplay.baud import DEFAULT_BAUD, Baud, open_at
 from voxdisplay.cli.options import (
     DEFAULT_PORT,
+    SecondsType,
+    baud_option,
     json_option,
     note,
     port_option,
     print_json,
     progress_bar,
+    timeout_option,
 )
-from voxdisplay.transport import open_transport
 
 if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
     from voxdisplay.conformance.catalogue import Check
@@ -34,27 +37,12 @@ _EXIT_BROKEN = 1
     at; 2 usage; 3 the port cannot be opened."""
 )
 @port_option
-@click.option(
-    "--baud",
-    type=click.IntRange(min=50),
-    default=115200,
-    metavar="RATE",
-    show_default=True,
-    help="Bits per second of a serial line.",
-)
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=click.FloatRange(min=0.01),
-    default=1.0,
-    metavar="SECONDS",
-    show_default=True,
-    help="How long an answer may take, beyond a refresh period and the time on a serial line.",
-)
+@baud_option
+@timeout_option(1.0)
 @click.option(
     "--opening",
     "opening_s",
-    type=click.FloatRange(min=0.1),
+    type=SecondsType(0.1),
     default=5.0,
     metavar="SECONDS",
     show_default=True,
@@ -73,7 +61,7 @@ _EXIT_BROKEN = 1
 def conformance(
     *,
     port: str | None,
-    baud: int,
+    baud: Baud,
     timeout_s: float,
     opening_s: float,
     only: tuple[str, ...],
@@ -86,6 +74,8 @@ def conformance(
 
     It takes any device behind any kind of port. It draws on the display; afterwards the display is
     as it was, if it can be read back, otherwise dark.
+
+    An answer may take --timeout, and besides a refresh period and its time on a serial line.
     """
     from voxdisplay.conformance import report, run  # noqa: PLC0415 - only what is needed
 
@@ -96,10 +86,10 @@ def conformance(
     if as_list:
         _list(selected, as_json=as_json)
         return
-    if not port:
+    if port is None:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
-    pipe = open_transport(port, baud=baud)
+    pipe = open_at(port, baud, opening_s, note)
     done = 0
     try:
         with progress_bar("checking") as progress:
@@ -119,7 +109,7 @@ def conformance(
                 only,
                 timeout_s=timeout_s,
                 opening_s=opening_s,
-                baud=baud,
+                baud=getattr(pipe, "baud", DEFAULT_BAUD),
                 seed=seed,
                 greeted=lambda said, kept: _announce(port, said, kept=kept),
                 ended=ended,

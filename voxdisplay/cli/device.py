@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 import numpy as np
 
+from voxdisplay.baud import Baud
 from voxdisplay.cli.options import (
-    Baud,
     device_json,
     json_option,
     note,

@@ -6,6 +6,7 @@ Whatever it does then, it unwinds: the port is closed, and the picture is what `
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import sys
@@ -96,10 +97,21 @@ def say(text: str) -> None:
     """Tell a person something, if there still is one."""
     try:
         click.echo(text, err=True)
-    except OSError:
-        # The terminal is gone. What Python would flush at its end goes nowhere, without complaint.
+    except OSError as error:
+        # What Python would flush at its end goes nowhere, without complaint: with the terminal
+        # everything, but with a disk that is full only what was to be said.
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        for stream in (sys.stdout, sys.stderr):
+        for stream in (sys.stdout, sys.stderr) if error.errno == errno.EIO else (sys.stderr,):
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
+
+
+def have_streams() -> None:
+    """Open what the program was started without: a port must not get the number of stderr."""
+    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:  # the lowest that is free
+        continue
+    os.close(nowhere)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115

@@ -12,6 +12,7 @@ import sys
 import click
 
 import voxdisplay as vd
+from voxdisplay.baud import DEFAULT_BAUD, Baud
 from voxdisplay.pixel import Pixels
 
 _COLUMNS, _ROWS = 56, 18
@@ -25,7 +26,7 @@ _BITS_A_VOXEL = 80
 _PATIENCE_S = 0.5
 
 
-def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: int) -> None:
+def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: Baud) -> None:
     """Draw what is on display, if stderr is a terminal that can show it and Pillow is installed.
 
     Parameters
@@ -35,8 +36,8 @@ def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: int
         What it has just shown, and proved by its digest.
     page : ndarray or None
         What was read back, if it was. If not, it is now, if that is cheap; else the frame is drawn.
-    baud : int
-        Speed of the line.
+    baud : int or "auto"
+        Speed of the line; found by asking, it is taken for the usual one.
 
     """
     if not _can_show():
@@ -50,7 +51,8 @@ def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: int
     except vd.MissingExtra:
         return
     info = display.info
-    if page is None and _cheap(info, count, baud):
+    rate = DEFAULT_BAUD if baud == "auto" else baud
+    if page is None and _cheap(info, count, rate):
         page = display.read()
     what = "what was sent, not read back" if page is None else "read back from the display"
     lit = lit_voxels(frame.array() if page is None else page, info.grid, info.format)

@@ -11,7 +11,7 @@ import click
 from voxdisplay import __version__
 from voxdisplay.cli.conformance import conformance
 from voxdisplay.cli.device import clear, info, read
-from voxdisplay.cli.ending import EndedError, ended_by_signals, told_to_end
+from voxdisplay.cli.ending import EndedError, ended_by_signals, have_streams, say, told_to_end
 from voxdisplay.cli.plan import plan_command
 from voxdisplay.cli.ports import ports
 from voxdisplay.cli.preview import preview
@@ -75,6 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command line; give its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
+    have_streams()
     try:
         with ended_by_signals():
             # A command that ends by click's Exit gives its code; all others give nothing.
@@ -84,23 +85,23 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_USAGE
     except (click.Abort, KeyboardInterrupt, EndedError) as why:
         return told_to_end(why)
+    except SystemExit as left:  # click's answer to a reader that has left, and to completion
+        return EXIT_USAGE if left.code else 0
     except VoxDisplayError as error:
         if debug:
             traceback.print_exc()
-        click.echo(f"voxdisplay: {error}", err=True)
+        say(f"voxdisplay: {error}")
         if error.hint:
-            click.echo(f"  {error.hint}", err=True)
+            say(f"  {error.hint}")
         return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
     except OSError as error:  # a pipe's are TransportErrors: what is left is our own output
-        click.echo(f"voxdisplay: the output cannot be written: {error.strerror}", err=True)
+        say(f"voxdisplay: the output cannot be written: {error.strerror}")
         return EXIT_USAGE
     except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
         if debug:
             traceback.print_exc()
-        click.echo(
-            f"voxdisplay: a fault of this program: {type(error).__name__}: {error}", err=True
-        )
-        click.echo("  please report it with what voxdisplay --debug ... prints", err=True)
+        say(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
+        say("  please report it with what voxdisplay --debug ... prints")
         return EXIT_INTERNAL
     return ended if isinstance(ended, int) else 0
 

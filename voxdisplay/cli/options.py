@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import RATES
+from voxdisplay.baud import DEFAULT_BAUD, RATES, Baud
+from voxdisplay.cli.ending import say
 from voxdisplay.transport.discovery import all_ports
 
 if TYPE_CHECKING:
@@ -19,9 +21,25 @@ if TYPE_CHECKING:
 
 _C = TypeVar("_C", bound=Callable[..., Any])
 DEFAULT_PORT = "sim:"
+_LONGEST_S = 1e6
 
 
-Baud: TypeAlias = int | Literal["auto"]
+class SecondsType(click.FloatRange):
+    """A time that the system can wait for."""
+
+    name = "seconds"
+
+    def __init__(self, least: float) -> None:
+        super().__init__(min=least, max=_LONGEST_S)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Read it, or fail with a message."""
+        seconds: float = super().convert(value, param, ctx)
+        if math.isnan(seconds):
+            self.fail(f"{value!r} is no time: write one like 5", param, ctx)
+        return seconds
 
 
 class BaudType(click.ParamType[Baud]):
@@ -68,29 +86,33 @@ port_option = click.option(
 )
 
 
+baud_option = click.option(
+    "--baud",
+    type=BaudType(),
+    default=str(DEFAULT_BAUD),
+    metavar="RATE",
+    show_default=True,
+    help="Bits per second of a serial line; auto: the fastest at which the display answers, which "
+    "takes some seconds to find.",
+)
+
+
+def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
+    """Give ``--timeout``, with the default of a command that waits for many devices or answers."""
+    return click.option(
+        "--timeout",
+        "timeout_s",
+        type=SecondsType(0.1),
+        default=default_s,
+        metavar="SECONDS",
+        show_default=True,
+        help="How long the device may be silent.",
+    )
+
+
 def port_options(function: _C) -> _C:
     """Add ``--port``, ``--baud`` and ``--timeout``."""
-    for option in (
-        click.option(
-            "--timeout",
-            "timeout_s",
-            type=click.FloatRange(min=0.1),
-            default=5.0,
-            metavar="SECONDS",
-            show_default=True,
-            help="How long the device may be silent.",
-        ),
-        click.option(
-            "--baud",
-            type=BaudType(),
-            default="115200",
-            metavar="RATE",
-            show_default=True,
-            help="Bits per second of a serial line; auto: the fastest at which the display "
-            "answers, which takes some seconds to find.",
-        ),
-        port_option,
-    ):
+    for option in (timeout_option(), baud_option, port_option):
         function = option(function)
     return function
 
@@ -98,7 +120,7 @@ def port_options(function: _C) -> _C:
 reconnect_option = click.option(
     "--reconnect",
     "reconnect_s",
-    type=click.FloatRange(min=0),
+    type=SecondsType(0),
     default=0.0,
     metavar="SECONDS",
     help="How long a display that is pulled out is waited for. When it is back, it gets its "
@@ -135,7 +157,7 @@ def open_display(
     capture: TextIO | None = None,
 ) -> vd.Display:
     """Open what ``--port`` names, or the emulator, and say so."""
-    if not port:
+    if port is None:  # and not an empty one, which a script has by mistake
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
     return vd.open(
@@ -145,7 +167,7 @@ def open_display(
 
 def note(text: str) -> None:
     """Tell a person something on stderr."""
-    click.echo(text, err=True)
+    say(text)
 
 
 def print_json(result: dict[str, Any]) -> None:

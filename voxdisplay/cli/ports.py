@@ -9,8 +9,17 @@ from typing import Any
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import device_json, json_option, note, plural, print_json
-from voxdisplay.probe import Answer, probe_all
+from voxdisplay.baud import Baud
+from voxdisplay.cli.options import (
+    baud_option,
+    device_json,
+    json_option,
+    note,
+    plural,
+    print_json,
+    timeout_option,
+)
+from voxdisplay.roll_call import Answer, probe_all
 from voxdisplay.transport.discovery import FoundPort, all_ports
 
 _SLACK_S = 2.0
@@ -21,7 +30,7 @@ _SLACK_S = 2.0
     Examples:
       voxdisplay ports
       voxdisplay ports --probe
-      voxdisplay ports --probe --json
+      voxdisplay ports --probe --baud auto --json
     """
 )
 @click.option(
@@ -31,26 +40,14 @@ _SLACK_S = 2.0
     "restart when their port is opened, and what is no display hears a few bytes that it does "
     "not know.",
 )
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=click.FloatRange(min=0.1),
-    default=3.0,
-    metavar="SECONDS",
-    show_default=True,
-    help="With --probe: how long to ask. All ports are asked at the same time.",
-)
-@click.option(
-    "--baud",
-    type=click.IntRange(min=50),
-    default=115200,
-    metavar="RATE",
-    show_default=True,
-    help="With --probe: bits per second of serial lines.",
-)
+@timeout_option(3.0)
+@baud_option
 @json_option
-def ports(*, probe: bool, timeout_s: float, baud: int, as_json: bool) -> None:
-    """List what can be opened: serial ports and displays on USB."""
+def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
+    """List what can be opened: serial ports and displays on USB.
+
+    With --probe, all are asked at the same time, each for --timeout.
+    """
     found = all_ports()
     answers: dict[str, Answer] = {}
     if probe:

@@ -8,11 +8,10 @@ from typing import Literal, TextIO
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import DEFAULT_BAUD
+from voxdisplay.baud import Baud
 from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
 from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
-    Baud,
     capture_option,
     device_json,
     fit_option,
@@ -113,7 +112,7 @@ def push(
         if preview and page is not None:  # what was shown has been said, if this fails
             save_page(preview, page, display.info)
         if not quiet and not as_json:
-            glimpse(display, frame, page, DEFAULT_BAUD if baud == "auto" else baud)
+            glimpse(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

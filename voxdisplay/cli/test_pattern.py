@@ -9,6 +9,7 @@ import numpy as np
 
 import voxdisplay as vd
 from voxdisplay import pattern
+from voxdisplay.baud import Baud
 from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
     device_json,
@@ -66,7 +67,7 @@ _LEGEND = {
 def test_pattern(
     *,
     port: str | None,
-    baud: int,
+    baud: Baud,
     timeout_s: float,
     name: str,
     brightness: float | None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import voxdisplay as vd
+from voxdisplay.baud import Baud
 from voxdisplay.cli.options import SizeType, note, open_display, port_options
 from voxdisplay.cli.scenes import draw
 
@@ -77,7 +78,7 @@ def view(
     *,
     scene: str | None,
     port: str | None,
-    baud: int,
+    baud: Baud,
     timeout_s: float,
     listen: tuple[str, int],
     no_open: bool,
@@ -137,7 +138,7 @@ def _still(scene: str, display_size: vd.Grid | None) -> Iterator[Source]:
 
 
 @contextlib.contextmanager
-def _readback(port: str | None, baud: int, timeout_s: float) -> Iterator[Source]:
+def _readback(port: str | None, baud: Baud, timeout_s: float) -> Iterator[Source]:
     from voxdisplay.view.live.sources import DisplaySource  # noqa: PLC0415 - an extra
 
     with open_display(port, baud, timeout_s) as display:
@@ -175,7 +176,7 @@ def _of_scene(scene: str, display_size: vd.Grid | None) -> Iterator[View]:
 
 
 @contextlib.contextmanager
-def _of_display(port: str | None, baud: int, timeout_s: float) -> Iterator[View]:
+def _of_display(port: str | None, baud: Baud, timeout_s: float) -> Iterator[View]:
     from voxdisplay.view.terminal import View  # noqa: PLC0415
     from voxdisplay.view.voxels import Lit, lit_voxels  # noqa: PLC0415
 

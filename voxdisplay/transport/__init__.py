@@ -38,7 +38,8 @@ def open_transport(port: str, *, baud: int = 115200) -> Transport:
         If it cannot be opened; the message says why, ``hint`` what to do.
 
     """
-    kind = match[1] if (match := re.match(r"([a-z][a-z0-9+-]+):", port)) else ""
+    match = re.match(r"([a-z][a-z0-9+-]+):", port, re.IGNORECASE)
+    kind = match[1].lower() if match else ""
     if kind == "tcp":
         from voxdisplay.transport.tcp import TcpTransport  # noqa: PLC0415 - only what is needed
 

@@ -52,6 +52,10 @@ def explain(port: str, error: BaseException) -> OpenError:
         )
     if number in {errno.ENOTTY, errno.EISDIR}:
         return OpenError(f"{port} is no serial port", port=port, hint=_what_there_is())
+    if number in {errno.ELOOP, errno.ENOTDIR, errno.ENAMETOOLONG}:
+        return OpenError(
+            f"{port} names nothing: {os.strerror(number)}", port=port, hint=_what_there_is()
+        )
     hint = "is the device, or the server for it, running there?" if "://" in port else None
     return OpenError(f"{port} cannot be opened: {reason(error)}", port=port, hint=hint)
 

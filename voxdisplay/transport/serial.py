@@ -60,7 +60,7 @@ class SerialTransport:
             self._serial: Any = _open(port, baud)  # of many kinds, with more than they share
         except _GONE as error:
             raise explain(port, error) from error
-        except ValueError as error:  # a URL that pyserial does not know, or an impossible baud
+        except (ValueError, OverflowError) as error:  # a URL that is unknown, or an absurd rate
             raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
         self._closed = False
         self._descriptor = _descriptor(self._serial)
@@ -94,6 +94,8 @@ class SerialTransport:
             self._serial.baudrate = baud
         except _GONE as error:
             raise ValueError(f"{self.port} has no rate of {baud} Bd: {reason(error)}") from error
+        except OverflowError as error:  # the system has no number for it
+            raise ValueError(f"{self.port} has no rate of {baud} Bd") from error
         self.baud = baud
 
     def read(self, timeout_s: float) -> bytes:
@@ -172,7 +174,15 @@ class SerialTransport:
 
 
 def _open(port: str, baud: int) -> serial.SerialBase:
-    line = serial.serial_for_url(port, baudrate=baud, timeout=_POLL_S, do_not_open=True)
+    settings: dict[str, Any] = {"baudrate": baud, "timeout": _POLL_S}
+    line: serial.SerialBase
+    if port.lower().startswith("rfc2217:"):
+        from voxdisplay.transport import rfc2217  # noqa: PLC0415 - only what is needed
+
+        line = rfc2217.Serial(None, **settings)
+        line.port = port
+    else:
+        line = serial.serial_for_url(port, do_not_open=True, **settings)
     if isinstance(line, serial.Serial):  # the system's own, perhaps behind spy://
         line.exclusive = True
     line.open()
@@ -211,4 +221,4 @@ def _descriptor(line: serial.SerialBase) -> int | None:
 
 
 def _is_rfc2217(line: serial.SerialBase) -> bool:
-    return type(line).__module__ == "serial.rfc2217"
+    return type(line).__module__ == "voxdisplay.transport.rfc2217"

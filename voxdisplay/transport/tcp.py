@@ -10,6 +10,7 @@ from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 
 _READ_BYTES = 1 << 16
 _CONNECT_S = 5.0
+_LIKE = "write it like tcp://127.0.0.1:5000 or tcp://[::1]:5000"
 
 
 class TcpTransport:
@@ -21,13 +22,13 @@ class TcpTransport:
             url = urlsplit(port)
             host, number = url.hostname, url.port
         except ValueError as error:
-            raise OpenError(f"{port}: {error}", port=port) from error
+            raise OpenError(f"{port}: {error}", port=port, hint=_LIKE) from error
         if not host or not number or url.path or url.query:
-            raise OpenError(
-                f"{port} is not a TCP port", port=port, hint="write it like tcp://127.0.0.1:5000"
-            )
+            raise OpenError(f"{port} is not a TCP port", port=port, hint=_LIKE)
         try:
             self._socket = socket.create_connection((host, number), timeout=_CONNECT_S)
+        except UnicodeError as error:  # a name that no host can have
+            raise OpenError(f"{port} is not a TCP port: {error}", port=port, hint=_LIKE) from error
         except OSError as error:
             raise OpenError(
                 f"{port} cannot be opened: {error}",

@@ -1,0 +1,75 @@
+"""What a server of RFC 2217 sends, parted into data and commands."""
+
+import itertools
+import socket
+import threading
+
+import pytest
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from voxdisplay.transport import rfc2217
+from voxdisplay.transport.rfc2217 import Sieve
+
+IAC = b"\xff"
+# A few bytes, of which telnet's are many: each means something else after another.
+BYTES = st.lists(st.sampled_from([0, 1, 0xF0, 0xF1, 0xFA, 0xFB, 0xFE, 0xFF]), max_size=8).map(bytes)
+COMMANDS = st.one_of(
+    st.tuples(st.integers(0xFB, 0xFE), st.integers(0, 255)).map(lambda pair: IAC + bytes(pair)),
+    BYTES.map(lambda value: IAC + b"\xfa" + value.replace(IAC, IAC + IAC) + IAC + b"\xf0"),
+    st.just(IAC + b"\xf1"),
+)
+
+
+@given(st.lists(st.tuples(BYTES, COMMANDS), max_size=5), st.lists(st.integers(0, 60), max_size=8))
+def test_data_and_commands_are_parted_wherever_they_are_cut(pieces, cuts):
+    sent = b"".join(data.replace(IAC, IAC + IAC) + command for data, command in pieces)
+    places = sorted({0, len(sent), *(cut for cut in cuts if cut < len(sent))})
+    sieve = Sieve()
+    parted = [sieve.feed(sent[a:b]) for a, b in itertools.pairwise(places)]
+    assert b"".join(data for data, _ in parted) == b"".join(data for data, _ in pieces)
+    assert b"".join(command for _, command in parted) == b"".join(c for _, c in pieces)
+
+
+@given(BYTES)
+def test_anything_is_taken(noise):
+    Sieve().feed(noise)
+
+
+def test_an_end_without_a_beginning_is_nothing():
+    assert Sieve().feed(b"a\xff\xf0b") == (b"ab", b"")
+
+
+@pytest.fixture
+def sieved():
+    ours, theirs = socket.socketpair()
+    with theirs:
+        sieved = rfc2217._Sieved(ours)
+        yield sieved, theirs
+        sieved.close()
+
+
+def test_no_more_is_taken_than_is_read(sieved, monkeypatch):
+    monkeypatch.setattr(rfc2217, "_MOST_BYTES", 10)
+    sieved, theirs = sieved
+    reader = threading.Thread(target=sieved.recv, args=(1,))
+    reader.start()
+    theirs.sendall(b"0123456789")
+    assert sieved.take(10, 20) == b"0123456789"
+    theirs.sendall(b"0123456789ab")
+    assert sieved.take(5, 20) == b"01234"
+    assert sieved.take(7, 20) == b"56789ab"
+    theirs.close()
+    reader.join(20)
+    assert not reader.is_alive()
+
+
+def test_who_waits_is_woken_at_the_end_and_gets_what_has_come(sieved):
+    sieved, theirs = sieved
+    theirs.sendall(b"bye\xff\xf1")
+    assert sieved.recv(1) == b"\xff\xf1"
+    threading.Timer(0.01, sieved.end).start()
+    assert sieved.take(5, 20) == b"bye"
+    with pytest.raises(serial.SerialException, match="closed the connection"):
+        sieved.take(1, 20)
