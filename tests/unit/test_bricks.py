@@ -139,6 +139,36 @@ def test_a_cuboid_anywhere_is_a_box():
     assert "BOX" not in assert_draws(encode(voxels, OCT | DOTS), voxels)
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("half", range(2))
+def test_what_is_flat_is_a_box(axis, half):
+    """A plate, and beside it enough that is uneven for bricks to be worth it."""
+    low, high = [6, 4, 2], [35, 27, 19]
+    low[axis] = high[axis] = 8 + half
+    plate = block(low, high)
+    above = plate[np.random.default_rng(1).random(len(plate)) < 0.1]
+    above[:, axis] += 1
+    voxels = np.concatenate((plate, above))
+    with_box = encode(voxels, OCT | DOTS | BOX)
+    ops = assert_draws(with_box, voxels)
+    assert ops.count("BOX") == 1
+    without = encode(voxels, OCT | DOTS)
+    assert_draws(without, voxels)
+    assert sum(map(len, with_box)) < sum(map(len, without))
+
+
+def test_plates_one_above_the_other_are_boxes_of_their_own():
+    voxels = np.concatenate([block((0, 0, z), (31, 31, z)) for z in (0, 2, 4)])
+    values = np.where(voxels[:, 1] < 16, 5, 9)
+    ops = assert_draws(
+        encode(voxels, OCT | BOX, values, format_=PixelFormat.INDEX8),
+        voxels,
+        values,
+        format_=PixelFormat.INDEX8,
+    )
+    assert ops.count("BOX") == 6
+
+
 def test_cuboids_and_a_rest():
     voxels = np.concatenate((block((3, 5, 2), (30, 9, 17)), [(35, 30, 3), (37, 32, 5)]))
     values = np.where(voxels[:, 0] < 17, 5, 9)
