@@ -1,8 +1,8 @@
-"""Sets of voxels without an order -> OCT, DOTS and BOX (protocol.md, sections 7.3 and 7.4).
+"""Sets of voxels without an order -> OCT, DOTS, BOX and STEP (protocol.md, 7.1, 7.3, 7.4).
 
-An octree says which nodes become bricks, and which voxels dots. Before that, what is flat and large
-becomes a BOX if that takes fewer bytes, and so do large cuboids; afterwards, full bricks that make
-up a cuboid. What the voxels mean was settled before.
+What is flat and large becomes a BOX. An octree says which nodes of the rest become bricks or
+chains, and which voxels dots. Full bricks that make up a cuboid become one BOX, and so do large
+cuboids that lie anywhere, if that takes fewer bytes. What the voxels mean was settled before.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
 from voxdisplay.wire.boxes import cuboids
+from voxdisplay.wire.chains import chain
 from voxdisplay.wire.octree import SIDE, Level, chosen, leaves, origins, tree
 from voxdisplay.wire.ops import Bools, Bytes, Coding, Ints, places, ranges
 from voxdisplay.wire.pieces import ANY, Layout, Pieces, join, no_pieces
@@ -26,8 +27,6 @@ _SQUARES = [(axis, half) for axis in range(3) for half in range(2)]
 _SQUARE_OF = np.full(256, -1)
 for _number, (_axis, _half) in enumerate(_SQUARES):
     _SQUARE_OF[sum(1 << child for child in range(8) if child >> _axis & 1 == _half)] = _number
-# So many squares side by side may be worth a BOX: each is a mask, and a third of one above.
-_FLAT = 8
 
 
 @dataclass(frozen=True)
@@ -88,26 +87,26 @@ def _brick(index: Ints, values: NDArray[np.integer], coding: Coding) -> Bricks:
     pixels, rank = _ranked(values)
     blocks = [-(-side // SIDE) for side in coding.grid]
     key, mask = leaves(index, rank, len(pixels), blocks, coding)
-    levels = tree(key, mask, coding)
     parts: list[Pieces] = []
-    flat, others = _flats(key, mask, pixels, coding, blocks)
-    if len(flat):
-        rest = tree(key[others], mask[others], coding) if others.any() else []
-        least = 2 * int(flat.size.sum()) + (int(rest[-1].least.sum()) if rest else 0)
-        if least < levels[-1].least.sum():
-            levels, parts = rest, [flat]
-    if levels:
-        parts += _of_tree(levels, pixels, coding, blocks)
+    if coding.has(spec.FEATURE_BOX):
+        flats, others = _flats(key, mask, pixels, coding, blocks)
+        parts.append(flats)
+        key, mask = key[others], mask[others]
+    if len(key):
+        parts += _of_tree(tree(key, mask, coding), pixels, coding, blocks)
     return _counted(join(parts), pixels, coding)
 
 
 def _of_tree(levels: list[Level], pixels: Ints, coding: Coding, blocks: list[int]) -> list[Pieces]:
-    roots, dots = chosen(levels, coding)
+    roots, walks, dots = chosen(levels, coding)
     boxes, roots = _boxes(levels, roots, pixels, coding, blocks)
     parts = [] if boxes is None else [boxes]
     for number, nodes in roots:
         if len(nodes):
             parts.append(_oct(levels, number, nodes, pixels, coding, blocks))
+    if len(walks):
+        voxels, rank = origins(walks, blocks)
+        parts.append(chain(voxels, pixels[rank], coding).pieces)
     if len(dots):
         parts.append(_dots(dots, pixels, coding, blocks))
     return parts
@@ -115,8 +114,10 @@ def _of_tree(levels: list[Level], pixels: Ints, coding: Coding, blocks: list[int
 
 def _counted(pieces: Pieces, pixels: Ints, coding: Coding) -> Bricks:
     pieces = pieces.take(np.argsort(pieces.pen, kind="stable"))
-    # Everything of a pen counts, the MOVE of a BOX included.
-    size = pieces.size + (pieces.at != ANY) * (1 + coding.move_bytes)
+    # Everything of a pen counts, the MOVE of a BOX included, and what makes a STEP a FROM.
+    goes = pieces.at != ANY
+    goes[1:] &= pieces.at[1:] != pieces.at_after[:-1]
+    size = pieces.size + goes * (coding.move_bytes + ~pieces.is_chain)
     bytes_of = np.bincount(np.searchsorted(pixels, pieces.pen), weights=size, minlength=len(pixels))
     return Bricks(pieces, pixels, bytes_of.astype(np.int64))
 
@@ -257,10 +258,15 @@ def _boxes(
 def _flats(
     key: Ints, mask: Bytes, pixels: Ints, coding: Coding, blocks: list[int]
 ) -> tuple[Pieces, Bools]:
-    """Make a BOX of squares that lie side by side; tell which nodes of level 1 are left."""
+    """Make a BOX of squares that lie side by side; tell which nodes of level 1 are left.
+
+    Each of them takes a mask in a brick, or more elsewhere: as many as a BOX and its MOVE have
+    bytes are worth one.
+    """
+    least = 2 * (1 + coding.move_bytes)
     rest = np.ones(len(key), dtype=np.bool_)
     at = np.flatnonzero(_SQUARE_OF[mask] >= 0)
-    if not coding.has(spec.FEATURE_BOX) or len(at) < _FLAT:
+    if len(at) < least:
         return no_pieces(), rest
     origin, rank = origins(key[at] << 3, blocks)
     square = _SQUARE_OF[mask[at]]
@@ -269,7 +275,7 @@ def _flats(
     plane = np.take_along_axis(origin, axis[:, None], axis=1)[:, 0] + half
     group = (rank * len(_SQUARES) + square) << 32 | plane
     low, high, count, owner = cuboids(origin >> 1, group)
-    large = count >= _FLAT
+    large = count >= least
     rest[at[large[owner]]] = False
     low, high = low[large] << 1, (high[large] << 1) + 1
     first = np.unique(owner, return_index=True)[1][large]

@@ -1,9 +1,10 @@
 """Sets of voxels without an order -> nodes of octrees, and how each costs least.
 
 Voxels of one pixel are sorted so that those of a node follow each other. From the leaves up, each
-node finds how its voxels cost least: as a brick of its own, as dots, or in whatever way its
-children do; a brick that no payload holds is never among them. All nodes of a level are done at
-once, by arrays. This module counts bytes (protocol.md, 7.3 and 7.4), and makes none.
+node finds how its voxels cost least: as a brick of its own, as dots, as one chain if they are one,
+or in whatever way its children do; a brick that no payload holds is never among them. All nodes of
+a level are done at once, by arrays. This module counts bytes (protocol.md, section 7), and makes
+none.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ _SPREAD = np.array([sum((c >> bit & 1) << 3 * bit for bit in range(TOP)) for c i
 _BITS = np.array([mask.bit_count() for mask in range(256)])
 # Where one voxel of so many is lit, the whole page is looked at.
 _CROWDED = 16
-_HOW_BRICK, _HOW_DOTS, _HOW_CHILDREN = range(3)
+_HOW_BRICK, _HOW_DOTS, _HOW_CHILDREN, _HOW_CHAIN = range(4)
+_STEPS_PER_BYTE = 4
+# In nodes of lower levels a chain saves a byte or two; to look for them takes longest there.
+_LEAST_WALKED = 3
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ def tree(key: Ints, mask: Bytes, coding: Coding) -> list[Level]:
     nodes = np.ones(len(key), dtype=np.int64)
     ways = np.stack((nodes + header, voxels * dot, voxels * min(header, dot)))
     levels = [Level(key, key, mask, mask == 255, nodes, voxels, ways.min(axis=0), _least(ways))]
-    for _ in range(1, TOP):
+    for number in range(1, TOP):
         below = levels[-1]
         parent = below.key >> 3
         first = np.flatnonzero(np.concatenate(([True], parent[1:] != parent[:-1])))
@@ -102,11 +106,60 @@ def tree(key: Ints, mask: Bytes, coding: Coding) -> list[Level]:
         nodes = 1 + np.where(full, 0, np.add.reduceat(below.nodes, first))
         own = nodes + header
         own[own > coding.room] = _NEVER
-        ways = np.stack((own, voxels * dot, np.add.reduceat(below.least, first)))
-        levels.append(
-            Level(parent[first], first, mask, full, nodes, voxels, ways.min(axis=0), _least(ways))
-        )
+        key, by_child = parent[first], np.add.reduceat(below.least, first)
+        ways = np.stack((own, voxels * dot, by_child, np.full(len(key), _NEVER)))
+        if number + 1 >= _LEAST_WALKED:
+            chain = 2 + coding.move_bytes + -(-(voxels - 1) // _STEPS_PER_BYTE)
+            maybe = np.flatnonzero((voxels <= 2 << number) & (chain < ways.min(axis=0)))
+            walked = maybe[_walks(levels, number + 1, key[maybe])[1] >= 0]
+            ways[_HOW_CHAIN, walked] = chain[walked]
+        levels.append(Level(key, first, mask, full, nodes, voxels, ways.min(axis=0), _least(ways)))
     return levels
+
+
+def _walks(levels: list[Level], number: int, nodes: Ints) -> tuple[Ints, Ints, Ints]:
+    """Find out which nodes of a level, by their keys, are one chain that rises on some axis.
+
+    Returns
+    -------
+    keys : (n,) int64 array
+        Their voxels, each chain in its order.
+    main : (nodes,) int64 array
+        The axis, or -1.
+    owner : (n,) int64 array
+        Which node each voxel belongs to.
+
+    """
+    inside = 3 * (number - 1)
+    if not len(nodes):
+        return nodes, nodes, nodes
+    begin, end = np.searchsorted(levels[0].key, (nodes << inside, nodes + 1 << inside))
+    key = _voxels(levels, ranges(begin, end - begin))
+    owner = np.searchsorted(nodes, key >> inside + 3)
+    spot = np.zeros((3, len(key)), dtype=np.int64)
+    for bit in range(number):
+        spot |= (key >> 3 * bit + np.arange(3)[:, None] & 1) << bit
+    main = np.full(len(nodes), -1)
+    order = np.arange(len(key))
+    for axis in range(3):
+        along = np.argsort(owner << TOP | spot[axis], kind="stable")
+        step = np.diff(spot[:, along])
+        inner = owner[1:] == owner[:-1]
+        far = inner & ((step[axis] != 1) | (np.abs(step) > 1).any(axis=0))
+        # What goes on on this axis, and does not turn round on another.
+        up, down = (_any_of(inner & (step * way > 0), owner, len(nodes)) for way in (1, -1))
+        found = ~_any_of(far[None], owner, len(nodes))[0] & ~(up & down).any(axis=0) & (main < 0)
+        main[found] = axis
+        order = np.where(found[owner], along, order)
+    return key[order], main, owner
+
+
+def _any_of(steps: Bools, owner: Ints, nodes: int) -> Bools:
+    """Tell of each row which nodes have such a step: (rows, nodes)."""
+    found = np.zeros((len(steps), nodes), dtype=np.bool_)
+    row, at = np.nonzero(steps)
+    found[row, owner[at]] = True
+    return found
 
 
 def _prices(coding: Coding) -> tuple[int, int]:
@@ -119,18 +172,22 @@ def _least(ways: Ints) -> NDArray[np.int8]:
     return np.asarray(ways.argmin(axis=0), dtype=np.int8)
 
 
-def chosen(levels: list[Level], coding: Coding) -> tuple[list[tuple[int, Ints]], Ints]:
-    """Go down from the top: the bricks of each level, and the keys of voxels that are dots.
+def chosen(levels: list[Level], coding: Coding) -> tuple[list[tuple[int, Ints]], Ints, Ints]:
+    """Go down from the top: the bricks of each level, the keys of chains' voxels, and of dots.
 
-    Bricks are nodes of their level; those of level 0 are keys, too.
+    Bricks are nodes of their level; those of level 0 are keys, too. Voxels of a chain are in its
+    order, one chain after another.
     """
     roots: list[tuple[int, Ints]] = []
     dots: list[Ints] = []
+    walks: list[Ints] = []
     open_ = np.arange(len(levels[-1].key))
     for number in range(TOP, 0, -1):
-        how = levels[number - 1].how[open_]
+        level = levels[number - 1]
+        how = level.how[open_]
         roots.append((number, open_[how == _HOW_BRICK]))
         dots.append(_voxels(levels, _below(levels, number, open_[how == _HOW_DOTS], 1)))
+        walks.append(_walks(levels, number, level.key[open_[how == _HOW_CHAIN]])[0])
         open_ = open_[how == _HOW_CHILDREN]
         if number > 1:
             open_ = _below(levels, number, open_, number - 1)
@@ -140,7 +197,7 @@ def chosen(levels: list[Level], coding: Coding) -> tuple[list[tuple[int, Ints]],
         roots.append((0, alone))
     else:
         dots.append(alone)
-    return roots, np.sort(np.concatenate(dots))
+    return roots, np.concatenate(walks), np.sort(np.concatenate(dots))
 
 
 def _below(levels: list[Level], number: int, nodes: Ints, to: int) -> Ints:
