@@ -12,7 +12,7 @@ import itertools
 import random
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -91,6 +91,8 @@ class Probe:
         Bits per second of a serial line.
     seed : int
         Where all that is random begins.
+    clock : callable
+        Seconds, never going back; those of which ``pipe`` takes its time.
 
     Attributes
     ----------
@@ -107,6 +109,8 @@ class Probe:
     rng : random.Random
     log : list of Line
         What went and came since the check began.
+    clock : callable
+        See above.
     """
 
     def __init__(
@@ -117,7 +121,9 @@ class Probe:
         opening_s: float = 5.0,
         baud: int = 115200,
         seed: int = 0,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self.clock = clock
         self.rng = random.Random(seed)
         self._seed = seed
         self.hearing = Hearing()
@@ -166,23 +172,27 @@ class Probe:
         return self._timeout_s + 2 * self.said.period_s + line_s
 
     def hear(self, until_s: float) -> Answer | None:
-        """Give the next answer; None if none comes until then (`time.monotonic`)."""
+        """Give the next answer; None if none comes until then, by `clock`."""
         while not self._heard:
-            left_s = until_s - time.monotonic()
-            come = self._pipe.read(max(left_s, 0.0))  # what is there already is never missed
-            if not come and left_s <= 0:
+            left_s = until_s - self.clock()
+            if not self._listen(left_s) and left_s <= 0:
                 return None
-            for answer in self.hearing.feed(come):
-                self._note(sent=False, data=answer.body, text=str(answer))
-                self._heard.append(answer)
             if left_s < -self._timeout_s:  # it babbles
                 return None
         self._unanswered_bytes = 0
         return self._heard.popleft()
 
+    def _listen(self, timeout_s: float) -> bool:
+        """Hear what comes next; tell whether anything came. What is there is never missed."""
+        come = self._pipe.read(max(timeout_s, 0.0))
+        for answer in self.hearing.feed(come):
+            self._note(sent=False, data=answer.body, text=str(answer))
+            self._heard.append(answer)
+        return bool(come)
+
     def answers(self) -> Iterator[Answer]:
         """Give answers until none comes in time."""
-        until_s = time.monotonic() + self.patience_s
+        until_s = self.clock() + self.patience_s
         for _ in range(_MANY_ANSWERS):
             answer = self.hear(until_s)
             if answer is None:
@@ -193,7 +203,9 @@ class Probe:
     def let_ticks_pass(self) -> None:
         """Wait for two refresh ticks, and a little."""
         if self.said.refresh:
-            time.sleep(2 * self.said.period_s + 0.01)
+            until_s = self.clock() + 2 * self.said.period_s + 0.01
+            while (left_s := until_s - self.clock()) > 0:
+                self._listen(left_s)
 
     def _note(self, *, sent: bool, data: bytes, text: str) -> None:
         if len(self.log) < _KEPT_LINES:
@@ -222,12 +234,12 @@ class Probe:
     def greet(self) -> bool:
         """Open the first session; tell whether the device answered."""
         self.session = self.rng.randrange(1, 65536)
-        until_s = time.monotonic() + self._opening_s
+        until_s = self.clock() + self._opening_s
         info = None
-        while info is None and time.monotonic() < until_s:
+        while info is None and self.clock() < until_s:
             self.raw(b"\0")
             self.send(packets.hello(self.session))
-            info = self._await_info(min(until_s, time.monotonic() + _HELLO_AGAIN_S))
+            info = self._await_info(min(until_s, self.clock() + _HELLO_AGAIN_S))
         if info is None:
             return False
         self.info, self.said = info, Said.of(info)
@@ -235,7 +247,7 @@ class Probe:
         return True
 
     def _await_info(self, until_s: float | None = None) -> Answer | None:
-        until_s = time.monotonic() + self.patience_s if until_s is None else until_s
+        until_s = self.clock() + self.patience_s if until_s is None else until_s
         while answer := self.hear(until_s):
             if answer.kind == spec.TYPE_INFO and answer.session == self.session:
                 return answer
@@ -392,9 +404,9 @@ class Probe:
         for answer in come or []:
             if answer.kind == spec.TYPE_ACK and _shows(answer, frame):
                 return answer
-        until_s = time.monotonic() + self.patience_s
-        while time.monotonic() < until_s:
-            hear_until_s = time.monotonic() + max(1.2 * self.said.period_s, 0.02)
+        until_s = self.clock() + self.patience_s
+        while self.clock() < until_s:
+            hear_until_s = self.clock() + max(1.2 * self.said.period_s, 0.02)
             while heard := self.hear(hear_until_s):
                 if heard.kind == spec.TYPE_ACK and _shows(heard, frame):
                     return heard
