@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.probe import Broken, Probe
+from voxdisplay.conformance.dialogue import Broken
+from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 _MOST_S = 20.0

@@ -11,9 +11,10 @@ from typing import TypeVar
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
 from voxdisplay.conformance import first_contact
 from voxdisplay.conformance.catalogue import CHECKS, Check
+from voxdisplay.conformance.dialogue import Broken, Line, NotApplicable, Silent
 from voxdisplay.conformance.keeping import keep, put_back
 from voxdisplay.conformance.packets import NoSuchFieldError
-from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Silent
+from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.said import FORMATS, Said
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport
