@@ -18,7 +18,6 @@ from typing import NoReturn
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.hearing import Hearing
 from voxdisplay.conformance.packets import SHOWN, Answer
-from voxdisplay.conformance.page import Page
 from voxdisplay.conformance.said import Said
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.transport import Transport
@@ -96,9 +95,7 @@ class Dialogue:
     session : int
         Number of the session that the kit has opened last.
     seq, frame : int
-        The next sequence number and frame id of `draw` and `show`.
-    front : Page or None
-        What must be on display; None if that is not known.
+        The next sequence number and frame id.
     state : Answer
         The latest answer to a STATUS: an ACK, or an ERROR where no session was open.
     rng : random.Random
@@ -124,7 +121,6 @@ class Dialogue:
         self.hearing = Hearing()
         self.session = 0
         self.seq = self.frame = 0
-        self.front: Page | None = None
         self.log: list[Line] = []
         self.said = Said(0, 0, 0, 0)
         self.info = self.state = Answer(b"\0\0\0")
@@ -138,7 +134,6 @@ class Dialogue:
         """Forget what was before: a check goes the same way whichever others are made."""
         self.rng = random.Random(f"{self._seed} {name}")
         self.log = []
-        self.front = None
 
     # -- bytes
 

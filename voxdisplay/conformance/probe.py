@@ -24,7 +24,20 @@ _PAGE_COUNTS = (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT)
 
 
 class Probe(Dialogue):
-    """A device under examination: a `Dialogue` about pictures."""
+    """A device under examination: a `Dialogue` about pictures.
+
+    Attributes
+    ----------
+    front : Page or None
+        What must be on display; None if that is not known.
+    """
+
+    front: Page | None = None
+
+    def begin(self, name: str) -> None:
+        """See `Dialogue.begin`."""
+        super().begin(name)
+        self.front = None
 
     # -- pictures
 
