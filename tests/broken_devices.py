@@ -175,7 +175,7 @@ def too_long_taken(patch):
     around(patch, Receiver, "__init__", lambda old, self, longest: old(self, longest + 1))
 
 
-@mutant("10/dense-page", "4/answers-checked")
+@mutant("10/dense-page", "4/answers-checked", "4/answers-length")
 def answers_in_short_groups(patch):
     patch.setattr(sender, "_GROUP", 100)
 
@@ -188,6 +188,7 @@ def answers_in_short_groups(patch):
     "10/back-page",
     "10/dense-page",
     "4/answers-checked",
+    "4/answers-length",
 )
 def answers_with_another_check_value(patch):
     def send(kind, flags, seq, frame, payload):
@@ -773,6 +774,16 @@ def any_leb128_taken(patch):
     around(patch, Operands, "count", count)
 
 
+@mutant("11/count-form")
+def leb128_asks_for_a_sixth_byte(patch):
+    def count(old, self, operand):
+        if operand == 31 and all(byte & 128 for byte in self._packet[self._at : self._at + 5]):
+            self.take(6)
+        return old(self, operand)
+
+    around(patch, Operands, "count", count)
+
+
 @mutant("7.2/literal-pen", "7.5/difference-pen", likely="left as it was")
 def literal_leaves_pen(patch):
     def write(old, self, count, pixels):
@@ -792,6 +803,7 @@ def literal_leaves_pen(patch):
     "10/whole-page",
     "10/ranges",
     "10/dense-page",
+    "4/answers-length",
     pixel_format="mono1",
     likely="lowest bits",
 )

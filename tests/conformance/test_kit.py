@@ -8,12 +8,8 @@ import time
 import broken_devices
 import document
 import pytest
+from bench_top import BenchTop
 
-from firmware_sim.bench import Bench
-from firmware_sim.config import Config
-from firmware_sim.device import Device
-from firmware_sim.in_process import InProcessPort
-from firmware_sim.wire import Wire
 from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.decoder import Decoder, Refused
 from voxdisplay.conformance.mistakes import MISTAKES
@@ -47,10 +43,11 @@ BYSTANDERS = (
 
 
 def device(**config):
-    config = {**SMALL, "rx_buffer": 2048, "boot": 7} | config
-    port = InProcessPort(Wire(Device(Config(**config))))
-    port.port = "a device in this process"
-    return port
+    return BenchTop(**{**SMALL, "rx_buffer": 2048, "boot": 7} | config)
+
+
+def examined(port, only=(), **how):
+    return examine(port, only, clock=port.clock, **how)
 
 
 def by_verdict(report, verdict):
@@ -117,7 +114,7 @@ def test_packets(vector):
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_emulator_holds(name):
-    report = examine(device(**DEVICES[name]), timeout_s=2)
+    report = examined(device(**DEVICES[name]))
     assert report.holds, explain(report)
     assert len(report.results) == len(CHECKS)
     assert report.left.startswith("dark" if name in {"bare", "digest-only"} else "as it was")
@@ -133,20 +130,30 @@ def test_over_a_real_tty(emulator, run):
     assert "it will be as it was" in checked.stderr
 
 
+@pytest.mark.parametrize("name", ["index8", "at-once", "wide"])
+@pytest.mark.parametrize(
+    "line",
+    [{"late_s": 0.008}, {"late_s": 0.02}, {"baud": 115200}, {"late_s": 0.02, "baud": 115200}],
+    ids="-".join,
+)
+def test_the_emulator_holds_on_a_slow_line(name, line):
+    report = examined(device(**line, **DEVICES.get(name, {})))
+    assert report.holds, explain(report)
+
+
 @pytest.mark.parametrize("name", ["at-once", "mono", "wide"])
 def test_the_picture_is_put_back(name):
     port = device(**DEVICES[name])
     said = Said.of(_info(port))
     drawn = ops.literal(said, [1, 0, 1]) + ops.skip(said.voxels - 4) + ops.run()
     port.write(packets.wire(packets.data(0, 0, drawn, packets.CLEAR | packets.COMMIT)), 1)
-    time.sleep(said.period_s)
-    while not Bench(port._wire.device).snapshot().pixels.strip(b"\0"):
-        port.read(0.01)
-    before = Bench(port._wire.device).snapshot().pixels
-    report = examine(port, ["7/pen", "6/clear"], timeout_s=2)
+    while not port.bench.snapshot().pixels.strip(b"\0"):
+        port.read(said.period_s)
+    before = port.bench.snapshot().pixels
+    report = examined(port, ["7/pen", "6/clear"])
     assert report.holds, explain(report)
     assert report.left == "as it was"
-    assert Bench(port._wire.device).snapshot().pixels == before
+    assert port.bench.snapshot().pixels == before
 
 
 def _info(port):
@@ -163,9 +170,7 @@ def _info(port):
 def test_a_fault_is_found_where_it_is(fault, monkeypatch):
     fault.make(monkeypatch)
     bystanders = [] if fault.spreads else BYSTANDERS
-    report = examine(
-        device(**fault.config), [*fault.fails, *bystanders], timeout_s=0.3, opening_s=2
-    )
+    report = examined(device(**fault.config), [*fault.fails, *bystanders])
     broken = by_verdict(report, Verdict.BROKEN)
     assert broken == set(fault.fails), explain(report)
     said = " ".join(result.likely for result in report.results)
@@ -176,7 +181,7 @@ def test_a_fault_is_found_where_it_is(fault, monkeypatch):
 @pytest.mark.parametrize("fault", broken_devices.MUTANTS, ids=str)
 def test_a_fault_is_found_nowhere_else(fault, monkeypatch):
     fault.make(monkeypatch)
-    report = examine(device(**fault.config), timeout_s=0.3, opening_s=2)
+    report = examined(device(**fault.config))
     broken = by_verdict(report, Verdict.BROKEN)
     random_ones = {"7/anything", "11/anything", "12/mutated", "12/noise"}
     assert set(fault.fails) <= broken
@@ -191,7 +196,7 @@ def test_every_check_finds_a_fault():
 
 def test_a_wrong_check_value_is_named(monkeypatch):
     monkeypatch.setattr(broken_devices.crc, "_TABLE", _castagnoli())
-    report = examine(device(), ["3"], timeout_s=0.1, opening_s=0.3)
+    report = examined(device(), ["3"])
     assert report.said is None
     assert "CRC-32C" in report.results[0].likely
     assert {result.verdict for result in report.results[1:]} == {Verdict.NOT_RUN}
@@ -293,7 +298,7 @@ def test_a_device_that_falls_silent_is_given_up():
             inner(data, timeout_s)
 
     port.write = write
-    report = examine(port, timeout_s=0.02, opening_s=0.5)
+    report = examined(port)
     assert by_verdict(report, Verdict.BROKEN)
     assert len(by_verdict(report, Verdict.NOT_RUN)) > 100
     assert report.left.startswith("unknown")
@@ -330,15 +335,15 @@ def test_an_interrupted_examination_puts_the_picture_back():
     port = device(refresh=0)
     said = Said.of(_info(port))
     port.write(packets.wire(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
-    before = Bench(port._wire.device).snapshot().pixels
+    before = port.bench.snapshot().pixels
     assert before.count(0xFF) == 3 < said.voxels
 
     def enough(_result):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        examine(port, ["7/move"], timeout_s=2, ended=enough)
-    assert Bench(port._wire.device).snapshot().pixels == before
+        examined(port, ["7/move"], ended=enough)
+    assert port.bench.snapshot().pixels == before
 
 
 # -- the list

@@ -139,6 +139,74 @@ def test_a_cuboid_anywhere_is_a_box():
     assert "BOX" not in assert_draws(encode(voxels, OCT | DOTS), voxels)
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("half", range(2))
+def test_what_is_flat_is_a_box(axis, half):
+    """A plate, and beside it enough that is uneven for bricks to be worth it."""
+    low, high = [6, 4, 2], [35, 27, 19]
+    low[axis] = high[axis] = 8 + half
+    plate = block(low, high)
+    above = plate[np.random.default_rng(1).random(len(plate)) < 0.1]
+    above[:, axis] += 1
+    voxels = np.concatenate((plate, above))
+    with_box = encode(voxels, OCT | DOTS | BOX)
+    ops = assert_draws(with_box, voxels)
+    assert ops.count("BOX") == 1
+    without = encode(voxels, OCT | DOTS)
+    assert_draws(without, voxels)
+    assert sum(map(len, with_box)) < sum(map(len, without))
+
+
+def test_plates_one_above_the_other_are_boxes_of_their_own():
+    voxels = np.concatenate([block((0, 0, z), (31, 31, z)) for z in (0, 2, 4)])
+    values = np.where(voxels[:, 1] < 16, 5, 9)
+    ops = assert_draws(
+        encode(voxels, OCT | BOX, values, format_=PixelFormat.INDEX8),
+        voxels,
+        values,
+        format_=PixelFormat.INDEX8,
+    )
+    assert ops.count("BOX") == 6
+
+
+@pytest.mark.parametrize("main", range(3))
+@pytest.mark.parametrize("falls", range(4))
+def test_what_is_thin_is_a_chain(main, falls):
+    """7.1: six steps are two bytes of crumbs; a brick of them has six masks and more."""
+    voxels = np.tile((8, 16, 0), (7, 1))
+    k = np.arange(7)
+    voxels[:, main] += k
+    voxels[:, (main + 1) % 3] += 6 - k // 2 if falls & 1 else k // 2
+    voxels[:, (main + 2) % 3] += 5 - k * 2 // 3 if falls & 2 else k * 2 // 3
+    (payload,) = encode(voxels, OCT)
+    assert len(payload) == 7
+    assert assert_draws([payload], voxels) == ["FROM"]
+
+
+@pytest.mark.parametrize(
+    "voxels",
+    [
+        [(0, 0, 0), (1, 1, 0), (2, 0, 0), (3, 1, 0), (4, 2, 0)],  # turns round
+        [(0, 0, 0), (1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 5, 0)],  # jumps aside
+        [(0, 0, 0), (2, 1, 0), (3, 2, 0), (4, 3, 0), (5, 4, 0)],  # leaves one out
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0), (3, 2, 0)],  # two beside each other
+    ],
+)
+def test_what_is_no_chain(voxels):
+    assert "FROM" not in assert_draws(encode(voxels, OCT), voxels)
+
+
+def test_a_chain_of_each_pixel():
+    voxels = [(x, y, 3) for y in (0, 8) for x in range(8)]
+    values = [5] * 8 + [9] * 8
+    made = brick(np.sort(GRID.index_of(np.array(voxels))), np.array(values),
+                 Coding(GRID, PixelFormat.INDEX8, 1024, OCT))  # fmt: skip
+    assert made.bytes_of.tolist() == [7, 7]
+    payloads = encode(voxels, OCT, values, format_=PixelFormat.INDEX8)
+    ops = assert_draws(payloads, voxels, values, format_=PixelFormat.INDEX8)
+    assert ops[1::2] in (["STEP", "FROM"], ["FROM", "FROM"])
+
+
 def test_cuboids_and_a_rest():
     voxels = np.concatenate((block((3, 5, 2), (30, 9, 17)), [(35, 30, 3), (37, 32, 5)]))
     values = np.where(voxels[:, 0] < 17, 5, 9)

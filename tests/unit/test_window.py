@@ -46,6 +46,17 @@ def test_data_leaves_the_reserve():
     assert not window.fits(1)
 
 
+def test_what_was_promised_stays_promised():
+    """9.2: "A host goes by the farthest place that it has been told"."""
+    window = Window(10 * SIZE + spec.LIMIT_RESERVE)
+    sent(window, 2)
+    window.acknowledge(ack(1, 0, credit=9 * SIZE + spec.LIMIT_RESERVE))
+    assert window.fits(8 * SIZE)
+    window.acknowledge(ack(2, 1, credit=5 * SIZE))
+    assert window.fits(8 * SIZE)
+    assert not window.fits(8 * SIZE + 1)
+
+
 def test_credit_counts_from_the_end_of_the_packet_that_last_names():
     window = Window(10 * SIZE)
     sent(window, 3)

@@ -5,7 +5,8 @@ read by whoever has built a device and sees a check fail::
 
     catalogue   what a check is
     checks/     the checks, by section
-    probe       the hands that they have: send, ask, show, read back
+    probe       the hands that they have: show, look, read back
+    dialogue    what the hands are made of: send, hear, ask, demand
     run         one after the other, and what came of each
     packets  said  page  decoder  arc     packets, INFO, pages and ops, in their simplest form
     mistakes    decoders that misread one rule each, to name what is probably wrong

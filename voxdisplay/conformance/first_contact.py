@@ -6,7 +6,6 @@ ways in which it could have been meant, and if one of them is answered, that is 
 
 from __future__ import annotations
 
-import time
 import zlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -71,8 +70,8 @@ def _stirs(probe: Probe, stream: bytes) -> bool:
     """Send something; tell whether anything comes that could be a packet."""
     before = probe.hearing.segments
     probe.raw(b"\0" + stream, "a HELLO that is not as it must be")
-    until_s = time.monotonic() + _EACH_S
-    while time.monotonic() < until_s and probe.hearing.segments == before:
+    until_s = probe.clock() + _EACH_S
+    while probe.clock() < until_s and probe.hearing.segments == before:
         probe.hear(until_s)
     return probe.hearing.segments > before
 

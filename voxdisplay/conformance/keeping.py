@@ -6,11 +6,11 @@ same pixels (sections 7 and 10). The palette cannot be read, so that it is not b
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.probe import Broken, Probe
+from voxdisplay.conformance.dialogue import Broken
+from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 _MOST_S = 20.0
@@ -27,7 +27,7 @@ class Kept:
 def keep(probe: Probe) -> Kept | None:
     """Read what is on display; None if that cannot be, or takes too long."""
     said = probe.said
-    until_s = time.monotonic() + _MOST_S
+    until_s = probe.clock() + _MOST_S
     payloads, at = [], 0
     try:
         probe.sync()
@@ -37,7 +37,7 @@ def keep(probe: Probe) -> Kept | None:
         while at < said.voxels:
             page = probe.ask_page(packets.read(at, said.voxels - at))
             probe.unpack(page, at, said.voxels - at)  # is it a picture at all?
-            if time.monotonic() > until_s:
+            if probe.clock() > until_s:
                 return None
             payloads.append(ops.skip(at) + page.tail)
             at += page.count

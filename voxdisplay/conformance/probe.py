@@ -1,336 +1,43 @@
-"""The hands of a check: send anything, hear what comes, draw and look.
+"""The hands of a check: talk with a device, draw, look, and read back.
 
-Nothing here assumes that an answer comes at once, and nothing waits without an end. Where *no*
-answer is demanded, a STATUS is sent behind: packets are taken in their order, so what has not come
-before the answer to that STATUS does not come. Sends what it is told, right or wrong; what it
-expects comes from ``decoder`` and ``page``.
+What is expected comes from ``decoder`` and ``page``.
 """
 
 from __future__ import annotations
 
 import itertools
-import random
-import time
-from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import NoReturn
 
 from voxdisplay.conformance import mistakes, packets
 from voxdisplay.conformance.decoder import Decoder, Refused
-from voxdisplay.conformance.hearing import Hearing
+from voxdisplay.conformance.dialogue import Broken, Dialogue, NotApplicable
 from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, Answer
 from voxdisplay.conformance.page import Page
 from voxdisplay.conformance.said import Said
-from voxdisplay.errors import TransportTimeout
-from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
 
-_TAGS = range(129, 223)  # never the number of a DATA packet that a check has just sent
-_HELLO_AGAIN_S = 0.25
-_MANY_ANSWERS = 10_000
-_KEPT_LINES = 2_000
-_BITS_PER_BYTE = 10  # of a serial line
-_SHOWN_BYTES = 48  # of a packet in a transcript
+_MANY_PAGES = 10_000
 # A PAGE is made of these alone (section 10).
 _PAGE_OPS = (spec.OP_END, spec.OP_PEN)
 _PAGE_COUNTS = (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT)
 
 
-class Broken(Exception):  # noqa: N818 - a verdict
-    """The device does not do what the document demands.
-
-    Parameters
-    ----------
-    must : str
-        What must be.
-    came : str
-        What was.
-    likely : str
-        The mistake that is probably behind it.
-    """
-
-    def __init__(self, must: str, came: str, likely: str = "") -> None:
-        super().__init__(f"must be: {must}; was: {came}")
-        self.must, self.came, self.likely = must, came, likely
-
-
-class Silent(Broken):
-    """Nothing came in time."""
-
-
-class NotApplicable(Exception):  # noqa: N818 - no fault at all
-    """The check does not concern this device, or could not be made here."""
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One packet, or some raw bytes, that went or came."""
-
-    sent: bool
-    data: bytes
-    text: str
-
-    def __str__(self) -> str:
-        shown = self.data[:_SHOWN_BYTES].hex(" ").upper()
-        more = f" ... {len(self.data)} bytes" if len(self.data) > _SHOWN_BYTES else ""
-        return f"{'->' if self.sent else '<-'} {shown}{more}   {self.text}"
-
-
-class Probe:
-    """A device under examination.
-
-    Parameters
-    ----------
-    pipe : Transport
-    timeout_s : float
-        How long an answer may take, beyond the refresh period and the time on a serial line.
-    opening_s : float
-        How long the first INFO may take: a board may have to start.
-    baud : int
-        Bits per second of a serial line.
-    seed : int
-        Where all that is random begins.
+class Probe(Dialogue):
+    """A device under examination: a `Dialogue` about pictures.
 
     Attributes
     ----------
-    said : Said
-        What the device announced.
-    session : int
-        Number of the session that the kit has opened last.
-    seq, frame : int
-        The next sequence number and frame id of `draw` and `show`.
     front : Page or None
         What must be on display; None if that is not known.
-    state : Answer
-        The latest answer to a STATUS: an ACK, or an ERROR where no session was open.
-    rng : random.Random
-    log : list of Line
-        What went and came since the check began.
     """
 
-    def __init__(
-        self,
-        pipe: Transport,
-        *,
-        timeout_s: float = 1.0,
-        opening_s: float = 5.0,
-        baud: int = 115200,
-        seed: int = 0,
-    ) -> None:
-        self.rng = random.Random(seed)
-        self._seed = seed
-        self.hearing = Hearing()
-        self.session = 0
-        self.seq = self.frame = 0
-        self.front: Page | None = None
-        self.log: list[Line] = []
-        self.said = Said(0, 0, 0, 0)
-        self.info = self.state = Answer(b"\0\0\0")
-        self._pipe = pipe
-        self._timeout_s, self._opening_s, self._baud = timeout_s, opening_s, baud
-        self._heard: deque[Answer] = deque()
-        self._unanswered_bytes = 0
-        self._tags: Iterator[int] = iter(())
+    front: Page | None = None
 
     def begin(self, name: str) -> None:
-        """Forget what was before: a check goes the same way whichever others are made."""
-        self.rng = random.Random(f"{self._seed} {name}")
-        self.log = []
+        """See `Dialogue.begin`."""
+        super().begin(name)
         self.front = None
-
-    # -- bytes
-
-    def raw(self, stream: bytes, text: str = "raw") -> None:
-        """Send bytes as they are."""
-        self._note(sent=True, data=stream, text=text)
-        self._write(stream)
-
-    def send(self, *bodies: bytes) -> None:
-        """Send packets, all in one write."""
-        for packet in bodies:
-            self._note(sent=True, data=packet, text=packets.describe(packet))
-        self._write(b"".join(map(packets.wire, bodies)))
-
-    def _write(self, stream: bytes) -> None:
-        self._unanswered_bytes += len(stream)
-        try:
-            self._pipe.write(stream, self.patience_s)
-        except TransportTimeout as error:
-            raise Silent("the device reads what is sent to it", str(error)) from error
-
-    @property
-    def patience_s(self) -> float:
-        """How long to wait for an answer."""
-        line_s = self._unanswered_bytes * _BITS_PER_BYTE / self._baud
-        return self._timeout_s + 2 * self.said.period_s + line_s
-
-    def hear(self, until_s: float) -> Answer | None:
-        """Give the next answer; None if none comes until then (`time.monotonic`)."""
-        while not self._heard:
-            left_s = until_s - time.monotonic()
-            come = self._pipe.read(max(left_s, 0.0))  # what is there already is never missed
-            if not come and left_s <= 0:
-                return None
-            for answer in self.hearing.feed(come):
-                self._note(sent=False, data=answer.body, text=str(answer))
-                self._heard.append(answer)
-            if left_s < -self._timeout_s:  # it babbles
-                return None
-        self._unanswered_bytes = 0
-        return self._heard.popleft()
-
-    def answers(self) -> Iterator[Answer]:
-        """Give answers until none comes in time."""
-        until_s = time.monotonic() + self.patience_s
-        for _ in range(_MANY_ANSWERS):
-            answer = self.hear(until_s)
-            if answer is None:
-                return
-            yield answer
-        raise Silent("the device speaks when it is spoken to", f"{_MANY_ANSWERS} packets")
-
-    def let_ticks_pass(self) -> None:
-        """Wait for two refresh ticks, and a little."""
-        if self.said.refresh:
-            time.sleep(2 * self.said.period_s + 0.01)
-
-    def _note(self, *, sent: bool, data: bytes, text: str) -> None:
-        if len(self.log) < _KEPT_LINES:
-            self.log.append(Line(sent, data, text))
-
-    # -- questions
-
-    def open(self) -> None:
-        """Open a new session, and see that it is still the same device that answers."""
-        self.session = self.session % 65535 + 1
-        self.seq = self.frame = 0
-        self.raw(b"\0", "00, which ends whatever was")
-        self.send(packets.hello(self.session))
-        info = self._await_info()
-        if info is None:
-            raise Silent("INFO answers HELLO", "nothing", "did it stumble over what came before?")
-        if info.boot != self.said.boot:
-            self.info, self.said = info, Said.of(info)
-            self.hearing.said = self.said
-            raise Broken(
-                "the device goes on",
-                f"it has restarted: its boot id is {info.boot:04X}h now",
-                "it crashed, or a watchdog bit, at what this check sent",
-            )
-
-    def greet(self) -> bool:
-        """Open the first session; tell whether the device answered."""
-        self.session = self.rng.randrange(1, 65536)
-        until_s = time.monotonic() + self._opening_s
-        info = None
-        while info is None and time.monotonic() < until_s:
-            self.raw(b"\0")
-            self.send(packets.hello(self.session))
-            info = self._await_info(min(until_s, time.monotonic() + _HELLO_AGAIN_S))
-        if info is None:
-            return False
-        self.info, self.said = info, Said.of(info)
-        self.hearing.said = self.said
-        return True
-
-    def _await_info(self, until_s: float | None = None) -> Answer | None:
-        until_s = time.monotonic() + self.patience_s if until_s is None else until_s
-        while answer := self.hear(until_s):
-            if answer.kind == spec.TYPE_INFO and answer.session == self.session:
-                return answer
-        return None
-
-    def close(self) -> None:
-        """End the session by a DATA packet with a reserved flag, number, frame and op."""
-        self.say(packets.data(self.seq + 99, self.frame + 99, b"\x1f", 2))
-        must = "NO_SESSION answers all, after a refused DATA"
-        self.demand(self.state.kind == spec.TYPE_ERROR, must, self.state)
-
-    def sync(self) -> list[Answer]:
-        """Ask by STATUS; give all that came before its answer, which is `state` then."""
-        tag = next(self._tags, 0)
-        if not tag:
-            self._tags = iter(_TAGS)
-            tag = next(self._tags)
-        self.send(packets.status(tag))
-        before: list[Answer] = []
-        for answer in self.answers():
-            if (answer.kind == spec.TYPE_ACK and answer.last == tag) or (
-                answer.kind == spec.TYPE_ERROR and answer.seq == tag
-            ):
-                self.state = answer
-                return before
-            before.append(answer)
-        raise Silent("STATUS is answered", "nothing" if not before else f"only {before[-1]}")
-
-    def say(self, *bodies: bytes) -> list[Answer]:
-        """Send packets and a STATUS; give what came before the answer to that."""
-        self.send(*bodies)
-        return self.sync()
-
-    def ask(self, packet: bytes) -> Answer:
-        """Send a packet; give its answer, which must be the only one."""
-        self.send(packet)
-        answer = next(self.answers(), None)
-        if answer is None:
-            raise Silent(f"{packets.describe(packet)} is answered", "nothing")
-        extra = self.sync()
-        if extra:
-            raise Broken("one answer", " and ".join(map(str, [answer, *extra])))
-        return answer
-
-    def ask_raw(self, stream: bytes, text: str = "raw") -> list[Answer]:
-        """Send bytes and a STATUS; give what came before the answer to that."""
-        self.raw(stream, text)
-        return self.sync()
-
-    # -- verdicts
-
-    def fail(self, must: str, came: object, likely: str = "") -> NoReturn:
-        """Say that the device does otherwise."""
-        raise Broken(must, str(came), likely)
-
-    def skip(self, reason: str) -> NoReturn:
-        """Say that the check cannot be made here."""
-        raise NotApplicable(reason)
-
-    def demand(self, holds: bool, must: str, came: object, likely: str = "") -> None:
-        """Demand something."""
-        if not holds:
-            raise Broken(must, str(came), likely)
-
-    def demand_ack(self, answer: Answer, likely: str = "", /, **fields: int) -> None:
-        """Demand an ACK with some fields; ``shown``, ``pending`` and ``asked`` are its flags."""
-        if answer.kind != spec.TYPE_ACK:
-            raise Broken("ACK", str(answer), likely)
-        flags = {"shown": SHOWN, "pending": packets.PENDING, "asked": packets.ASKED}
-        for name, value in fields.items():
-            if name in flags:
-                is_so = bool(answer.flags & flags[name])
-                was = f"{name.upper()} {'set' if is_so else 'clear'}"
-                must = f"{name.upper()} {'set' if value else 'clear'}"
-            else:
-                is_so = getattr(answer, name)
-                form = "08X" if name in {"received", "digest"} else ""
-                must, was = f"{name} {value:{form}}", f"{name} {is_so:{form}}"
-            if is_so != value:
-                raise Broken(f"ACK with {must}", f"{was} in {answer}", likely)
-
-    def refuse(self, packet: bytes, code: int, offset: int) -> Answer:
-        """Demand that a packet is refused: with this code, at this offset of the packet."""
-        answer = self.ask(packet)
-        must = f"ERROR {packets.CODE_NAMES[code]} at offset {offset}"
-        if answer.kind != spec.TYPE_ERROR:
-            raise Broken(must, str(answer), "the device does not look at this")
-        if (answer.code, answer.offset) != (code, offset):
-            raise Broken(must, str(answer), _why_otherwise(answer, code, offset))
-        return answer
-
-    def refuse_ops(self, ops: bytes, code: int, at: int = 0) -> None:
-        """Demand, in a new session, that ops are refused: at this offset of the payload."""
-        self.open()
-        self.refuse(packets.data(0, 0, ops), code, packets.HEADER_BYTES + at)
 
     # -- pictures
 
@@ -392,9 +99,9 @@ class Probe:
         for answer in come or []:
             if answer.kind == spec.TYPE_ACK and _shows(answer, frame):
                 return answer
-        until_s = time.monotonic() + self.patience_s
-        while time.monotonic() < until_s:
-            hear_until_s = time.monotonic() + max(1.2 * self.said.period_s, 0.02)
+        until_s = self.clock() + self.patience_s
+        while self.clock() < until_s:
+            hear_until_s = self.clock() + max(1.2 * self.said.period_s, 0.02)
             while heard := self.hear(hear_until_s):
                 if heard.kind == spec.TYPE_ACK and _shows(heard, frame):
                     return heard
@@ -523,7 +230,7 @@ class Probe:
         """Read a whole page."""
         pixels: dict[int, int] = {}
         at = 0
-        for _ in range(_MANY_ANSWERS):
+        for _ in range(_MANY_PAGES):
             if at >= self.said.voxels:
                 return pixels
             part, count = self.read_range(at, self.said.voxels - at, flags)
@@ -556,11 +263,3 @@ def _either(reasons: Iterable[str]) -> str:
 
 def _shows(ack: Answer, frame: int) -> bool:
     return bool(ack.flags & SHOWN) and ack.frame == frame
-
-
-def _why_otherwise(error: Answer, code: int, offset: int) -> str:
-    if error.code == code and error.offset == offset - packets.HEADER_BYTES:
-        return "offsets count from the packet's first byte, its header included"
-    if error.code == code:
-        return "an op's offset is that of its op byte, a field's that of its first byte"
-    return "checks are made in the order of the table of section 11, ops from first to last"

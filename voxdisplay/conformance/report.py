@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from voxdisplay.conformance.catalogue import SECTIONS
-from voxdisplay.conformance.probe import Line
+from voxdisplay.conformance.dialogue import Line
 from voxdisplay.conformance.run import Report, Result, Verdict
 from voxdisplay.conformance.said import FEATURES, FORMATS
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -10,9 +11,10 @@ from typing import TypeVar
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
 from voxdisplay.conformance import first_contact
 from voxdisplay.conformance.catalogue import CHECKS, Check
+from voxdisplay.conformance.dialogue import Broken, Line, NotApplicable, Silent
 from voxdisplay.conformance.keeping import keep, put_back
 from voxdisplay.conformance.packets import NoSuchFieldError
-from voxdisplay.conformance.probe import Broken, Line, NotApplicable, Probe, Silent
+from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.said import FORMATS, Said
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport
@@ -119,6 +121,7 @@ def examine(
     opening_s: float = 5.0,
     baud: int = 115200,
     seed: int = 0,
+    clock: Callable[[], float] = time.monotonic,
     greeted: Callable[[Said, bool], object] | None = None,
     ended: Callable[[Result], object] | None = None,
 ) -> Report:
@@ -129,7 +132,7 @@ def examine(
     pipe : Transport
     only : iterable of str
         Sections, names or patterns of checks; all, if there are none.
-    timeout_s, opening_s, baud, seed
+    timeout_s, opening_s, baud, seed, clock
         As of `Probe`.
     greeted : callable, optional
         Is told what the device announced, and whether its picture could be kept, before anything
@@ -147,7 +150,7 @@ def examine(
         If ``only`` names no check.
     """
     selected = chosen(only)
-    probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed)
+    probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed, clock=clock)
     report = Report()
     stranger = _meet(probe)
     if stranger:

@@ -1,9 +1,8 @@
-"""Sets of voxels without an order -> OCT, DOTS and BOX (protocol.md, sections 7.3 and 7.4).
+"""Sets of voxels without an order -> OCT, DOTS, BOX and STEP (protocol.md, 7.1, 7.3, 7.4).
 
-Voxels of one pixel are sorted so that those of a node of an octree follow each other. From the
-leaves up, each node finds how its voxels cost least: as a brick of its own, as dots, or in whatever
-way its children do; a brick that no payload holds is never among them. Full bricks that make up a
-cuboid become one BOX. All levels are done by arrays. What the voxels mean was settled before.
+What is flat and large becomes a BOX. An octree says which nodes of the rest become bricks or
+chains, and which voxels dots. Full bricks that make up a cuboid become one BOX, and so do large
+cuboids that lie anywhere, if that takes fewer bytes. What the voxels mean was settled before.
 """
 
 from __future__ import annotations
@@ -15,22 +14,19 @@ from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
 from voxdisplay.wire.boxes import cuboids
+from voxdisplay.wire.chains import chain
+from voxdisplay.wire.octree import SIDE, Level, chosen, leaves, origins, tree
 from voxdisplay.wire.ops import Bools, Bytes, Coding, Ints, places, ranges
-from voxdisplay.wire.pieces import ANY, Layout, Pieces, join
+from voxdisplay.wire.pieces import ANY, Layout, Pieces, join, no_pieces
 
-_TOP = spec.LIMIT_MAX_LEVEL
-_SIDE = 1 << _TOP
-_LEAF_BITS = 3 * _TOP
-_NEVER = 1 << 40
-# Where the bits of a coordinate inside a brick go, so that x, y and z take turns.
-_SPREAD = np.array([sum((c >> bit & 1) << 3 * bit for bit in range(_TOP)) for c in range(_SIDE)])
 # A cuboid of so many voxels may be worth a BOX of its own; the rows of voxels must be few, or long.
 _LARGE = 64
 _MANY_ROWS, _LONG_ROW = 2000, 4
-_BITS = np.array([mask.bit_count() for mask in range(256)])
-# Where one voxel of so many is lit, the whole page is looked at.
-_CROWDED = 16
-_HOW_BRICK, _HOW_DOTS, _HOW_CHILDREN = range(3)
+# A square of four voxels in a cube of eight: across which axis, and whether in its upper half.
+_SQUARES = [(axis, half) for axis in range(3) for half in range(2)]
+_SQUARE_OF = np.full(256, -1)
+for _number, (_axis, _half) in enumerate(_SQUARES):
+    _SQUARE_OF[sum(1 << child for child in range(8) if child >> _axis & 1 == _half)] = _number
 
 
 @dataclass(frozen=True)
@@ -51,20 +47,6 @@ class Bricks:
     pieces: Pieces
     values: Ints
     bytes_of: Ints
-
-
-@dataclass(frozen=True)
-class _Level:
-    """The nodes of one level, 1 or higher, in the order of their keys."""
-
-    key: Ints
-    first: Ints  # their first child on the level below; meaningless on level 1
-    mask: Bytes  # of all children, also where it is not sent
-    full: Bools
-    nodes: Ints  # masks of a brick that begins here
-    voxels: Ints  # how many
-    least: Ints  # bytes of the cheapest way
-    how: NDArray[np.int8]
 
 
 def can_code(coding: Coding) -> bool:
@@ -103,25 +85,39 @@ def brick(index: Ints, values: NDArray[np.integer], coding: Coding) -> Bricks:
 
 def _brick(index: Ints, values: NDArray[np.integer], coding: Coding) -> Bricks:
     pixels, rank = _ranked(values)
-    blocks = [-(-side // _SIDE) for side in coding.grid]
-    levels = _tree(*_leaves(index, rank, len(pixels), blocks, coding), coding)
-    roots, dots = _chosen(levels, coding)
+    blocks = [-(-side // SIDE) for side in coding.grid]
+    key, mask = leaves(index, rank, len(pixels), blocks, coding)
     parts: list[Pieces] = []
+    if coding.has(spec.FEATURE_BOX):
+        flats, others = _flats(key, mask, pixels, coding, blocks)
+        parts.append(flats)
+        key, mask = key[others], mask[others]
+    if len(key):
+        parts += _of_tree(tree(key, mask, coding), pixels, coding, blocks)
+    return _counted(join(parts), pixels, coding)
+
+
+def _of_tree(levels: list[Level], pixels: Ints, coding: Coding, blocks: list[int]) -> list[Pieces]:
+    roots, walks, dots = chosen(levels, coding)
     boxes, roots = _boxes(levels, roots, pixels, coding, blocks)
-    if boxes is not None:
-        parts.append(boxes)
-    for number, chosen in roots:
-        if len(chosen):
-            parts.append(_oct(levels, number, chosen, pixels, coding, blocks))
+    parts = [] if boxes is None else [boxes]
+    for number, nodes in roots:
+        if len(nodes):
+            parts.append(_oct(levels, number, nodes, pixels, coding, blocks))
+    if len(walks):
+        voxels, rank = origins(walks, blocks)
+        parts.append(chain(voxels, pixels[rank], coding).pieces)
     if len(dots):
         parts.append(_dots(dots, pixels, coding, blocks))
-    return _counted(join(parts), pixels, coding)
+    return parts
 
 
 def _counted(pieces: Pieces, pixels: Ints, coding: Coding) -> Bricks:
     pieces = pieces.take(np.argsort(pieces.pen, kind="stable"))
-    # Everything of a pen counts, the MOVE of a BOX included.
-    size = pieces.size + (pieces.at != ANY) * (1 + coding.move_bytes)
+    # Everything of a pen counts, the MOVE of a BOX included, and what makes a STEP a FROM.
+    goes = pieces.at != ANY
+    goes[1:] &= pieces.at[1:] != pieces.at_after[:-1]
+    size = pieces.size + goes * (coding.move_bytes + ~pieces.is_chain)
     bytes_of = np.bincount(np.searchsorted(pixels, pieces.pen), weights=size, minlength=len(pixels))
     return Bricks(pieces, pixels, bytes_of.astype(np.int64))
 
@@ -175,137 +171,8 @@ def _ranked(values: NDArray[np.integer]) -> tuple[Ints, Ints]:
     return pixels.astype(np.int64), rank.astype(np.int64)
 
 
-def _leaves(
-    index: Ints, rank: Ints, ranks: int, blocks: list[int], coding: Coding
-) -> tuple[Ints, Bytes]:
-    """Give keys and masks of the nodes of level 1, in the order of the keys.
-
-    A key is the pixel, the brick, and the way down to the node in it, three bits a level.
-    """
-    if ranks == 1 and _CROWDED * len(index) > coding.grid.voxels:
-        return _leaves_of_page(index, blocks, coding)
-    x, y, z = coding.grid.voxels_at(index).T
-    bx, by, bz = blocks
-    block = rank * bz + (z >> _TOP)
-    block = (block * by + (y >> _TOP)) * bx + (x >> _TOP)
-    low = _SIDE - 1
-    inner = _SPREAD[x & low] | _SPREAD[y & low] << 1 | _SPREAD[z & low] << 2
-    key = np.sort(block << _LEAF_BITS | inner)
-    parent = key >> 3
-    first = np.flatnonzero(np.concatenate(([True], parent[1:] != parent[:-1])))
-    bits = (1 << (key & 7)).astype(np.uint8)
-    return parent[first], np.add.reduceat(bits, first, dtype=np.uint8)
-
-
-def _leaves_of_page(index: Ints, blocks: list[int], coding: Coding) -> tuple[Ints, Bytes]:
-    """Do as `_leaves` for many voxels of one pixel: as a whole page nothing needs to be sorted."""
-    nx, ny, nz = coding.grid
-    bx, by, bz = blocks
-    page = np.zeros((bz * _SIDE, by * _SIDE, bx * _SIDE), dtype=np.uint8)
-    inside = np.zeros(coding.grid.voxels, dtype=np.uint8)
-    inside[index] = 1
-    page[:nz, :ny, :nx] = inside.reshape(coding.grid.array_shape)
-    mask = np.zeros([side // 2 for side in page.shape], dtype=np.uint8)
-    for child in range(8):
-        mask |= page[child >> 2 :: 2, child >> 1 & 1 :: 2, child & 1 :: 2] << np.uint8(child)
-    halves = [2] * (_TOP - 1)
-    parts = mask.reshape(bz, *halves, by, *halves, bx, *halves)
-    # Bricks first, then level by level: z, y and x take turns.
-    axes = np.arange(3 * _TOP).reshape(3, _TOP).T.reshape(-1)
-    ordered = parts.transpose(axes).reshape(-1)
-    key = np.flatnonzero(ordered)
-    return key, ordered[key]
-
-
-def _origins(key: Ints, blocks: list[int]) -> tuple[Ints, Ints]:
-    """Give the voxels, (n, 3), of keys of level 0, and the ranks of their pixels."""
-    bx, by, bz = blocks
-    block, x = np.divmod(key >> _LEAF_BITS, bx)
-    block, y = np.divmod(block, by)
-    rank, z = np.divmod(block, bz)
-    corner = np.stack((x, y, z), axis=1) << _TOP
-    for bit in range(_TOP):
-        corner += (key[:, None] >> (3 * bit + np.arange(3)) & 1) << bit
-    return corner, rank
-
-
-def _tree(key: Ints, mask: Bytes, coding: Coding) -> list[_Level]:
-    """Build the levels from 1 up, each node with the cheapest way to draw it."""
-    header, dot = _prices(coding)
-    voxels = _BITS[mask]
-    nodes = np.ones(len(key), dtype=np.int64)
-    ways = np.stack((nodes + header, voxels * dot, voxels * min(header, dot)))
-    levels = [_Level(key, key, mask, mask == 255, nodes, voxels, ways.min(axis=0), _least(ways))]
-    for _ in range(1, _TOP):
-        below = levels[-1]
-        parent = below.key >> 3
-        first = np.flatnonzero(np.concatenate(([True], parent[1:] != parent[:-1])))
-        bits = (1 << (below.key & 7)).astype(np.uint8)
-        mask = np.add.reduceat(bits, first, dtype=np.uint8)
-        full = (mask == 255) & (np.add.reduceat(below.full.astype(np.int64), first) == 8)
-        voxels = np.add.reduceat(below.voxels, first)
-        nodes = 1 + np.where(full, 0, np.add.reduceat(below.nodes, first))
-        own = nodes + header
-        own[own > coding.room] = _NEVER
-        ways = np.stack((own, voxels * dot, np.add.reduceat(below.least, first)))
-        levels.append(
-            _Level(parent[first], first, mask, full, nodes, voxels, ways.min(axis=0), _least(ways))
-        )
-    return levels
-
-
-def _prices(coding: Coding) -> tuple[int, int]:
-    """Give the bytes of a brick but for its masks, and of a dot."""
-    header = 1 + coding.move_bytes if coding.has(spec.FEATURE_OCT) else _NEVER
-    return header, coding.move_bytes if coding.has(spec.FEATURE_DOTS) else _NEVER
-
-
-def _least(ways: Ints) -> NDArray[np.int8]:
-    return np.asarray(ways.argmin(axis=0), dtype=np.int8)
-
-
-def _chosen(levels: list[_Level], coding: Coding) -> tuple[list[tuple[int, Ints]], Ints]:
-    """Go down from the top: the bricks of each level, and the keys of voxels that are dots.
-
-    Bricks are nodes of their level; those of level 0 are keys, too.
-    """
-    roots: list[tuple[int, Ints]] = []
-    dots: list[Ints] = []
-    open_ = np.arange(len(levels[-1].key))
-    for number in range(_TOP, 0, -1):
-        how = levels[number - 1].how[open_]
-        roots.append((number, open_[how == _HOW_BRICK]))
-        dots.append(_voxels(levels, _below(levels, number, open_[how == _HOW_DOTS], 1)))
-        open_ = open_[how == _HOW_CHILDREN]
-        if number > 1:
-            open_ = _below(levels, number, open_, number - 1)
-    alone = _voxels(levels, open_)
-    header, dot = _prices(coding)
-    if header < dot:
-        roots.append((0, alone))
-    else:
-        dots.append(alone)
-    return roots, np.sort(np.concatenate(dots))
-
-
-def _below(levels: list[_Level], number: int, nodes: Ints, to: int) -> Ints:
-    """Give the descendants of nodes on a lower level, 1 or higher."""
-    begin, end = nodes, nodes + 1
-    for level in range(number, to, -1):
-        edges = np.append(levels[level - 1].first, len(levels[level - 2].key))
-        begin, end = edges[begin], edges[end]
-    return ranges(begin, end - begin)
-
-
-def _voxels(levels: list[_Level], nodes: Ints) -> Ints:
-    """Give the keys of the voxels of nodes of level 1."""
-    leaves = levels[0]
-    lit = np.unpackbits(leaves.mask[nodes, None], axis=1, bitorder="little") != 0
-    return np.asarray((leaves.key[nodes, None] << 3 | np.arange(8))[lit])
-
-
 def _oct(
-    levels: list[_Level],
+    levels: list[Level],
     number: int,
     roots: Ints,
     pixels: Ints,
@@ -317,9 +184,7 @@ def _oct(
     size = 1 + coding.move_bytes + (levels[number - 1].nodes[roots] if number else none)
     offset = np.cumsum(size) - size
     body = np.empty(int(size.sum()), dtype=np.uint8)
-    origin, rank = _origins(
-        levels[number - 1].key[roots] << 3 * number if number else roots, blocks
-    )
+    origin, rank = origins(levels[number - 1].key[roots] << 3 * number if number else roots, blocks)
     body[offset] = spec.OP_OCT | number
     place = places(origin >> number, coding)
     body[offset[:, None] + 1 + np.arange(coding.move_bytes)] = place
@@ -344,7 +209,7 @@ def _oct(
 
 def _dots(key: Ints, pixels: Ints, coding: Coding, blocks: list[int]) -> Pieces:
     """Give DOTS ops, each with voxels of one pen."""
-    voxels, rank = _origins(key, blocks)
+    voxels, rank = origins(key, blocks)
     most = min(spec.LIMIT_MAX_DOTS, (coding.room - 2) // coding.move_bytes)
     first = np.flatnonzero(np.concatenate(([True], rank[1:] != rank[:-1])))
     count = np.diff(first, append=len(rank))
@@ -368,7 +233,7 @@ def _dots(key: Ints, pixels: Ints, coding: Coding, blocks: list[int]) -> Pieces:
 
 
 def _boxes(
-    levels: list[_Level],
+    levels: list[Level],
     roots: list[tuple[int, Ints]],
     pixels: Ints,
     coding: Coding,
@@ -379,7 +244,7 @@ def _boxes(
     full = levels[number - 1].full[top]
     if not coding.has(spec.FEATURE_BOX) or full.sum() < 2:
         return None, roots
-    origin, rank = _origins(levels[number - 1].key[top[full]] << 3 * number, blocks)
+    origin, rank = origins(levels[number - 1].key[top[full]] << 3 * number, blocks)
     low, high, merged, owner = cuboids(origin >> number, rank)
     worth = merged > 1
     kept = np.concatenate((top[~full], top[full][~worth[owner]]))
@@ -388,6 +253,35 @@ def _boxes(
     low, high, rank = low[worth], high[worth], rank[np.unique(owner, return_index=True)[1]][worth]
     pieces = box_pieces(low << number, ((high + 1) << number) - 1, pixels[rank], coding)
     return pieces, [(number, np.sort(kept)), *others]
+
+
+def _flats(
+    key: Ints, mask: Bytes, pixels: Ints, coding: Coding, blocks: list[int]
+) -> tuple[Pieces, Bools]:
+    """Make a BOX of squares that lie side by side; tell which nodes of level 1 are left.
+
+    Each of them takes a mask in a brick, or more elsewhere: as many as a BOX and its MOVE have
+    bytes are worth one.
+    """
+    least = 2 * (1 + coding.move_bytes)
+    rest = np.ones(len(key), dtype=np.bool_)
+    at = np.flatnonzero(_SQUARE_OF[mask] >= 0)
+    if len(at) < least:
+        return no_pieces(), rest
+    origin, rank = origins(key[at] << 3, blocks)
+    square = _SQUARE_OF[mask[at]]
+    axis, half = np.array(_SQUARES)[square].T
+    # Squares one above the other are no cuboid: each plane is a group of its own.
+    plane = np.take_along_axis(origin, axis[:, None], axis=1)[:, 0] + half
+    group = (rank * len(_SQUARES) + square) << 32 | plane
+    low, high, count, owner = cuboids(origin >> 1, group)
+    large = count >= least
+    rest[at[large[owner]]] = False
+    low, high = low[large] << 1, (high[large] << 1) + 1
+    first = np.unique(owner, return_index=True)[1][large]
+    row = np.arange(len(first))
+    low[row, axis[first]] = high[row, axis[first]] = plane[first]
+    return box_pieces(low, high, pixels[rank[first]], coding), rest
 
 
 def box_pieces(low: Ints, high: Ints, pen: Ints, coding: Coding) -> Pieces:
