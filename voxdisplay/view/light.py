@@ -153,11 +153,12 @@ def spread(light: Light, variance: float, step: float) -> Light:
     """Blur planes by a variance, in square pixels, in passes of at most a step; 2/3 at most."""
     passes = math.ceil(variance / step)
     share = np.float32(variance / max(1, passes) / 2)
+    light, given = light.copy(), np.empty_like(light)
     for _ in range(passes):
         for axis in (1, 2):
             # Each pixel gives its two neighbours along the axis a share: a variance of two shares.
-            given = light * share
-            light = light - 2 * given
+            np.multiply(light, share, out=given)
+            light *= 1 - 2 * share
             here, there = (
                 (light, given) if axis == 1 else (light.swapaxes(1, 2), given.swapaxes(1, 2))
             )
