@@ -35,14 +35,14 @@ _PIECES = 12
 @functools.lru_cache(maxsize=2)
 def stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
     """Draw the stage. Do not draw on it: it is kept for the next picture."""
-    fine = size[0] * _FINER, size[1] * _FINER
-    pen = _Pen(grid, camera, fine)
+    pen = _Pen(grid, camera, size)
     pen.lines(_floor(grid), _FLOOR, 0.9)
     pen.lines(_edges(grid), _EDGE, 1.0)
     ends = tips(grid)
     for tip, color in zip(ends, AXIS_COLORS, strict=True):
         pen.arrow(np.zeros(3), tip, color, 1.7)
-    image = pen.image.reduce(_FINER)
+    image = Image.new("RGB", size, GROUND)
+    image.paste(pen.image.reduce(_FINER), pen.corner)
     if labels:
         _label(image, ends, grid, camera)
     return image
@@ -78,15 +78,23 @@ class _Pen:
     """Draws lines between points of voxel space, fainter the farther away."""
 
     def __init__(self, grid: Grid, camera: Camera, size: tuple[int, int]) -> None:
-        self.image = Image.new("RGB", size, GROUND)
-        self._draw = ImageDraw.Draw(self.image)
-        self._grid, self._camera = grid, camera
-        self._unit = _FINER * max(1.0, min(size) / _FINER / 600)
+        self._grid, self._camera, self._size = grid, camera, size
+        self._unit = _FINER * max(1.0, min(size) / 600)
         self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
+        # Only as much of the picture as there are lines on, and the heads of arrows.
+        ends = np.vstack((tips(grid), list(itertools.product(*((0, side) for side in grid)))))
+        places = np.stack(camera.project(ends, grid, size)[:2])
+        room = 3 + 3 * self._unit / _FINER
+        low = np.clip(np.floor(places.min(axis=1) - room), 0, np.array(size) - 1).astype(int)
+        high = np.clip(np.ceil(places.max(axis=1) + room), low + 1, size).astype(int)
+        self.corner = int(low[0]), int(low[1])
+        width, height = ((high - low) * _FINER).tolist()
+        self.image = Image.new("RGB", (width, height), GROUND)
+        self._draw = ImageDraw.Draw(self.image)
 
     def _project(self, points: Floats) -> tuple[Floats, Floats]:
-        x, y, scale = self._camera.project(points, self._grid, self.image.size)
-        return np.stack((x, y), axis=1), scale / self._middle
+        x, y, scale = self._camera.project(points, self._grid, self._size)
+        return (np.stack((x, y), axis=1) - self.corner) * _FINER, scale / self._middle
 
     def lines(self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float) -> None:
         """Draw lines whose brightness shows their distance, in a few pieces each."""
