@@ -209,7 +209,7 @@ def test_a_picture_that_is_not_what_the_device_says_is_marked(tab, live):
     show(display, (1, 2, 3))
     page = tab(url)
     page.wait("current()?.n")
-    page.run("current().positions[0][0] = 2, proved = null, tell()")
+    page.run("current().positions[0][0] = 2, current().proved = null, tell()")
     assert "✗" in page.run("$('fact-Digest').textContent")
 
 

@@ -54,6 +54,8 @@ def read_back(message):
     assert len(x) == count
     format_ = vd.PixelFormat(head["format"])
     planes = np.frombuffer(data[size:], np.uint8)
+    if format_ is vd.PixelFormat.INDEX8:
+        head["palette"], planes = planes[-768:].reshape(3, 256).T, planes[:-768]
     planes = planes.reshape(0 if format_ is vd.PixelFormat.MONO1 else format_.bytes, count)
     page = np.zeros(format_.shape((nz, ny, nx)), format_.dtype)
     if format_ is vd.PixelFormat.MONO1:
@@ -84,6 +86,19 @@ def test_a_message_has_every_voxel(format_, size, density, seed):
     assert np.array_equal(got, page)
     assert (head["number"], head["title"], head["digest"]) == (12, "a", "0000beef")
     assert head["counters"] == {"Lost": 3}
+
+
+def test_a_message_has_the_palette():
+    palette = vd.Frame(GRID, "index8").palette
+    page = np.zeros(GRID.array_shape, np.uint8)
+    plain, _ = read_back(encode(Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "")))
+    assert np.array_equal(plain["palette"], palette)
+    assert plain["own"] == []
+    palette[[3, 200]] = (1, 2, 3), (4, 5, 6)
+    moment = Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "", palette=palette)
+    own, _ = read_back(encode(moment))
+    assert np.array_equal(own["palette"], palette)
+    assert own["own"] == [3, 200]
 
 
 # -- sources

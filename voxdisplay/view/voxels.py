@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import Colors
 from voxdisplay.pixel import PixelFormat
 
 _AT_ONCE = 8  # pixels of 1, 2 or 3 bytes, which make whole words
@@ -33,7 +34,12 @@ class Lit(NamedTuple):
     colors: NDArray[np.uint8]
 
 
-def lit_voxels(page: NDArray[np.integer], grid: Grid, format: PixelFormat) -> Lit:  # noqa: A002 - the word of the command line
+def lit_voxels(
+    page: NDArray[np.integer],
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002 - the word of the command line
+    palette: Colors | None = None,
+) -> Lit:
     """List what is lit.
 
     Parameters
@@ -42,6 +48,8 @@ def lit_voxels(page: NDArray[np.integer], grid: Grid, format: PixelFormat) -> Li
         What `Display.read` and `Frame.array` give, indexed [z, y, x].
     grid : Grid
     format : PixelFormat
+    palette : (256, 3) uint8 array, optional
+        Of an index8 page; by default the default one.
 
     Returns
     -------
@@ -57,7 +65,10 @@ def lit_voxels(page: NDArray[np.integer], grid: Grid, format: PixelFormat) -> Li
     format.check(page, grid.array_shape)
     flat = page.reshape(format.shape((grid.voxels,)))
     index, pixels = _lit(np.ascontiguousarray(flat))
-    colors = pixels if format is PixelFormat.RGB888 else format.rgb(pixels)
+    if format is PixelFormat.RGB888:
+        colors = pixels
+    else:
+        colors = format.rgb(pixels) if palette is None else palette[pixels]
     # Half the time of Grid.voxels_at: a display's sides are 16-bit, its voxels need not be.
     rest = index.astype(np.uint32) if grid.voxels < 1 << 32 else index
     positions = np.empty((len(index), 3), dtype=np.uint16)
