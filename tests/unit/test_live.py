@@ -132,6 +132,17 @@ def test_a_tap_is_read():
         TapSource(*parse_address(tap.address), "")
 
 
+def test_a_tap_brings_the_palette():
+    device = Device(Config(GRID, "index8", refresh=0))
+    device.memory.front.palette[9:12] = b"\x01\x02\x04"
+    with Tap(device) as tap:
+        source = TapSource(*parse_address(tap.address), "")
+        _, moment = source.next()
+        assert moment.palette[3].tolist() == [1, 2, 4]
+        assert np.array_equal(moment.palette[4:], vd.Frame(GRID, "index8").palette[4:])
+        source.close()
+
+
 def test_what_is_no_tap_is_refused(tmp_path):
     del tmp_path
     import socket  # noqa: PLC0415

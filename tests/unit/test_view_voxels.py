@@ -48,6 +48,15 @@ def test_dark_and_full(format_):
     assert colors.shape == (grid.voxels, 3)
 
 
+def test_a_palette_gives_the_colours():
+    grid, format_ = Grid(3, 5, 7), PixelFormat.INDEX8
+    palette = np.zeros((256, 3), np.uint8)
+    palette[9] = 1, 2, 4
+    array = np.zeros(grid.array_shape, np.uint8)
+    array[6, 4, 2] = 9
+    assert lit_voxels(array, grid, format_, palette).colors.tolist() == [[1, 2, 4]]
+
+
 def test_one_channel_is_enough():
     grid, format_ = Grid(3, 5, 7), PixelFormat.RGB888
     for channel in range(3):

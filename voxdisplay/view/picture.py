@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import Colors
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.axes import GROUND, stage
 from voxdisplay.view.camera import Camera
@@ -71,6 +72,7 @@ def picture(
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - the word of the command line
     look: Look = Look(),
+    palette: Colors | None = None,
 ) -> Image.Image:
     """Draw a page.
 
@@ -81,6 +83,8 @@ def picture(
     grid : Grid
     format : PixelFormat
     look : Look
+    palette : (256, 3) uint8 array, optional
+        Of an index8 page; by default the default one.
 
     Returns
     -------
@@ -88,7 +92,7 @@ def picture(
         RGB, of the look's size.
 
     """
-    return picture_of(lit_voxels(page, grid, format), grid, look)
+    return picture_of(lit_voxels(page, grid, format, palette), grid, look)
 
 
 def picture_of(lit: Lit, grid: Grid, look: Look, exposure: float | None = None) -> Image.Image:
