@@ -25,6 +25,7 @@ from firmware_sim.tap import Tap
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
 from voxdisplay.view.live.message import Moment, encode
+from voxdisplay.view.live.page import page as page_text
 from voxdisplay.view.live.server import open_server
 from voxdisplay.view.live.sources import DisplaySource, StillSource, TapSource
 
@@ -99,6 +100,10 @@ def test_a_message_has_the_palette():
     own, _ = read_back(encode(moment))
     assert np.array_equal(own["palette"], palette)
     assert own["own"] == [3, 200]
+
+
+def test_the_page_stays_small():
+    assert len(page_text().encode()) < 40_000
 
 
 # -- sources
