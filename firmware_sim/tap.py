@@ -9,7 +9,8 @@ The tap listens on TCP, on this machine only. The watcher asks, and gets one ans
   of the answer that brought it. A watcher that has none asks with FF in all bytes.
 - The answer comes as soon as another picture than that is on display: a header, and the front page
   as it stands in memory, that is ``nx * ny * nz`` pixels in scan order (protocol.md, section 2.1),
-  with a byte for each voxel of MONO1. Pictures in between are left out: only the newest counts.
+  with a byte for each voxel of MONO1. Behind a page of INDEX8 comes its palette: 256 times red,
+  green and blue, a byte each. Pictures in between are left out: only the newest counts.
 
 The header is 40 bytes, its integers unsigned and little-endian, one behind the other:
 
@@ -178,4 +179,4 @@ class Tap:
             device.damaged & _U32,
             device.refused.get(spec.CODE_OVERRUN, 0) & _U32,
         )
-        return header, shown.pixels
+        return header, shown.pixels + shown.palette

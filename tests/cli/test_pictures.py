@@ -109,9 +109,12 @@ def test_push_preview_is_of_the_device_s_own_page(run, emulator, tmp_path, forma
     done = run("push", "examples/house.json", "--port", running.port, "--preview", path)
     assert done.returncode == 0, done.stderr
     assert "read back from the display" in done.stderr
-    page = np.load(dump)
+    page, grid = np.load(dump), vd.Grid(40, 24, 32)
     assert page.any()
-    meant = picture(page, vd.Grid(40, 24, 32), PixelFormat(format_))
+    drawn = vd.Frame(grid, format_, own_palette=True)
+    for item in vd.load_scene("examples/house.json").fitted(grid)[0].items:
+        drawn.draw(item.curve, item.color)
+    meant = picture(page, grid, PixelFormat(format_), palette=drawn.palette)
     assert np.array_equal(pixels(path), np.asarray(meant))
 
 

@@ -10,8 +10,12 @@ import sys
 import urllib.request
 from pathlib import Path
 
+import numpy as np
 import pytest
 from websockets.sync.client import connect
+
+import voxdisplay as vd
+from voxdisplay.cli.view import _Watched
 
 ROOT = Path(__file__).parents[2]
 DEADLINE_S = 60
@@ -49,6 +53,27 @@ def test_a_display_that_cannot_be_read_cannot_be_watched(run):
     done = run("view", "--no-open", "--port", "sim:?size=3x5x7&features=digest")
     assert done.returncode == 1
     assert "cannot read its memory back" in done.stderr
+
+
+def test_colours_that_cannot_be_known_are_told_of_once(capsys):
+    port = "sim:?size=3x5x7&format=index8"
+    with vd.open(port) as display:
+        watched = _Watched(display)
+        frame = display.frame()
+        frame.draw([(1, 2, 3)], color="#010204")
+        for _ in range(2):
+            display.present(frame)
+            assert np.array_equal(watched.read(), frame.array())
+    assert capsys.readouterr().err.count("a palette, which cannot be read back") == 1
+
+
+def test_colours_of_the_default_palette_are_known(capsys):
+    with vd.open("sim:?size=3x5x7&format=index8") as display:
+        frame = display.frame()
+        frame.draw([(1, 2, 3)], color="#ff0000")
+        display.present(frame)
+        _Watched(display).read()
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("address", ["8000", "127.0.0.1:99999"])

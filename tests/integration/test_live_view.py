@@ -191,6 +191,17 @@ def test_colors_are_the_devices(format_, tab, tmp_path):
 # -- live
 
 
+def test_a_palette_is_the_page_s_own(tab, tmp_path):
+    frame = vd.Frame(SIZE, "index8", own_palette=True)
+    frame.draw([(1, 2, 3)], "#010204")
+    assert frame.has_own_palette
+    url = exported(tmp_path, [frame.array()], format_="index8", palette=frame.palette)
+    page = tab(url)
+    page.wait("painted")
+    assert page.run("current().colors.map(c => c[0])") == [1, 2, 4]
+    assert page.run("digest(current())") == f"{frame.digest():08x}"
+
+
 def test_what_the_device_shows_is_seen(tab, live):
     display, url, first = live
     page = tab(url)
@@ -209,7 +220,7 @@ def test_a_picture_that_is_not_what_the_device_says_is_marked(tab, live):
     show(display, (1, 2, 3))
     page = tab(url)
     page.wait("current()?.n")
-    page.run("current().positions[0][0] = 2, proved = null, tell()")
+    page.run("current().positions[0][0] = 2, current().proved = null, tell()")
     assert "✗" in page.run("$('fact-Digest').textContent")
 
 

@@ -25,6 +25,7 @@ from firmware_sim.tap import Tap
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
 from voxdisplay.view.live.message import Moment, encode
+from voxdisplay.view.live.page import page as page_text
 from voxdisplay.view.live.server import open_server
 from voxdisplay.view.live.sources import DisplaySource, StillSource, TapSource
 
@@ -54,6 +55,8 @@ def read_back(message):
     assert len(x) == count
     format_ = vd.PixelFormat(head["format"])
     planes = np.frombuffer(data[size:], np.uint8)
+    if format_ is vd.PixelFormat.INDEX8:
+        head["palette"], planes = planes[-768:].reshape(3, 256).T, planes[:-768]
     planes = planes.reshape(0 if format_ is vd.PixelFormat.MONO1 else format_.bytes, count)
     page = np.zeros(format_.shape((nz, ny, nx)), format_.dtype)
     if format_ is vd.PixelFormat.MONO1:
@@ -86,6 +89,23 @@ def test_a_message_has_every_voxel(format_, size, density, seed):
     assert head["counters"] == {"Lost": 3}
 
 
+def test_a_message_has_the_palette():
+    palette = vd.Frame(GRID, "index8").palette
+    page = np.zeros(GRID.array_shape, np.uint8)
+    plain, _ = read_back(encode(Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "")))
+    assert np.array_equal(plain["palette"], palette)
+    assert plain["own"] == []
+    palette[[3, 200]] = (1, 2, 3), (4, 5, 6)
+    moment = Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "", palette=palette)
+    own, _ = read_back(encode(moment))
+    assert np.array_equal(own["palette"], palette)
+    assert own["own"] == [3, 200]
+
+
+def test_the_page_stays_small():
+    assert len(page_text().encode()) < 40_000
+
+
 # -- sources
 
 
@@ -115,6 +135,17 @@ def test_a_tap_is_read():
     source.close()
     with pytest.raises(OpenError, match="cannot be reached"):
         TapSource(*parse_address(tap.address), "")
+
+
+def test_a_tap_brings_the_palette():
+    device = Device(Config(GRID, "index8", refresh=0))
+    device.memory.front.palette[9:12] = b"\x01\x02\x04"
+    with Tap(device) as tap:
+        source = TapSource(*parse_address(tap.address), "")
+        _, moment = source.next()
+        assert moment.palette[3].tolist() == [1, 2, 4]
+        assert np.array_equal(moment.palette[4:], vd.Frame(GRID, "index8").palette[4:])
+        source.close()
 
 
 def test_what_is_no_tap_is_refused(tmp_path):

@@ -82,6 +82,17 @@ def test_the_header_is_as_it_is_written() -> None:
     assert page == bytes(3 * 5 * 7 * 2)
 
 
+def test_a_palette_comes_behind_its_page() -> None:
+    watched = device(pixel_format="index8")
+    watched.receive(hello() + data(0, 0, b"\x06\x03\x00\x01\x02\x04", CLEAR | COMMIT))
+    with tapped(watched) as tap, watch(tap) as watcher:
+        watcher.sendall(NOTHING)
+        _, page = take(watcher, 3 * 5 * 7 + 256 * 3)
+    shown = Bench(watched).snapshot()
+    assert page == shown.pixels + shown.palette
+    assert page[105 + 9 : 105 + 12] == b"\x01\x02\x04"
+
+
 def test_a_watcher_gets_the_newest_picture_and_none_twice() -> None:
     watched = device()
     watched.receive(hello())

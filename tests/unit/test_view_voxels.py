@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
@@ -46,6 +48,15 @@ def test_dark_and_full(format_):
     assert colors.shape == (grid.voxels, 3)
 
 
+def test_a_palette_gives_the_colours():
+    grid, format_ = Grid(3, 5, 7), PixelFormat.INDEX8
+    palette = np.zeros((256, 3), np.uint8)
+    palette[9] = 1, 2, 4
+    array = np.zeros(grid.array_shape, np.uint8)
+    array[6, 4, 2] = 9
+    assert lit_voxels(array, grid, format_, palette).colors.tolist() == [[1, 2, 4]]
+
+
 def test_one_channel_is_enough():
     grid, format_ = Grid(3, 5, 7), PixelFormat.RGB888
     for channel in range(3):
@@ -57,3 +68,20 @@ def test_one_channel_is_enough():
 def test_a_page_of_another_shape_is_refused():
     with pytest.raises(ValueError, match="shape"):
         lit_voxels(np.zeros((3, 5, 7), np.uint8), Grid(3, 5, 7), PixelFormat.INDEX8)
+
+
+@given(
+    st.sampled_from(list(PixelFormat)),
+    st.sampled_from([Grid(3, 5, 7), Grid(4, 4, 4), Grid(1, 1, 1), Grid(300, 5, 9)]),
+    st.sampled_from([0.0, 0.005, 0.1, 1.0]),
+    st.integers(0, 1000),
+)
+def test_what_is_lit_is_found_however_little_or_much_it_is(format_, grid, density, seed):
+    rng = np.random.default_rng(seed)
+    top = 2 if format_ is PixelFormat.MONO1 else np.iinfo(format_.dtype).max + 1
+    array = rng.integers(0, top, format_.shape(grid.array_shape)).astype(format_.dtype)
+    array[rng.random(grid.array_shape) >= density] = 0
+    values = format_.values(array)
+    positions, colors = lit_voxels(array, grid, format_)
+    assert np.array_equal(grid.index_of(positions), np.flatnonzero(values))
+    assert np.array_equal(colors, format_.rgb(values[values != 0]))

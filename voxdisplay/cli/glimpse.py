@@ -55,7 +55,8 @@ def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: Bau
     if page is None and _cheap(info, count, rate):
         page = display.read()
     what = "what was sent, not read back" if page is None else "read back from the display"
-    lit = lit_voxels(frame.array() if page is None else page, info.grid, info.format)
+    shown = frame.array() if page is None else page
+    lit = lit_voxels(shown, info.grid, info.format, frame.palette)
     room = shutil.get_terminal_size()
     columns, rows = min(_COLUMNS, room.columns - 1), min(_ROWS, room.lines - 5)
     if columns < 2 * rows or rows < 6:

@@ -18,6 +18,9 @@ from voxdisplay.cli.options import note, plural
 from voxdisplay.pixel import Pixels
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from voxdisplay.view.save import Shot
 
 # The keys of voxdisplay.view.save.WRITERS, which is not imported for them.
@@ -114,11 +117,16 @@ def save_picture(
         raise click.ClickException(f"{path} cannot be written: {error.strerror}") from error
 
 
-def save_page(path: Path, page: Pixels, info: vd.DeviceInfo) -> None:
-    """Write a picture of what was read back from a display."""
+def save_page(
+    path: Path, page: Pixels, info: vd.DeviceInfo, palette: NDArray[np.uint8] | None
+) -> None:
+    """Write a picture of what was read back from a display.
+
+    The palette, which cannot be read back, is the frame's: the display's digest has proved both.
+    """
     from voxdisplay.view.save import Shot  # noqa: PLC0415
 
     title = f"{info.name or 'voxdisplay'} {info.serial}".strip()
-    save_picture(path, Shot(page, info.grid, info.format, title=title))
+    save_picture(path, Shot(page, info.grid, info.format, title=title, palette=palette))
     lit = int(page.any(axis=-1).sum() if page.ndim == 4 else (page != 0).sum())
     note(f"{path}: {plural(lit, 'voxel')} read back from the display")

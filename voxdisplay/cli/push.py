@@ -110,7 +110,7 @@ def push(
         else:
             click.echo(_summary(display, receipt, verify=verify))
         if preview and page is not None:  # what was shown has been said, if this fails
-            save_page(preview, page, display.info)
+            save_page(preview, page, display.info, frame.palette)
         if not quiet and not as_json:
             glimpse(display, frame, page, baud)
 

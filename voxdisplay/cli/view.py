@@ -14,6 +14,7 @@ import voxdisplay as vd
 from voxdisplay.baud import Baud
 from voxdisplay.cli.options import SizeType, note, open_display, port_options
 from voxdisplay.cli.scenes import draw
+from voxdisplay.pixel import Pixels
 
 if TYPE_CHECKING:
     from voxdisplay.view.live.sources import Source
@@ -152,7 +153,34 @@ def _readback(port: str | None, baud: Baud, timeout_s: float) -> Iterator[Source
             counted = display.counters
             return {"Bytes sent": counted.wire_bytes, "Damaged": counted.device_damaged}
 
-        yield DisplaySource(display, info.grid, info.format, counters)
+        yield DisplaySource(_Watched(display), info.grid, info.format, counters)
+
+
+class _Watched:
+    """A display that is read back, and of which is said, once, if its colours cannot be known."""
+
+    def __init__(self, display: vd.Display) -> None:
+        self._display = display
+        info = display.info
+        self._in_doubt = info.format is vd.PixelFormat.INDEX8 and "palette" in info.features
+        self.port = display.port
+
+    def digest(self) -> int | None:
+        """See `Display.digest`."""
+        return self._display.digest()
+
+    def read(self) -> Pixels:
+        """See `Display.read`. A palette cannot be read, but the digest tells the default one."""
+        page = self._display.read()
+        if self._in_doubt:
+            meant = vd.Frame(self._display.info.grid, vd.PixelFormat.INDEX8)
+            meant.set(page)
+            if self.digest() != meant.digest():
+                self._in_doubt = False
+                note(
+                    "this picture has a palette, which cannot be read back: colours are not its own"
+                )
+        return page
 
 
 def _frame(scene: str, display_size: vd.Grid | None) -> vd.Frame:
@@ -181,9 +209,9 @@ def _of_display(port: str | None, baud: Baud, timeout_s: float) -> Iterator[View
     from voxdisplay.view.voxels import Lit, lit_voxels  # noqa: PLC0415
 
     with open_display(port, baud, timeout_s) as display:
-        info = display.info
+        info, watched = display.info, _Watched(display)
 
         def read() -> Lit:
-            return lit_voxels(display.read(), info.grid, info.format)
+            return lit_voxels(watched.read(), info.grid, info.format)
 
         yield View(info.grid, display.port, read, changes=True)

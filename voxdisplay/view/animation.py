@@ -83,9 +83,13 @@ def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
     Its clock ticks a hundred times a second: the times of the pictures are rounded to that, and
     the whole is as long as it should be.
     """
-    palette = _palette(pictures)
+    samples = {n: pictures[n] for n in {i * len(pictures) // _SAMPLES for i in range(_SAMPLES)}}
+    palette = _palette([*samples.values()])
     quantised = (
-        picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
+        (samples.pop(number, None) or pictures[number]).quantize(
+            palette=palette, dither=Image.Dither.NONE
+        )
+        for number in range(len(pictures))
     )
     ticks = [round(100 * i / fps) for i in range(len(pictures) + 1)]
     next(quantised).save(
@@ -101,18 +105,19 @@ def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
     )
 
 
-def _palette(pictures: Sequence[Image.Image]) -> Image.Image:
-    """Find 256 colours for all pictures.
+def _palette(samples: Sequence[Image.Image]) -> Image.Image:
+    """Find 256 colours for all pictures of which these are some.
 
-    Those of some of them count, a colour that is rare nearly as much as one that is common: the
-    ground is most of a picture, and least of what one looks at.
+    A colour that is rare counts nearly as much as one that is common: the ground is most of a
+    picture, and least of what one looks at.
     """
-    some = [np.asarray(pictures[i * len(pictures) // _SAMPLES])[::2, ::2] for i in range(_SAMPLES)]
-    colors = np.concatenate([picture.reshape(-1, 3) for picture in some]).astype(np.uint32)
-    coarse = colors @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32) & 0xFEFEFE
-    distinct, counts = np.unique(coarse, return_counts=True)
-    repeated = np.repeat(distinct, np.ceil(counts**_COMMON).astype(np.int64))
-    rgb = np.stack([repeated >> 16, repeated >> 8 & 255, repeated & 255], axis=1).astype(np.uint8)
+    colors = np.concatenate([np.asarray(one)[::3, ::3].reshape(-1, 3) for one in samples])
+    red, green, blue = (colors >> 1).astype(np.int32).T
+    counts = np.bincount(red << 14 | green << 7 | blue)
+    distinct = np.flatnonzero(counts)
+    repeated = np.repeat(distinct, np.ceil(counts[distinct] ** _COMMON).astype(np.int64))
+    rgb = np.stack([repeated >> 14, repeated >> 7 & 127, repeated & 127], axis=1).astype(np.uint8)
+    rgb <<= 1
     count = 256 - len(AXIS_COLORS)  # thin lines, which an average would lose
     found = Image.fromarray(rgb[None]).quantize(count, method=Image.Quantize.MEDIANCUT)
     palette = Image.new("P", (1, 1))

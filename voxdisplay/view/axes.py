@@ -28,21 +28,21 @@ _BEYOND = 0.075
 _CELLS = 8
 # Lines are drawn on a raster this much finer, and reduced: Pillow draws hard edges.
 _FINER = 3
+# A line fades with its distance in so many steps.
+_PIECES = 12
 
 
 @functools.lru_cache(maxsize=2)
 def stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
     """Draw the stage. Do not draw on it: it is kept for the next picture."""
-    fine = size[0] * _FINER, size[1] * _FINER
-    pen = _Pen(grid, camera, fine)
-    for start, end in _floor(grid):
-        pen.line(start, end, _FLOOR, 0.9)
-    for start, end in _edges(grid):
-        pen.line(start, end, _EDGE, 1.0)
+    pen = _Pen(grid, camera, size)
+    pen.lines(_floor(grid), _FLOOR, 0.9)
+    pen.lines(_edges(grid), _EDGE, 1.0)
     ends = tips(grid)
     for tip, color in zip(ends, AXIS_COLORS, strict=True):
         pen.arrow(np.zeros(3), tip, color, 1.7)
-    image = pen.image.reduce(_FINER)
+    image = Image.new("RGB", size, GROUND)
+    image.paste(pen.image.reduce(_FINER), pen.corner)
     if labels:
         _label(image, ends, grid, camera)
     return image
@@ -78,28 +78,38 @@ class _Pen:
     """Draws lines between points of voxel space, fainter the farther away."""
 
     def __init__(self, grid: Grid, camera: Camera, size: tuple[int, int]) -> None:
-        self.image = Image.new("RGB", size, GROUND)
-        self._draw = ImageDraw.Draw(self.image)
-        self._grid, self._camera = grid, camera
-        self._unit = _FINER * max(1.0, min(size) / _FINER / 600)
+        self._grid, self._camera, self._size = grid, camera, size
+        self._unit = _FINER * max(1.0, min(size) / 600)
         self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
+        # Only as much of the picture as there are lines on, and the heads of arrows.
+        ends = np.vstack((tips(grid), list(itertools.product(*((0, side) for side in grid)))))
+        places = np.stack(camera.project(ends, grid, size)[:2])
+        room = 3 + 3 * self._unit / _FINER
+        low = np.clip(np.floor(places.min(axis=1) - room), 0, np.array(size) - 1).astype(int)
+        high = np.clip(np.ceil(places.max(axis=1) + room), low + 1, size).astype(int)
+        self.corner = int(low[0]), int(low[1])
+        width, height = ((high - low) * _FINER).tolist()
+        self.image = Image.new("RGB", (width, height), GROUND)
+        self._draw = ImageDraw.Draw(self.image)
 
     def _project(self, points: Floats) -> tuple[Floats, Floats]:
-        x, y, scale = self._camera.project(points, self._grid, self.image.size)
-        return np.stack((x, y), axis=1), scale / self._middle
+        x, y, scale = self._camera.project(points, self._grid, self._size)
+        return (np.stack((x, y), axis=1) - self.corner) * _FINER, scale / self._middle
 
-    def line(self, start: Floats, end: Floats, color: Rgb, width: float) -> None:
-        """Draw a line whose brightness shows its distance, in a few pieces."""
-        pieces = 12
-        points, near = self._project(np.linspace(start, end, pieces + 1))
-        for i in range(pieces):
-            fade = min(1.0, max(0.12, (near[i] + near[i + 1]) / 2 * 1.55 - 0.95))
-            mixed = tuple(round(g + (c - g) * fade) for g, c in zip(GROUND, color, strict=True))
-            self._draw.line(
-                [tuple(points[i]), tuple(points[i + 1])],
-                fill=mixed,
-                width=max(1, round(width * self._unit)),
-            )
+    def lines(self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float) -> None:
+        """Draw lines whose brightness shows their distance, in a few pieces each."""
+        if not ends:
+            return
+        starts, stops = np.array(ends).swapaxes(0, 1)[:, :, None]
+        along = starts + (stops - starts) * np.linspace(0, 1, _PIECES + 1)[:, None]
+        points, near = self._project(along.reshape(-1, 3))
+        near = near.reshape(len(ends), -1)
+        fade = np.clip((near[:, :-1] + near[:, 1:]) / 2 * 1.55 - 0.95, 0.12, 1)
+        mixed = np.rint(GROUND + np.subtract(color, GROUND) * fade[..., None]).astype(int).tolist()
+        thick = max(1, round(width * self._unit))
+        for line, colors in zip(points.reshape(len(ends), -1, 2).tolist(), mixed, strict=True):
+            for start, stop, fill in zip(line, line[1:], colors, strict=False):
+                self._draw.line((*start, *stop), fill=tuple(fill), width=thick)
 
     def arrow(self, start: Floats, end: Floats, color: Rgb, width: float) -> None:
         """Draw an axis with its head."""

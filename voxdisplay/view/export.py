@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import Colors
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.live.message import Moment, encode
 from voxdisplay.view.live.page import page, policy
@@ -37,6 +38,7 @@ def save_html(
     *,
     title: str = "voxdisplay",
     fps: float = 20.0,
+    palette: Colors | None = None,
 ) -> None:
     """Write pages as one HTML file, that takes the place of another only when it is whole.
 
@@ -50,6 +52,8 @@ def save_html(
     title : str
     fps : float
         Pages a second, 0.1 to 120.
+    palette : (256, 3) uint8 array, optional
+        Of index8 pages; by default the default one.
 
     Raises
     ------
@@ -65,10 +69,11 @@ def save_html(
         raise ValueError(f"{fps} pages a second: take 0.1 to 120")
     grid = Grid(*grid)
     frames = [
-        zlib.compress(encode(Moment(np.asarray(one), grid, format, number, title)), _LEVEL)
+        Moment(np.asarray(one), grid, format, number, title, palette=palette)
         for number, one in enumerate(pages, 1)
     ]
-    data = json.dumps({"fps": fps, "frames": [base64.b64encode(f).decode() for f in frames]})
+    packed = [zlib.compress(encode(frame), _LEVEL) for frame in frames]
+    data = json.dumps({"fps": fps, "frames": [base64.b64encode(f).decode() for f in packed]})
     text = page()
     for mark, more in (
         (_HEAD, f'<meta http-equiv="Content-Security-Policy" content="{policy()}">\n'),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import Colors
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.axes import GROUND, stage
 from voxdisplay.view.camera import Camera
@@ -71,6 +72,7 @@ def picture(
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - the word of the command line
     look: Look = Look(),
+    palette: Colors | None = None,
 ) -> Image.Image:
     """Draw a page.
 
@@ -81,6 +83,8 @@ def picture(
     grid : Grid
     format : PixelFormat
     look : Look
+    palette : (256, 3) uint8 array, optional
+        Of an index8 page; by default the default one.
 
     Returns
     -------
@@ -88,7 +92,7 @@ def picture(
         RGB, of the look's size.
 
     """
-    return picture_of(lit_voxels(page, grid, format), grid, look)
+    return picture_of(lit_voxels(page, grid, format, palette), grid, look)
 
 
 def picture_of(lit: Lit, grid: Grid, look: Look, exposure: float | None = None) -> Image.Image:
@@ -109,10 +113,20 @@ def picture_of(lit: Lit, grid: Grid, look: Look, exposure: float | None = None) 
     if not glare.light.size:
         return image
     exposed = _toned(glare.light * np.float32(exposure or meter(glare.light)))
-    sharp = Image.new("RGB", look.size)
-    sharp.paste(_srgb(exposed), (glare.left, glare.top))
-    image = ImageChops.screen(image, sharp)
-    return ImageChops.screen(image, _halo(sharp)) if look.glow else image
+    sharp = _srgb(exposed)
+    if not look.glow:
+        return _screened(image, sharp, glare.left, glare.top)
+    whole = Image.new("RGB", look.size)
+    whole.paste(sharp, (glare.left, glare.top))
+    image = _screened(image, sharp, glare.left, glare.top)
+    return _screened(image, *_halo(whole))
+
+
+def _screened(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:
+    """Shine light on a part of an image, and give the image."""
+    box = left, top, left + light.width, top + light.height
+    image.paste(ImageChops.screen(image.crop(box), light), box)
+    return image
 
 
 def meter(light: Light) -> float:
@@ -147,8 +161,11 @@ def _srgb(light: Light) -> Image.Image:
     return Image.merge("RGB", [Image.fromarray(plane) for plane in _TO_SRGB.take(steps)])
 
 
-def _halo(sharp: Image.Image) -> Image.Image:
-    """Give the light that scatters around what is bright: a narrow and a wide blur of it."""
+def _halo(sharp: Image.Image) -> tuple[Image.Image, int, int]:
+    """Give the light that scatters around what is bright: a narrow and a wide blur of it.
+
+    And where it lies in the picture, left and top; it is dark around it.
+    """
     coarse = np.asarray(sharp.reduce(_COARSER), dtype=np.float32).transpose(2, 0, 1)
     scattered = np.zeros_like(coarse)
     for variance, share in _SCATTER:
@@ -156,5 +173,17 @@ def _halo(sharp: Image.Image) -> Image.Image:
     gain = min(_MOST_GAIN, _HALO_PEAK / max(1.0, float(scattered.max())))
     planes = np.rint(scattered * gain).astype(np.uint8)
     small = Image.merge("RGB", [Image.fromarray(plane) for plane in planes])
-    large = small.resize((small.width * _COARSER, small.height * _COARSER), _SMOOTH)
-    return large.crop((0, 0, *sharp.size))
+    left, top, right, bottom = small.getbbox() or (0, 0, 1, 1)
+    # What is enlarged reaches two pixels farther.
+    box = (
+        max(0, left - 2),
+        max(0, top - 2),
+        min(small.width, right + 2),
+        min(small.height, bottom + 2),
+    )
+    size = (box[2] - box[0]) * _COARSER, (box[3] - box[1]) * _COARSER
+    left, top = box[0] * _COARSER, box[1] * _COARSER
+    large = small.resize(size, _SMOOTH, box)
+    # The last coarse pixels may stand over the picture's edge.
+    inside = min(large.width, sharp.width - left), min(large.height, sharp.height - top)
+    return large.crop((0, 0, *inside)), left, top

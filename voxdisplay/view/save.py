@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import Colors
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
 from voxdisplay.view.picture import Look, picture
@@ -38,6 +39,8 @@ class Shot:
     title : str
     seconds, fps : float
         Of a film: how long one turn takes, and pictures a second.
+    palette : (256, 3) uint8 array or None
+        Of an index8 page; None for the default one.
 
     """
 
@@ -48,10 +51,11 @@ class Shot:
     title: str = "voxdisplay"
     seconds: float = 3.0
     fps: float = 20.0
+    palette: Colors | None = None
 
     def turn(self, progress: Progress | None) -> Turntable:
         """Give the pictures of one turn."""
-        lit = lit_voxels(self.page, self.grid, self.format)
+        lit = lit_voxels(self.page, self.grid, self.format, self.palette)
         count = max(1, round(self.seconds * self.fps))
         return Turntable(lit, self.grid, self.look, count, progress)
 
@@ -99,7 +103,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _png(path: Path, shot: Shot, _: Progress | None) -> None:
-    picture(shot.page, shot.grid, shot.format, shot.look).save(path, format="PNG")
+    drawn = picture(shot.page, shot.grid, shot.format, shot.look, shot.palette)
+    drawn.save(path, format="PNG")
 
 
 def _gif(path: Path, shot: Shot, progress: Progress | None) -> None:
@@ -113,7 +118,15 @@ def _mp4(path: Path, shot: Shot, progress: Progress | None) -> None:
 def _html(path: Path, shot: Shot, _: Progress | None) -> None:
     from voxdisplay.view.export import save_html  # noqa: PLC0415 - it brings a page of its own
 
-    save_html(path, [shot.page], shot.grid, shot.format, title=shot.title, fps=shot.fps)
+    save_html(
+        path,
+        [shot.page],
+        shot.grid,
+        shot.format,
+        title=shot.title,
+        fps=shot.fps,
+        palette=shot.palette,
+    )
 
 
 WRITERS: dict[str, Callable[[Path, Shot, Progress | None], None]] = {

@@ -7,9 +7,11 @@ and planes of bytes, all little-endian::
     x, y, z      three planes with a u8 for each lit voxel, or a u16 if ``wide`` is true
     pixel        no plane for mono1, one for index8, two for rgb565 (low byte first), three for
                  rgb888 (red, green, blue)
+    palette      for index8: three planes of 256, red, green and blue of each pixel value
 
 Lit voxels are in scan order, so that deflate finds them easy. The JSON has ``number``, ``title``,
-``size``, ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap`` and ``wide``.
+``size``, ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap``, ``wide``, and
+``own``: which entries are not those of the default palette.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.grid import Grid
+from voxdisplay.palette import DEFAULT, Colors, Palette
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.view.voxels import lit_voxels
 
@@ -47,6 +50,8 @@ class Moment:
         What the device says of the page (protocol.md, section 8).
     counters : mapping of str to int
         What else the source knows, by names for people.
+    palette : (256, 3) uint8 array or None
+        Of an index8 page; None for the default one.
 
     """
 
@@ -57,6 +62,7 @@ class Moment:
     title: str
     digest: int | None = None
     counters: Mapping[str, int] = field(default_factory=dict)
+    palette: Colors | None = None
 
 
 def encode(moment: Moment) -> bytes:
@@ -71,6 +77,7 @@ def encode(moment: Moment) -> bytes:
         places = np.packbits(lit, bitorder="little").tobytes()
     else:
         places = voxels.T.astype("<u2" if wide else "u1").tobytes()
+    palette = Palette(moment.palette)
     head = json.dumps(
         {
             "number": moment.number,
@@ -82,18 +89,20 @@ def encode(moment: Moment) -> bytes:
             "counters": dict(moment.counters),
             "bitmap": bitmap,
             "wide": wide,
+            "own": palette.differs_from(DEFAULT).tolist(),
         }
     ).encode()
     head += b" " * (-(len(head) + _OFFSET.size) % 8)
-    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(moment, voxels)
+    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(moment, voxels, palette)
 
 
-def _planes(moment: Moment, voxels: NDArray[np.integer]) -> bytes:
-    """Give the pixel values of voxels, byte by byte."""
+def _planes(moment: Moment, voxels: NDArray[np.integer], palette: Palette) -> bytes:
+    """Give the pixel values of voxels, byte by byte, and what they mean."""
     if moment.format is PixelFormat.MONO1:
         return b""
     x, y, z = voxels.T
     values = moment.page[z, y, x].T
     if moment.format is PixelFormat.RGB565:
         values = np.stack((values & 0xFF, values >> 8))
-    return bytes(values.astype("u1").tobytes())
+    planes = bytes(values.astype("u1").tobytes())
+    return planes + palette.colors.T.tobytes() if moment.format is PixelFormat.INDEX8 else planes

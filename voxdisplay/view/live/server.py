@@ -274,5 +274,6 @@ def _response(
 
 def _png(moment: Moment) -> bytes:
     out = io.BytesIO()
-    picture(moment.page, moment.grid, moment.format).save(out, "PNG", compress_level=1)
+    drawn = picture(moment.page, moment.grid, moment.format, palette=moment.palette)
+    drawn.save(out, "PNG", compress_level=1)
     return out.getvalue()

@@ -18,6 +18,7 @@ import numpy as np
 
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.grid import Grid
+from voxdisplay.palette import DEFAULT
 from voxdisplay.pixel import PixelFormat, Pixels
 from voxdisplay.view.live.message import Moment
 
@@ -105,6 +106,9 @@ class TapSource:
                 raise TransportClosed(f"{self._name} speaks another language: {magic!r}")
             grid = Grid(nx, ny, nz)
             data = self._receive(grid.voxels * format_.bytes)
+            palette = None
+            if format_ is PixelFormat.INDEX8:
+                palette = np.frombuffer(self._receive(DEFAULT.size), "u1").reshape(DEFAULT.shape)
         except OSError as error:
             raise TransportClosed(f"{self._name} is gone: {error}") from error
         page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
@@ -117,6 +121,7 @@ class TapSource:
             self._title,
             digest,
             dict(zip(self._COUNTED, counts, strict=True)),
+            palette,
         )
 
     def check(self) -> None:
