@@ -33,13 +33,17 @@ def _near(voxels: Voxels, i: int, j: int) -> bool:
 @jit
 def torn(piece: Pieces, voxels: Voxels) -> Ints:
     """See `events.torn`."""
-    found = np.empty(piece.size, dtype=np.int64)
     count = 0
     for k in range(piece.size - 1):
-        if (piece[k] == piece[k + 1]) & ~_near(voxels, k, k + 1):
-            found[count] = k
-            count += 1
-    return found[:count].copy()
+        count += (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1))
+    found = np.empty(count, dtype=np.int64)
+    if count:  # which is rare
+        count = 0
+        for k in range(piece.size - 1):
+            if (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1)):
+                found[count] = k
+                count += 1
+    return found
 
 
 def choose_corners(crossings: Crossings, knots: Samples) -> Events:
@@ -94,13 +98,13 @@ def _choose_corners(
                 at, k = at + 1, k + 1
 
     bridged = np.zeros(size, dtype=np.bool_)
-    for k in range(size - 1):
-        if piece[k] == piece[k + 1] and not _near(nearest, k, k + 1):
+    for k in range(size):
+        if k + 1 < size and piece[k] == piece[k + 1] and not _near(nearest, k, k + 1):
             bridged[k] = True
             gain[k] = gain[k + 1] = np.inf
-    for k in range(size):
         if not np.isfinite(gain[k]):
-            voxels[:, k] = nearest[:, k]
+            for row in range(3):
+                voxels[row, k] = nearest[row, k]
     apart = torn(piece, voxels)
     while apart.size:
         back = np.empty(apart.size, dtype=np.int64)
@@ -263,11 +267,13 @@ def _reduce(
             number[size] = k
             size += 1
     number = number[:size]
-    piece, t, heading = full_piece[number], full_t[number], full_heading[number]
-    voxels = np.empty((3, size), dtype=np.int32)
-    for row in range(3):
-        for k in range(size):
-            voxels[row, k] = full_voxels[row, number[k]]
+    piece, t, voxels, heading = full_piece, full_t, full_voxels, full_heading
+    if size < whole:
+        piece, t, heading = full_piece[number], full_t[number], full_heading[number]
+        voxels = np.empty((3, size), dtype=np.int32)
+        for row in range(3):
+            for k in range(size):
+                voxels[row, k] = full_voxels[row, number[k]]
     look = _look(piece, voxels, heading, window)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
