@@ -130,6 +130,8 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
 
 def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:
     """Stop before the work gets out of hand: ``parts`` is what comes next."""
+    if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
+        return
     curve = samples.piece[:-1]
     length = np.bincount(curve, chord, len(batch.curves))
     count = np.bincount(curve, parts, len(batch.curves))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,16 +27,13 @@ def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
     Cuts are made at ``starts``, where curves begin, and at multiples of ``size`` from there, so
     that a curve is cut in the same places whatever comes before it.
     """
+    edges = np.append(starts, stop)
     begin = 0
-    for low, high in pairwise([*starts.tolist(), stop]):
-        if high - begin > size and low > begin:
-            yield begin, low
-            begin = low
-        while high - begin > size:
-            yield begin, begin + size
-            begin += size
-    if begin < stop:
-        yield begin, stop
+    while begin < stop:
+        end = int(edges[np.searchsorted(edges, begin + size, side="right") - 1])
+        end = end if end > begin else begin + size
+        yield begin, end
+        begin = end
 
 
 @twin

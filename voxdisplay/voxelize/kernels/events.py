@@ -80,22 +80,24 @@ def _choose_corners(
     size = inner_t.size + 2 * pieces
     piece, t = np.empty(size, dtype=np.int32), np.empty(size)
     nearest, voxels = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
-    heading, gain = np.full(size, PLAIN, dtype=np.int8), np.full(size, np.inf)
-    at = k = 0
+    heading, gain = np.empty(size, dtype=np.int8), np.empty(size)
+    at = begin = 0
     for number in range(pieces):
-        for end in range(2):
-            knot = bounds[number] if end == 0 else bounds[number + 1] - 1
-            piece[at], t[at] = number, knots_t[knot]
+        end = begin
+        while end < inner_t.size and inner_piece[end] == number:
+            end += 1
+        stop = at + 1 + end - begin
+        piece[at : stop + 1] = number
+        t[at + 1 : stop], gain[at + 1 : stop] = inner_t[begin:end], inner_gain[begin:end]
+        heading[at + 1 : stop] = inner_heading[begin:end]
+        for row in range(3):
+            nearest[row, at + 1 : stop] = inner_voxels[row, begin:end]
+            voxels[row, at + 1 : stop] = inner_better[row, begin:end]
+        for tip, knot in ((at, bounds[number]), (stop, bounds[number + 1] - 1)):
+            t[tip], heading[tip], gain[tip] = knots_t[knot], PLAIN, np.inf
             for row in range(3):
-                nearest[row, at] = voxels[row, at] = int(np.floor(points[row, knot]))
-            at += 1
-            while end == 0 and k < inner_t.size and inner_piece[k] == number:
-                piece[at], t[at] = number, inner_t[k]
-                heading[at], gain[at] = inner_heading[k], inner_gain[k]
-                for row in range(3):
-                    nearest[row, at] = inner_voxels[row, k]
-                    voxels[row, at] = inner_better[row, k]
-                at, k = at + 1, k + 1
+                nearest[row, tip] = voxels[row, tip] = int(np.floor(points[row, knot]))
+        at, begin = stop + 1, end
 
     bridged = np.zeros(size, dtype=np.bool_)
     for k in range(size):

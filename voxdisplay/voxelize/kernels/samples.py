@@ -27,44 +27,49 @@ def _most(a: float, b: float) -> float:
 
 
 @jit
+def _parts(
+    h: float, chord: float, second: float, resolution: float, limits: tuple[float, float, float]
+) -> int:
+    most_chord, most_bend, most_parts = limits
+    bend = h * h * second / 4
+    if (chord <= 0.99 * most_chord) & (bend <= 0.99 * most_bend):
+        return 1
+    wanted = np.ceil(_most(chord / most_chord, np.sqrt(bend / most_bend)))
+    if not wanted > 1:  # or not a number
+        return 1
+    return max(int(min(wanted, np.floor(h / resolution), most_parts)), 1)
+
+
+@jit
 def _needed_parts(
     piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: tuple[float, float, float]
 ) -> tuple[Ints, Floats]:
-    size, (most_chord, most_bend, most_parts) = t.size, limits
-    short, straight = 0.99 * most_chord, 0.99 * most_bend  # below these nothing is split
+    size = t.size
     parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
-    room = 64
-    velocity, turn = np.empty(room), np.empty(room + 1)
-    first = 0
-    while first < size:
-        last = first
-        while last + 1 < size and piece[last + 1] == piece[first]:
-            last += 1
-        steps, times = last - first, t[first : last + 1]
-        if steps > room:
-            room = steps
-            velocity, turn = np.empty(room), np.empty(room + 1)
-        turn[: steps + 1] = 0.0
-        longest = chord[first:last]
-        for axis in range(3):
-            row = points[axis, first : last + 1]
-            for k in range(steps):
-                velocity[k] = (row[k + 1] - row[k]) / (times[k + 1] - times[k])
-                longest[k] = _most(longest[k], abs(row[k + 1] - row[k]))
-            for k in range(1, steps):
-                turn[k] = _most(turn[k], abs(velocity[k] - velocity[k - 1]))
-        for k in range(1, steps):
-            turn[k] /= (times[k + 1] - times[k]) + (times[k] - times[k - 1])
-        for k in range(steps):
-            h = times[k + 1] - times[k]
-            bend = h * h * _most(turn[k], turn[k + 1]) / 4
-            if (longest[k] <= short) & (bend <= straight):
-                continue
-            wanted = np.ceil(_most(longest[k] / most_chord, np.sqrt(bend / most_bend)))
-            if wanted > 1:
-                possible = np.floor(h / resolution[piece[first]])
-                parts[first + k] = max(int(min(wanted, possible, most_parts)), 1)
-        first = last + 1
+    # Of the step before: its turn into this one is known only now.
+    before_x = before_y = before_z = before_h = before_turn = 0.0
+    inside = False
+    for k in range(size - 1):
+        joined = piece[k] == piece[k + 1]
+        h = x = y = z = turn = 0.0
+        if joined:
+            h = t[k + 1] - t[k]
+            x = points[0, k + 1] - points[0, k]
+            y = points[1, k + 1] - points[1, k]
+            z = points[2, k + 1] - points[2, k]
+            chord[k] = _most(_most(abs(x), abs(y)), abs(z))
+            x, y, z = x / h, y / h, z / h
+            if inside:
+                turn = _most(_most(abs(x - before_x), abs(y - before_y)), abs(z - before_z))
+                turn /= h + before_h
+        if inside:
+            second = _most(before_turn, turn)
+            parts[k - 1] = _parts(before_h, chord[k - 1], second, resolution[piece[k]], limits)
+        inside, before_h, before_turn = joined, h, turn
+        before_x, before_y, before_z = x, y, z
+    if inside:
+        at = size - 2
+        parts[at] = _parts(before_h, chord[at], before_turn, resolution[piece[at]], limits)
     return parts, chord
 
 
