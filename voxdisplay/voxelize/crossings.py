@@ -68,14 +68,13 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     Their events are connected only where one axis goes on to dominate.
     """
     slopes = slopes_at(knots)
-    starts = np.searchsorted(knots.curve[knots.piece], np.arange(len(batch.curves)))
+    starts = knots.curve_starts(len(batch.curves))
     found = [
         _crossings_of(batch, knots, slopes, aim(knots, slopes, low, high))
         for low, high in blocks(starts, knots.t.size, BLOCK)
     ]
-    if len(found) == 1:
-        (events, better, gain) = (found[0].events, found[0].better, found[0].gain)
-    else:
+    crossings = found[0]
+    if len(found) > 1:
         events = Events(
             np.concatenate([part.events.piece for part in found]),
             np.concatenate([part.events.t for part in found]),
@@ -83,13 +82,14 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
             np.concatenate([part.events.heading for part in found]),
         )
         better = np.concatenate([part.better for part in found], axis=1)
-        gain = np.concatenate([part.gain for part in found])
-    if (
-        (events.t[1:] < events.t[:-1]) & events.joined
-    ).any():  # several crossings of one plane, found in any order
+        crossings = Crossings(events, better, np.concatenate([part.gain for part in found]))
+    events = crossings.events
+    # Several crossings of one plane are found in any order.
+    if ((events.t[1:] < events.t[:-1]) & events.joined).any():
         order = np.lexsort((events.t, events.piece))
-        return Crossings(events.take(order), better[:, order], gain[order])
-    return Crossings(events, better, gain)
+        better = crossings.better.take(order, axis=1)
+        return Crossings(events.take(order), better, crossings.gain[order])
+    return crossings
 
 
 @twin
