@@ -185,5 +185,6 @@ def _touching(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
         here = rows[:, None, low : low + BLOCK]
         after = padded[:, low + 1 : low + here.shape[2] + WINDOW]
         apart = np.abs(sliding_window_view(after, here.shape[2], axis=1) - here)
+        # Only 0 and 1 give 0 or 1.
         touch[:, low : low + BLOCK] = np.bitwise_or.reduce(apart) <= 1
     return touch

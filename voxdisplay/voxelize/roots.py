@@ -53,7 +53,8 @@ def cross(
         there = batch.evaluate(curve[left], guess)
         value = there[axis[left], np.arange(left.size)] - level[left]
         done = np.abs(value) <= TOLERANCE
-        t[left[done]], points[:, left[done]], found[left[done]] = guess[done], there[:, done], True
+        hit = left[done]
+        t[hit], points[:, hit], found[hit] = guess[done], there[:, done], True
         lost = high - low <= batch.resolution[curve[left]] / 4
         on = ~(done | lost)
         if not on.any():
