@@ -112,9 +112,8 @@ class Expression:
         stack: list[V] = []
         for step in self.program:
             if isinstance(step, Operation):
-                operands = tuple(stack[-step.arity :])
-                del stack[-step.arity :]
-                stack.append(apply(step, operands))
+                last = stack.pop()
+                stack.append(apply(step, (last,) if step.arity == 1 else (stack.pop(), last)))
             else:
                 stack.append(variable if isinstance(step, str) else constant(step))
         (result,) = stack
@@ -122,11 +121,7 @@ class Expression:
 
     def value(self, t: Floats) -> Floats:
         """Evaluate at t, (n,) float64, to (n,) float64; not finite where there is no value."""
-        out = np.empty_like(t, dtype=np.float64)
-        variable: Any = t
-        with np.errstate(all="ignore"):
-            out[...] = self.fold(variable, np.float64, lambda operation, x: operation.value(*x))
-        return out
+        return rows([self], t).ravel()
 
     def derivative(self, t: Floats) -> Floats:
         """Give the derivative at t, (n,) float64; not finite where the rules find none.
@@ -147,6 +142,16 @@ class Expression:
         """
         with np.errstate(all="ignore"):
             return self.fold(t, interval, lambda operation, x: operation.enclosure(*x))
+
+
+def rows(expressions: Sequence[Expression], t: Floats) -> Floats:
+    """Evaluate k expressions at t, (n,) float64, to (k, n): as `Expression.value` does."""
+    out = np.empty((len(expressions), t.size))
+    variable: Any = t
+    with np.errstate(all="ignore"):
+        for row, each in zip(out, expressions, strict=True):
+            row[:] = each.fold(variable, np.float64, lambda operation, x: operation.value(*x))
+    return out
 
 
 def together(expressions: Sequence[Expression]) -> Evaluate:

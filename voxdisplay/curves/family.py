@@ -73,7 +73,7 @@ class Curves:
         points = np.empty((3, t.size))
         if not t.size:
             return points
-        edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1
+        edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1 if curve[0] < curve[-1] else curve[:0]
         for start, stop in pairwise([0, *edges.tolist(), t.size]):
             position = self._curves[curve[start]].position
             for low in range(start, stop, CALL):

@@ -8,7 +8,7 @@ Everything happens in float64 and nothing raises: ``9**9**9`` is inf, ``log(-1)`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +38,8 @@ class Operation:
         respect to it, elementwise. Not finite where there is none.
     variadic : bool
         An associative operation of two operands, which may be written with more.
+    arity : int
+        Number of operands: 1 or 2.
 
     """
 
@@ -46,11 +48,10 @@ class Operation:
     enclosure: Callable[..., Interval]
     partials: tuple[Callable[..., Any], ...]
     variadic: bool = False
+    arity: int = field(init=False)
 
-    @property
-    def arity(self) -> int:
-        """Number of operands."""
-        return len(self.partials)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "arity", len(self.partials))
 
 
 def _power_by_base(_: Any, a: Any, b: Any) -> Any:

@@ -61,6 +61,10 @@ class Samples:
         """Index of the first sample of each piece, and K: (pieces + 1,)."""
         return np.searchsorted(self.piece, np.arange(self.curve.size + 1))
 
+    def curve_starts(self, curves: int) -> Ints:
+        """Index of the first sample of each of so many curves: (curves,)."""
+        return self.bounds[np.searchsorted(self.curve, np.arange(curves))]
+
 
 class Batch:
     """Curves that are voxelised together.

@@ -68,14 +68,13 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     Their events are connected only where one axis goes on to dominate.
     """
     slopes = slopes_at(knots)
-    starts = np.searchsorted(knots.curve[knots.piece], np.arange(len(batch.curves)))
+    starts = knots.curve_starts(len(batch.curves))
     found = [
         _crossings_of(batch, knots, slopes, aim(knots, slopes, low, high))
         for low, high in blocks(starts, knots.t.size, BLOCK)
     ]
-    if len(found) == 1:
-        (events, better, gain) = (found[0].events, found[0].better, found[0].gain)
-    else:
+    crossings = found[0]
+    if len(found) > 1:
         events = Events(
             np.concatenate([part.events.piece for part in found]),
             np.concatenate([part.events.t for part in found]),
@@ -83,23 +82,24 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
             np.concatenate([part.events.heading for part in found]),
         )
         better = np.concatenate([part.better for part in found], axis=1)
-        gain = np.concatenate([part.gain for part in found])
-    if (
-        (events.t[1:] < events.t[:-1]) & events.joined
-    ).any():  # several crossings of one plane, found in any order
+        crossings = Crossings(events, better, np.concatenate([part.gain for part in found]))
+    events = crossings.events
+    # Several crossings of one plane are found in any order.
+    if ((events.t[1:] < events.t[:-1]) & events.joined).any():
         order = np.lexsort((events.t, events.piece))
-        return Crossings(events.take(order), better[:, order], gain[order])
-    return Crossings(events, better, gain)
+        better = crossings.better.take(order, axis=1)
+        return Crossings(events.take(order), better, crossings.gain[order])
+    return crossings
 
 
 @twin
 def slopes_at(knots: Samples) -> Floats:
     """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
     joined = knots.joined
-    h = np.where(joined, np.diff(knots.t), 1.0)
+    h = np.where(joined, knots.t[1:] - knots.t[:-1], 1.0)
     slopes = np.zeros_like(knots.points)
     with np.errstate(all="ignore"):
-        velocity = np.diff(knots.points, axis=1) / h
+        velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
         slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
         inner = np.zeros(knots.t.size, dtype=bool)
         inner[1:-1] = joined[1:] & joined[:-1]
@@ -132,22 +132,21 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
         (passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])
     )
     axis, passed = axis[step], passed[step]
-    from_cell = _of_axis(cells[:, step], axis)
-    # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
-    first = np.where(passed > 0, from_cell + 1.5, from_cell + 0.5)
-    planes = np.abs(passed).astype(np.int64)
-
-    left, right = low + step, low + step + 1
-    h = knots.t[right] - knots.t[left]
-    begin = _of_axis(knots.points[:, left], axis)
-    length = _of_axis(knots.points[:, right], axis) - begin
+    left = low + step
+    at = axis * np.int64(knots.t.size) + left  # of flat rows
+    h = knots.t[left + 1] - knots.t[left]
+    begin = knots.points.take(at)
+    length = knots.points.take(at + 1) - begin
     with np.errstate(all="ignore"):
-        m_left = length / (_of_axis(slopes[:, left], axis) * h)
-        m_right = length / (_of_axis(slopes[:, right], axis) * h)
+        m_left = length / (slopes.take(at) * h)
+        m_right = length / (slopes.take(at + 1) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
     m_left[~((m_left > 0) & (m_left < 3))] = 1.0
     m_right[~((m_right > 0) & (m_right < 3))] = 1.0
 
+    # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
+    first = np.floor(begin - 0.5) + np.where(passed > 0, 1.5, 0.5)
+    planes = np.abs(passed).astype(np.int64)
     # From here on everything is per crossing.
     of = np.repeat(np.arange(left.size), planes)
     nth = spread(np.zeros_like(planes), planes)
@@ -157,7 +156,7 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
     knot = left[of]
     t_left = knots.t[knot]
-    t = np.clip(t_left + tau * h[of], t_left, knots.t[knot + 1])
+    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), knots.t[knot + 1])
     return Aims(knot, axis[of], passed[of] < 0, level, tau, t)
 
 
@@ -248,7 +247,8 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
     for row in range(3):
         np.copyto(nearest[row], aims.level - 0.5, where=axis == row)
     h = knots.t[left + 1] - knots.t[left]
-    tangent, after = slopes[:, left] * h, slopes[:, left + 1] * h  # per step, not per t
+    tangent = slopes.take(left, axis=1) * h  # per step, not per t
+    after = slopes.take(left + 1, axis=1) * h
     tangent += tau * (after - tangent)
 
     apart = nearest + 0.5 - points
@@ -258,29 +258,38 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
     # The other corner along axis b is a unit step e_b away, towards the crossing. With w the
     # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
     # with p = D.w and s = w.e_b. Two such steps change it by the sum of both minus 2 s s'.
-    towards = np.where(apart > 0, -1.0, 1.0)
-    shift = towards * along
-    change = 1.0 - 2.0 * np.abs(apart) - (2.0 * project + shift) * shift
-    for row in range(3):
-        np.copyto(change[row], np.inf, where=axis == row)
-    best = np.zeros(axis.size)
-    move = np.zeros((3, axis.size), dtype=bool)
-    for rows in ((0,), (1,), (2,), (0, 1), (1, 2), (0, 2)):
-        total = change[rows[0]]
-        if len(rows) == 2:
-            total = total + change[rows[1]] - 2.0 * shift[rows[0]] * shift[rows[1]]
-        wins = total < best - MARGIN
-        best = np.where(wins, total, best)
-        for row in range(3):
-            np.copyto(move[row], row in rows, where=wins)
-    gain = np.where(best < 0, -best, np.inf)
-    step = np.where(move, towards, 0.0)
-    better = nearest + step
-    apart += step
-    far = (best < 0) & ((apart * apart).sum(axis=0) > 0.5)
-    foot = np.full(axis.size, np.inf)
-    foot[far] = (apart[:, far] * along[:, far]).sum(axis=0) / length[far]
-    return Corners(nearest.astype(np.int32), better.astype(np.int32), gain, foot)
+    changes, shifts = [], []
+    for off, way in zip(_across(apart, axis), _across(along, axis), strict=True):
+        shift = np.where(off > 0, -way, way)
+        shifts.append(shift)
+        changes.append(1.0 - 2.0 * np.abs(off) - (2.0 * project + shift) * shift)
+    best = np.where(changes[0] < -MARGIN, changes[0], 0.0)
+    other = changes[1] < best - MARGIN
+    best = np.where(other, changes[1], best)
+    total = changes[0] + changes[1] - 2.0 * shifts[0] * shifts[1]
+    both = total < best - MARGIN
+    best = np.where(both, total, best)
+
+    nearest = nearest.astype(np.int32)
+    better, gain, foot = nearest.copy(), np.full(axis.size, np.inf), np.full(axis.size, np.inf)
+    moved = np.flatnonzero(best < 0)
+    gain[moved] = -best[moved]
+    axis, both, other = axis[moved], both[moved], other[moved]
+    apart, along = apart.take(moved, axis=1), along.take(moved, axis=1)
+    each = np.arange(moved.size)
+    first, second = np.where(axis == 0, 1, 0), np.where(axis == 2, 1, 2)
+    for across, moves in ((first, both | ~other), (second, both | other)):
+        step = np.where(apart[across, each] > 0, -1, 1) * moves
+        better[across, moved] += step
+        apart[across, each] += step
+    far = np.flatnonzero((apart * apart).sum(axis=0) > 0.5)
+    foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
+    return Corners(nearest, better, gain, foot)
+
+
+def _across(rows: Floats, axis: NDArray[np.int8]) -> tuple[Floats, Floats]:
+    """Pick from three rows, (3, n), the two that are not named by ``axis`` (n,), in order."""
+    return np.where(axis == 0, rows[1], rows[0]), np.where(axis == 2, rows[1], rows[2])
 
 
 def _of_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:

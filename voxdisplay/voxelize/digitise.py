@@ -137,7 +137,7 @@ def _starts(events: Events) -> Ints:
 
 def _closed(batch: Batch, samples: Samples) -> list[bool]:
     """Tell which curves are closed, and stop at those that only say so."""
-    first = np.searchsorted(samples.curve[samples.piece], np.arange(len(batch.curves)))
+    first = samples.curve_starts(len(batch.curves))
     last = np.append(first[1:], samples.t.size) - 1
     apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
     closed: list[bool] = (apart <= TOUCH).tolist()

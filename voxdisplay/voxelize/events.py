@@ -42,7 +42,10 @@ class Events:
 
     def take(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Events:
         """Give the events at an index array or under a mask."""
-        return Events(self.piece[index], self.t[index], self.voxels[:, index], self.heading[index])
+        if index.dtype == bool:
+            (index,) = index.nonzero()
+        voxels = self.voxels.take(index, axis=1)
+        return Events(self.piece[index], self.t[index], voxels, self.heading[index])
 
     def insert(self, at: NDArray[np.intp], other: Events) -> Events:
         """Put other events before those at the indices ``at``, which ascend."""

@@ -25,6 +25,7 @@ from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
 from voxdisplay.voxelize.crossings import NUDGE, Crossings, dominant_crossings
 from voxdisplay.voxelize.events import OTHER, Events, Voxels, near
 from voxdisplay.voxelize.knots import refine
+from voxdisplay.voxelize.ranges import insert
 from voxdisplay.voxelize.roots import cross
 
 # Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
@@ -69,28 +70,20 @@ def trace_everything(batch: Batch, samples: Samples) -> Events:
 
 def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     """Put the voxels of each piece's first and last point around its crossings."""
-    inner = crossings.events
-    pieces = np.arange(knots.curve.size)
-    bounds = np.searchsorted(inner.piece, np.arange(pieces.size + 1))
-    size = inner.t.size + 2 * pieces.size
-    first, last = bounds[:-1] + 2 * pieces, bounds[1:] + 2 * pieces + 1
-    middle = np.ones(size, dtype=bool)
-    middle[first] = middle[last] = False
+    inner, bounds = crossings.events, knots.bounds
+    ends = np.stack((bounds[:-1], bounds[1:] - 1), axis=1).ravel()
+    piece = knots.piece[ends].astype(np.int32)
+    around = np.searchsorted(inner.piece, np.arange(bounds.size))
+    at = np.stack((around[:-1], around[1:]), axis=1).ravel()
 
-    piece = np.empty(size, dtype=np.int32)
-    t = np.empty(size)
-    voxels = np.empty((3, size), dtype=np.int32)
-    heading = np.full(size, OTHER)
-    gain = np.full(size, np.inf)
-    piece[middle], t[middle], voxels[:, middle] = inner.piece, inner.t, inner.voxels
-    heading[middle], gain[middle] = inner.heading, crossings.gain
-    knot_bounds = knots.bounds
-    for at, knot in ((first, knot_bounds[:-1]), (last, knot_bounds[1:] - 1)):
-        piece[at], t[at] = pieces, knots.t[knot]
-        voxels[:, at] = np.floor(knots.points[:, knot])
-    better = voxels.copy()
-    better[:, middle] = crossings.better
-    return Crossings(Events(piece, t, voxels, heading), better, gain)
+    voxels = np.floor(knots.points[:, ends]).astype(np.int32)
+    heading, gain = np.full(ends.size, OTHER), np.full(ends.size, np.inf)
+    *events, better, gain = insert(
+        at,
+        (inner.piece, inner.t, inner.voxels, inner.heading, crossings.better, crossings.gain),
+        (piece, knots.t[ends], voxels, heading, voxels, gain),
+    )
+    return Crossings(Events(*events), better, gain)
 
 
 @twin
@@ -100,7 +93,6 @@ def choose_corners(crossings: Crossings, knots: Samples) -> Events:
     events, better, gain = crossings.events, crossings.better, crossings.gain
     nearest = events.voxels
     gaps = events.gaps()
-    gain = gain.copy()
     gain[gaps] = gain[gaps + 1] = np.inf  # what bridges a gap counts on the nearest corners
     voxels = np.where(np.isfinite(gain), better, nearest)
     bridged = np.zeros(events.t.size + 1, dtype=bool)
@@ -151,7 +143,7 @@ def _samples_between(
 def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
     """Find the crossings of mid-planes of all axes, in order: piece, t and nearest voxel."""
     cells = np.floor(samples.points - 0.5)
-    passed = np.abs(np.diff(cells, axis=1)) == 1
+    passed = np.abs(cells[:, 1:] - cells[:, :-1]) == 1
     step, axis = np.nonzero((passed & samples.joined).T)
     level = np.maximum(cells[axis, step], cells[axis, step + 1]) + 0.5
     piece = samples.piece[step]

@@ -72,10 +72,11 @@ def settle(batch: Batch, samples: Samples) -> Samples:
 def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
     """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
     while True:
-        chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
+        chord = np.abs(samples.points[:, 1:] - samples.points[:, :-1]).max(axis=0)
         curve = samples.curve[samples.piece[:-1]]
-        possible = np.floor(np.diff(samples.t) / batch.resolution[curve])
-        parts = np.clip(np.minimum(np.ceil(chord / longest), possible), 1, PARTS).astype(np.int64)
+        possible = np.floor((samples.t[1:] - samples.t[:-1]) / batch.resolution[curve])
+        wanted = np.minimum(np.ceil(chord / longest), np.minimum(possible, PARTS))
+        parts = np.maximum(wanted, 1).astype(np.int64)
         parts[~samples.joined] = 1
         if not (parts > 1).any():
             return samples
@@ -107,13 +108,13 @@ def first_look(batch: Batch) -> Samples:
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
-    h = np.where(joined, np.diff(samples.t), 1.0)
-    step = np.diff(samples.points, axis=1)
+    h = np.where(joined, samples.t[1:] - samples.t[:-1], 1.0)
+    step = samples.points[:, 1:] - samples.points[:, :-1]
     chord = np.abs(step).max(axis=0)
     chord[~joined] = 0.0
     with np.errstate(all="ignore"):
         velocity = step / h
-        turn = np.abs(np.diff(velocity, axis=1)).max(axis=0) / (h[1:] + h[:-1])
+        turn = np.abs(velocity[:, 1:] - velocity[:, :-1]).max(axis=0) / (h[1:] + h[:-1])
         turn[~(joined[1:] & joined[:-1])] = 0.0
         second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
         second[1:] = turn
@@ -129,6 +130,8 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
 
 def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:
     """Stop before the work gets out of hand: ``parts`` is what comes next."""
+    if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
+        return
     curve = samples.piece[:-1]
     length = np.bincount(curve, chord, len(batch.curves))
     count = np.bincount(curve, parts, len(batch.curves))
@@ -177,7 +180,7 @@ def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError
 
 def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
     """Make pieces of what settled, ending where a curve jumps."""
-    finest = np.diff(samples.t) < 2 * batch.resolution[samples.piece[:-1]]
+    finest = samples.t[1:] - samples.t[:-1] < 2 * batch.resolution[samples.piece[:-1]]
     finest &= samples.joined
     if not finest.any():
         return samples

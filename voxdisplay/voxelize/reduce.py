@@ -8,6 +8,7 @@ is, as points: what turns back within two voxels, as a hairpin does, may not los
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from voxdisplay.compiled import twin
@@ -17,6 +18,8 @@ from voxdisplay.voxelize.ranges import spread
 
 # How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
 WINDOW = 12
+# Voxels compared with those after them at once.
+BLOCK = 1 << 12
 # How far from the voxels at both ends of a short cut samples of the curve may be between them, in
 # voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
 # which is much more than `knots.BEND` at cusps.
@@ -58,12 +61,13 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
     """
     if not events.t.size:
         return events
-    full, events = events, without_repeats(events)
-    start, stop = _short_cuts(events, way, tips=tips)
-    change = np.zeros(events.t.size, dtype=np.int8)
-    change[start + 1] += 1
-    change[stop] -= 1
-    thin = without_repeats(events.take(np.cumsum(change, dtype=np.int8) == 0))
+    full, thin = events, without_repeats(events)
+    start, stop = _short_cuts(thin, way, tips=tips)
+    if start.size:
+        change = np.zeros(thin.t.size, dtype=np.int8)
+        change[start + 1] += 1
+        change[stop] -= 1
+        thin = without_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
     # A piece ends where it ends, even if its last voxel was reached before.
     last, thin_last = (np.flatnonzero(np.append(~each.joined, True)) for each in (full, thin))
     thin.t[thin_last] = full.t[last]
@@ -96,10 +100,11 @@ def _short_cuts(
     look = np.flatnonzero(np.cumsum(reach[:-1]) > 0)
     if look.size < 3:
         return look[:0], look[:0]
-    voxels = events.voxels[:, look]
-    stretch = np.cumsum(np.diff(look, prepend=look[0]) > 1) + events.piece[look]
-    leap = furthest(voxels, stretch)
+    stretch = look - np.arange(look.size) + events.piece[look]
+    leap = furthest(events.voxels.take(look, axis=1), stretch)
     short = np.flatnonzero(leap > 1)
+    if not short.size:
+        return short, short
     starts, stops = look[short], look[short] + leap[short]
     if tips:
         keep = ~_over_tips(events, starts, stops)
@@ -154,21 +159,32 @@ def _leave_behind(
 
 def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
     """Give J(i) - i for each of n voxels, (3, n), which are looked at within stretches (n,)."""
-    size = stretch.size
-    window = min(WINDOW, size - 1)
-    touch = np.zeros((window + 1, size), dtype=bool)  # [w, i]: voxels i and i + w are neighbours
-    for w in range(1, window + 1):
-        touch[w, :-w] = near(voxels[:, w:], voxels[:, :-w]) & (stretch[w:] == stretch[:-w])
-    ahead = np.zeros(size, dtype=np.int8)  # how many events after i are its neighbours
-    behind = np.zeros(size, dtype=np.int8)  # and how many before it
-    on, back = np.ones(size, dtype=bool), np.ones(size, dtype=bool)
-    for w in range(1, window + 1):
-        on &= touch[w]
-        ahead += on
-        back[:w] = False
-        back[w:] &= touch[w, :-w]
-        behind += back
-    leap = np.ones(size, dtype=np.int8)
-    for w in range(2, window + 1):
-        leap[:-w][touch[w, :-w] & (ahead[:-w] + behind[w:] >= w - 1)] = w
+    leap = np.ones(stretch.size, dtype=np.int8)
+    rows = np.concatenate((voxels, 2 * stretch[None].astype(np.int32)))
+    touch = _touching(rows)
+    w, start = touch[1:].nonzero()
+    if start.size:
+        w += 2
+        ahead = np.logical_and.accumulate(touch).sum(axis=0)
+        behind = np.logical_and.accumulate(_touching(rows[:, ::-1])).sum(axis=0)[::-1]
+        short = ahead[start] + behind[start + w] >= w - 1
+        leap[start[short]] = w[short]  # of several for one voxel, the last: the furthest
     return leap
+
+
+def _touching(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Tell which of n voxels touch the ones after them: [w - 1, i] for voxels i and i + w.
+
+    A fourth row, twice the stretch, keeps those of different stretches apart.
+    """
+    size = rows.shape[1]
+    beyond = np.full((4, WINDOW), -2, dtype=np.int32)
+    padded = np.concatenate((rows, beyond), axis=1)
+    touch = np.empty((WINDOW, size), dtype=bool)
+    for low in range(0, size, BLOCK):
+        here = rows[:, None, low : low + BLOCK]
+        after = padded[:, low + 1 : low + here.shape[2] + WINDOW]
+        apart = np.abs(sliding_window_view(after, here.shape[2], axis=1) - here)
+        # Only 0 and 1 give 0 or 1.
+        touch[:, low : low + BLOCK] = np.bitwise_or.reduce(apart) <= 1
+    return touch

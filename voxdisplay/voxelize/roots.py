@@ -49,11 +49,12 @@ def cross(
         with np.errstate(all="ignore"):
             ratio = at_low / (at_low - at_high)
         ratio = np.where(np.isfinite(ratio) & (turn % 4 != 3), ratio, 0.5)
-        guess = np.clip(low + ratio * (high - low), low, high)
+        guess = np.minimum(np.maximum(low + ratio * (high - low), low), high)
         there = batch.evaluate(curve[left], guess)
         value = there[axis[left], np.arange(left.size)] - level[left]
         done = np.abs(value) <= TOLERANCE
-        t[left[done]], points[:, left[done]], found[left[done]] = guess[done], there[:, done], True
+        hit = left[done]
+        t[hit], points[:, hit], found[hit] = guess[done], there[:, done], True
         lost = high - low <= batch.resolution[curve[left]] / 4
         on = ~(done | lost)
         if not on.any():

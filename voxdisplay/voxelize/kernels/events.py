@@ -33,13 +33,17 @@ def _near(voxels: Voxels, i: int, j: int) -> bool:
 @jit
 def torn(piece: Pieces, voxels: Voxels) -> Ints:
     """See `events.torn`."""
-    found = np.empty(piece.size, dtype=np.int64)
     count = 0
     for k in range(piece.size - 1):
-        if (piece[k] == piece[k + 1]) & ~_near(voxels, k, k + 1):
-            found[count] = k
-            count += 1
-    return found[:count].copy()
+        count += (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1))
+    found = np.empty(count, dtype=np.int64)
+    if count:  # which is rare
+        count = 0
+        for k in range(piece.size - 1):
+            if (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1)):
+                found[count] = k
+                count += 1
+    return found
 
 
 def choose_corners(crossings: Crossings, knots: Samples) -> Events:
@@ -76,31 +80,33 @@ def _choose_corners(
     size = inner_t.size + 2 * pieces
     piece, t = np.empty(size, dtype=np.int32), np.empty(size)
     nearest, voxels = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
-    heading, gain = np.full(size, PLAIN, dtype=np.int8), np.full(size, np.inf)
-    at = k = 0
+    heading, gain = np.empty(size, dtype=np.int8), np.empty(size)
+    at = begin = 0
     for number in range(pieces):
-        for end in range(2):
-            knot = bounds[number] if end == 0 else bounds[number + 1] - 1
-            piece[at], t[at] = number, knots_t[knot]
+        end = begin
+        while end < inner_t.size and inner_piece[end] == number:
+            end += 1
+        stop = at + 1 + end - begin
+        piece[at : stop + 1] = number
+        t[at + 1 : stop], gain[at + 1 : stop] = inner_t[begin:end], inner_gain[begin:end]
+        heading[at + 1 : stop] = inner_heading[begin:end]
+        for row in range(3):
+            nearest[row, at + 1 : stop] = inner_voxels[row, begin:end]
+            voxels[row, at + 1 : stop] = inner_better[row, begin:end]
+        for tip, knot in ((at, bounds[number]), (stop, bounds[number + 1] - 1)):
+            t[tip], heading[tip], gain[tip] = knots_t[knot], PLAIN, np.inf
             for row in range(3):
-                nearest[row, at] = voxels[row, at] = int(np.floor(points[row, knot]))
-            at += 1
-            while end == 0 and k < inner_t.size and inner_piece[k] == number:
-                piece[at], t[at] = number, inner_t[k]
-                heading[at], gain[at] = inner_heading[k], inner_gain[k]
-                for row in range(3):
-                    nearest[row, at] = inner_voxels[row, k]
-                    voxels[row, at] = inner_better[row, k]
-                at, k = at + 1, k + 1
+                nearest[row, tip] = voxels[row, tip] = int(np.floor(points[row, knot]))
+        at, begin = stop + 1, end
 
     bridged = np.zeros(size, dtype=np.bool_)
-    for k in range(size - 1):
-        if piece[k] == piece[k + 1] and not _near(nearest, k, k + 1):
+    for k in range(size):
+        if k + 1 < size and piece[k] == piece[k + 1] and not _near(nearest, k, k + 1):
             bridged[k] = True
             gain[k] = gain[k + 1] = np.inf
-    for k in range(size):
         if not np.isfinite(gain[k]):
-            voxels[:, k] = nearest[:, k]
+            for row in range(3):
+                voxels[row, k] = nearest[row, k]
     apart = torn(piece, voxels)
     while apart.size:
         back = np.empty(apart.size, dtype=np.int64)
@@ -263,11 +269,13 @@ def _reduce(
             number[size] = k
             size += 1
     number = number[:size]
-    piece, t, heading = full_piece[number], full_t[number], full_heading[number]
-    voxels = np.empty((3, size), dtype=np.int32)
-    for row in range(3):
-        for k in range(size):
-            voxels[row, k] = full_voxels[row, number[k]]
+    piece, t, voxels, heading = full_piece, full_t, full_voxels, full_heading
+    if size < whole:
+        piece, t, heading = full_piece[number], full_t[number], full_heading[number]
+        voxels = np.empty((3, size), dtype=np.int32)
+        for row in range(3):
+            for k in range(size):
+                voxels[row, k] = full_voxels[row, number[k]]
     look = _look(piece, voxels, heading, window)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)

@@ -27,44 +27,49 @@ def _most(a: float, b: float) -> float:
 
 
 @jit
+def _parts(
+    h: float, chord: float, second: float, resolution: float, limits: tuple[float, float, float]
+) -> int:
+    most_chord, most_bend, most_parts = limits
+    bend = h * h * second / 4
+    if (chord <= 0.99 * most_chord) & (bend <= 0.99 * most_bend):
+        return 1
+    wanted = np.ceil(_most(chord / most_chord, np.sqrt(bend / most_bend)))
+    if not wanted > 1:  # or not a number
+        return 1
+    return max(int(min(wanted, np.floor(h / resolution), most_parts)), 1)
+
+
+@jit
 def _needed_parts(
     piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: tuple[float, float, float]
 ) -> tuple[Ints, Floats]:
-    size, (most_chord, most_bend, most_parts) = t.size, limits
-    short, straight = 0.99 * most_chord, 0.99 * most_bend  # below these nothing is split
+    size = t.size
     parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
-    room = 64
-    velocity, turn = np.empty(room), np.empty(room + 1)
-    first = 0
-    while first < size:
-        last = first
-        while last + 1 < size and piece[last + 1] == piece[first]:
-            last += 1
-        steps, times = last - first, t[first : last + 1]
-        if steps > room:
-            room = steps
-            velocity, turn = np.empty(room), np.empty(room + 1)
-        turn[: steps + 1] = 0.0
-        longest = chord[first:last]
-        for axis in range(3):
-            row = points[axis, first : last + 1]
-            for k in range(steps):
-                velocity[k] = (row[k + 1] - row[k]) / (times[k + 1] - times[k])
-                longest[k] = _most(longest[k], abs(row[k + 1] - row[k]))
-            for k in range(1, steps):
-                turn[k] = _most(turn[k], abs(velocity[k] - velocity[k - 1]))
-        for k in range(1, steps):
-            turn[k] /= (times[k + 1] - times[k]) + (times[k] - times[k - 1])
-        for k in range(steps):
-            h = times[k + 1] - times[k]
-            bend = h * h * _most(turn[k], turn[k + 1]) / 4
-            if (longest[k] <= short) & (bend <= straight):
-                continue
-            wanted = np.ceil(_most(longest[k] / most_chord, np.sqrt(bend / most_bend)))
-            if wanted > 1:
-                possible = np.floor(h / resolution[piece[first]])
-                parts[first + k] = max(int(min(wanted, possible, most_parts)), 1)
-        first = last + 1
+    # Of the step before: its turn into this one is known only now.
+    before_x = before_y = before_z = before_h = before_turn = 0.0
+    inside = False
+    for k in range(size - 1):
+        joined = piece[k] == piece[k + 1]
+        h = x = y = z = turn = 0.0
+        if joined:
+            h = t[k + 1] - t[k]
+            x = points[0, k + 1] - points[0, k]
+            y = points[1, k + 1] - points[1, k]
+            z = points[2, k + 1] - points[2, k]
+            chord[k] = _most(_most(abs(x), abs(y)), abs(z))
+            x, y, z = x / h, y / h, z / h
+            if inside:
+                turn = _most(_most(abs(x - before_x), abs(y - before_y)), abs(z - before_z))
+                turn /= h + before_h
+        if inside:
+            second = _most(before_turn, turn)
+            parts[k - 1] = _parts(before_h, chord[k - 1], second, resolution[piece[k]], limits)
+        inside, before_h, before_turn = joined, h, turn
+        before_x, before_y, before_z = x, y, z
+    if inside:
+        at = size - 2
+        parts[at] = _parts(before_h, chord[at], before_turn, resolution[piece[at]], limits)
     return parts, chord
 
 
@@ -171,6 +176,16 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
 
 
 @jit
+def _between(begin: float, end: float, share: float) -> float:
+    return begin + share * (end - begin)
+
+
+@jit
+def _dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> float:
+    return ax * bx + ay * by + az * bz
+
+
+@jit
 def _corners(
     t: Floats,
     slopes: Floats,
@@ -185,47 +200,49 @@ def _corners(
     size = knot.size
     nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
     gain, foot = np.full(size, np.inf), np.full(size, np.inf)
-    apart, along, tangent, corner = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    towards, shift, change = np.empty(3), np.empty(3), np.empty(3)
     for k in range(size):
-        left, axis = knot[k], axes[k]
+        left, axis, share, plane = knot[k], axes[k], tau[k], level[k] - 0.5
         h = t[left + 1] - t[left]
-        for row in range(3):
-            corner[row] = np.floor(points[row, k] + nudge)
-            begin = slopes[row, left] * h
-            tangent[row] = begin + tau[k] * (slopes[row, left + 1] * h - begin)
-        corner[axis] = level[k] - 0.5
-        length = np.sqrt(
-            tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]
-        )
-        length = _most(length, TINY)
-        for row in range(3):
-            apart[row] = corner[row] + 0.5 - points[row, k]
-            along[row] = tangent[row] / length
-        project = apart[0] * along[0] + apart[1] * along[1] + apart[2] * along[2]
-        for row in range(3):
-            towards[row] = -1.0 if apart[row] > 0 else 1.0
-            shift[row] = towards[row] * along[row]
-            change[row] = 1.0 - 2.0 * abs(apart[row]) - (2.0 * project + shift[row]) * shift[row]
-        best, one, other = 0.0, -1, -1
-        for row in range(3):
-            if row != axis and change[row] < best - margin:
-                best, one = change[row], row
-        # Of the three pairs of axes, in the order of `crossings.corners`, the one on the face.
-        first, second = (1, 2) if axis == 0 else ((0, 2) if axis == 1 else (0, 1))
-        total = change[first] + change[second] - 2.0 * shift[first] * shift[second]
-        if total < best - margin:
-            best, one, other = total, first, second
-        for row in range(3):
-            nearest[row, k] = better[row, k] = int(corner[row])
+        x, y, z = points[0, k], points[1, k], points[2, k]
+        corner_x = plane if axis == 0 else np.floor(x + nudge)
+        corner_y = plane if axis == 1 else np.floor(y + nudge)
+        corner_z = plane if axis == 2 else np.floor(z + nudge)
+        apart_x, apart_y, apart_z = corner_x + 0.5 - x, corner_y + 0.5 - y, corner_z + 0.5 - z
+        along_x = _between(slopes[0, left] * h, slopes[0, left + 1] * h, share)
+        along_y = _between(slopes[1, left] * h, slopes[1, left + 1] * h, share)
+        along_z = _between(slopes[2, left] * h, slopes[2, left + 1] * h, share)
+        length = _most(np.sqrt(_dot(along_x, along_y, along_z, along_x, along_y, along_z)), TINY)
+        along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
+        project = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
+        # The two axes of the face.
+        first, second = (1 if axis == 0 else 0), (1 if axis == 2 else 2)
+        apart_1, apart_2 = (apart_y if axis == 0 else apart_x), (apart_y if axis == 2 else apart_z)
+        along_1, along_2 = (along_y if axis == 0 else along_x), (along_y if axis == 2 else along_z)
+        shift_1 = -along_1 if apart_1 > 0 else along_1
+        shift_2 = -along_2 if apart_2 > 0 else along_2
+        change_1 = 1.0 - 2.0 * abs(apart_1) - (2.0 * project + shift_1) * shift_1
+        change_2 = 1.0 - 2.0 * abs(apart_2) - (2.0 * project + shift_2) * shift_2
+        both = change_1 + change_2 - 2.0 * shift_1 * shift_2
+        best, move_1, move_2 = 0.0, False, False
+        if change_1 < best - margin:
+            best, move_1 = change_1, True
+        if change_2 < best - margin:
+            best, move_1, move_2 = change_2, False, True
+        if both < best - margin:
+            best, move_1, move_2 = both, True, True
+        nearest[0, k] = better[0, k] = int(corner_x)
+        nearest[1, k] = better[1, k] = int(corner_y)
+        nearest[2, k] = better[2, k] = int(corner_z)
         if best < 0:
             gain[k] = -best
-            for row in range(3):
-                if row in (one, other):
-                    better[row, k] = int(corner[row] + towards[row])
-                    apart[row] += towards[row]
-            square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]
-            if square > 0.5:
-                reach = apart[0] * along[0] + apart[1] * along[1] + apart[2] * along[2]
+            step_1 = (-1 if apart_1 > 0 else 1) if move_1 else 0
+            step_2 = (-1 if apart_2 > 0 else 1) if move_2 else 0
+            better[first, k] += step_1
+            better[second, k] += step_2
+            apart_x += step_1 if axis != 0 else 0
+            apart_y += step_1 if axis == 0 else (step_2 if axis == 2 else 0)
+            apart_z += step_2 if axis != 2 else 0
+            if _dot(apart_x, apart_y, apart_z, apart_x, apart_y, apart_z) > 0.5:
+                reach = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
                 foot[k] = reach / length
     return nearest, better, gain, foot
