@@ -8,7 +8,8 @@ pixels, and says what was lost in that. It knows nothing of packets on their way
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import chain
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -98,7 +99,7 @@ class Frame:
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
         twin._items = list(self._items)  # noqa: SLF001 - of its own kind
-        if sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
+        if self._items and sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
             # Most of what was drawn is covered: the picture alone is less to keep.
             twin._items, twin._has_base = [], True  # noqa: SLF001
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
@@ -269,10 +270,20 @@ class Frame:
             What it announced, as in `DeviceInfo.features`. Nothing else is made use of.
 
         """
+        return list(chain.from_iterable(self.coded(max_payload, features)))
+
+    def coded(
+        self, max_payload: int, features: Collection[str] = ()
+    ) -> Iterator[list[bytes]]:
+        """Give the payloads of `payloads` as soon as they are coded, a few at a time, or none.
+
+        The frame must stay as it is until all have been taken.
+        """
         coding = self._coding(max_payload, features)
         items = self._seen(dark=False)
         index = _without(self.lit()[0], items) if self._has_base else _NONE
-        return self._encode(items, index, DEFAULT, coding)
+        yield []
+        yield from self._encode(items, index, DEFAULT, coding)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -294,7 +305,7 @@ class Frame:
             fresh = np.isin(items.index, changed)
             items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
         old = base._palette.colors if base._palette else DEFAULT
-        return self._encode(items, _without(changed, items), old, coding)
+        return list(chain.from_iterable(self._encode(items, _without(changed, items), old, coding)))
 
     def changed(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
@@ -328,7 +339,7 @@ class Frame:
         index: NDArray[np.int64],
         old: NDArray[np.uint8],
         coding: Coding,
-    ) -> list[bytes]:
+    ) -> Iterator[list[bytes]]:
         first = None
         if self._palette and len(entries := self._palette.differs_from(old)):
             first = color_pieces(entries, self._palette.colors, coding)

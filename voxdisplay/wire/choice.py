@@ -3,12 +3,13 @@
 Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as spans in scan order;
 what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
 saves the trouble. Range coding takes long: whoever has a fast link leaves ARC out of the features.
-Painter's order was settled before: no voxel has two pixels, so pieces may come in any order.
+Painter's order was settled before: no voxel has two pixels, so pieces may come in any order, and
+what is dense is coded in slabs, each by itself: the line need not wait for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -22,6 +23,9 @@ from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
 
 # Of many colours, voxels that mostly have other neighbours in their row make no bricks.
 _MANY_COLORS = 16
+# More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
+_LARGE_SET = 1 << 16
+_SLAB_VOXELS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -89,8 +93,13 @@ class Content:
     look: spans.Look
 
 
-def encode(content: Content, coding: Coding, first: Pieces | None = None) -> list[bytes]:
-    """Give the payloads that draw the content, in whatever order they arrive.
+def encode(
+    content: Content, coding: Coding, first: Pieces | None = None
+) -> Iterator[list[bytes]]:
+    """Give the payloads that draw the content, in whatever order they arrive, bit by bit.
+
+    Coding goes on while they are taken. An empty list means that some of the work is done: whoever
+    has something else to do may do it now.
 
     Parameters
     ----------
@@ -99,36 +108,60 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> lis
     first : Pieces, optional
         What is to be sent besides.
 
-    Returns
-    -------
+    Yields
+    ------
     list of bytes
         At most ``coding.max_payload`` bytes each, none of them empty.
 
     """
-    best = _Cheapest(coding, first or no_pieces())
+    items, index = content.items, content.index
+    if len(index) > _LARGE_SET:
+        *slabs, index = _slabs(index, coding)
+        for slab in slabs:
+            yield from _encode(Content(None, slab, content.look), coding, first or no_pieces())
+            first = None
+    yield from _encode(Content(items, index, content.look), coding, first or no_pieces())
+
+
+def _slabs(index: Ints, coding: Coding) -> list[Ints]:
+    """Cut voxels into slabs, n >= 1, along z; the cuts are where those of bricks are."""
+    layer = coding.grid.nx * coding.grid.ny
+    side = 1 << spec.LIMIT_MAX_LEVEL
+    thick = max(1, _SLAB_VOXELS // (layer * side)) * side
+    cuts = np.arange(thick, coding.grid.nz, thick) * layer
+    parts = np.split(index, np.searchsorted(index, cuts))
+    return [part for part in parts if len(part)]
+
+
+def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[bytes]]:
+    best = _Cheapest(coding, first)
     items, look = content.items, content.look
     if items is None or not len(items):
         if len(content.index):
             _offer_sets(best, no_pieces(), content.index, look)
-        return best.payloads
+        yield best.payloads
+        return
     # A voxel that follows itself would end a chain.
     items = items.only(np.concatenate(([True], items.index[1:] != items.index[:-1])))
     chains = chain(items.voxels, items.values, coding, items.corners)
+    yield []
     if not len(content.index):
         best.offer(chains.pieces)
         if (items.values != items.values[0]).any():
             best.offer(_by_pen(chains.pieces))
+    yield []
     apart = _cheaper_as_set(chains, items, look, coding)
     if apart.any() or len(content.index):
         index = _united(items.index[_voxels_of(chains, apart)], content.index)
         kept = _by_pen(chains.pieces.take(np.flatnonzero(~apart)))
         _offer_sets(best, kept, index, look)
+        yield []
     index = _united(items.index, content.index)
     if spans.least_bytes(index, coding) < best.total:
         best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
     if coding.has(spec.FEATURE_ARC) and not len(content.index):
         best.offer_payloads(encode_arcs(items.voxels, items.values, coding))
-    return best.payloads
+    yield best.payloads
 
 
 def _united(index: Ints, others: Ints) -> Ints:
