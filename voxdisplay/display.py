@@ -240,7 +240,7 @@ class Display:
         self._events += self._link.receive(data, time.monotonic())
 
     def _code(self) -> None:
-        """Code a part of the frame that is being coded, or begin the newest if the line needs it."""
+        """Code a part of a frame; begin the newest if there is none and the line needs it."""
         if self._newest and not self._coder and self._may_begin:
             frame, self._newest = self._newest, None
             self._unwaited[self._hand_over(frame)] = frame
@@ -430,9 +430,13 @@ class Display:
         return frame.payloads(self._link.payload_bytes, self._worth_using)
 
     @property
+    def _bytes_per_s(self) -> float | None:
+        return self._link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+
+    @property
     def _worth_using(self) -> tuple[str, ...]:
         """What the device announced, but for ARC on a line that is faster than its coder."""
-        rate = self._link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+        rate = self._bytes_per_s
         if rate is not None and rate < _SLOW_BYTES_PER_S:
             return self.info.features
         return tuple(name for name in self.info.features if name != "arc")
@@ -452,7 +456,8 @@ class Display:
                     return self._link.present_on(known.place, payloads, whole)
                 return self._link.present(whole())
         ticket = self._link.begin()
-        self._coder = _Coder(ticket, frame.coded(self._link.payload_bytes, self._worth_using))
+        coded = frame.coded(self._link.payload_bytes, self._worth_using, self._bytes_per_s or 0.0)
+        self._coder = _Coder(ticket, coded)
         return ticket
 
     def _shown_digest(self, ticket: int, progress: Progress | None = None) -> int | None:

@@ -249,14 +249,6 @@ class Link:
         self._frames.append(frame)
         return self._tickets
 
-    def withdraw(self, ticket: int) -> bool:
-        """Take back a frame of which nothing has been sent; tell whether that was so."""
-        for frame in self._frames:
-            if frame.ticket == ticket and not frame.begun:
-                self._frames.remove(frame)
-                return True
-        return False
-
     def read(self, start: int, count: int, *, back: bool = False) -> None:
         """Ask for pixels; `PageRead` brings them, or the first of them."""
         self._requests.append(_Request(start, count, back))

@@ -142,7 +142,7 @@ def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
     """Follow the runs: first voxel and number of steps of each segment; a lone voxel has none."""
     m = len(jump)
     ends = _trimmed(ends, jump)
-    following = memoryview(ends + jump)  # a list of all would take longer than the few looked at
+    following = (ends + jump).data  # a list of all would take longer than the few looked at
     path = []
     at = 0
     while at < m:
