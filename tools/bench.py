@@ -5,7 +5,7 @@
 beside other ways to do it (`bench_curves`); ``link`` what frames cost on the wire beside other
 codings, and how fast they are coded (`bench_link`); ``view`` what pictures cost (`bench_view`) and
 how fast the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare
-pipe below it (`bench_ports`).
+pipe below it (`bench_ports`); ``stream`` how full streaming keeps a line (`bench_stream`).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from bench_curves import bench_curves
 from bench_link import bench_link
 from bench_live import bench_live
 from bench_ports import bench_ports
+from bench_stream import bench_stream
 from bench_view import bench_view
 
 import voxdisplay as vd
@@ -225,7 +226,13 @@ def bench_views(repeats: int, *, quick: bool) -> None:
     bench_live(repeats, quick=quick)
 
 
-TABLES = {"curves": bench_curves, "link": bench_link, "view": bench_views, "ports": bench_ports}
+TABLES = {
+    "curves": bench_curves,
+    "link": bench_link,
+    "view": bench_views,
+    "ports": bench_ports,
+    "stream": bench_stream,
+}
 
 
 def main() -> None:
@@ -234,7 +241,7 @@ def main() -> None:
     parser.add_argument("what", choices=[*TABLES, "push", "cold"])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument(
-        "--quick", action="store_true", help="curves, link, view, ports: only a little"
+        "--quick", action="store_true", help="curves, link, view, ports, stream: only a little"
     )
     options = parser.parse_args()
     if table := TABLES.get(options.what):

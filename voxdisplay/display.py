@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from types import TracebackType
@@ -55,6 +55,9 @@ _SLOW_BYTES_PER_S = 25_000
 _LAST_S = 2.0  # for a last dark picture
 # So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
 _NEXT_TO_NOTHING = 64
+# One that the device shows at its next tick, and one behind it.
+_MOST_UNSHOWN = 2
+_WRONG_TWICE = "the device does not draw what protocol.md says, or its memory is faulty"
 _NOTHING: OnDisplay = (0, 0)  # is never on display
 Progress = Callable[[int, int], None]
 
@@ -77,6 +80,8 @@ class Receipt:
         From handing the frame over to the device's word that it is on display.
     digest : int or None
         What the device says it shows; it has been compared. None if the device gives none.
+    repaired : str or None
+        What the display showed at first, if that was something else and the frame was sent again.
 
     """
 
@@ -87,6 +92,7 @@ class Receipt:
     retransmitted: int
     elapsed_s: float
     digest: int | None
+    repaired: str | None = None
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
@@ -184,6 +190,9 @@ class Display:
         self._shown: dict[int, int | None] = {}  # ticket -> digest
         self._unwaited: dict[int, Frame] = {}  # ticket -> the frame, as it was
         self._known: _Known | None = None
+        self._newest: Frame | None = None  # handed over, and not begun
+        self._coder: _Coder | None = None
+        self._wrong = 0  # frames that nobody waited for, in a row
         self._pages: list[Page] = []
         self._told: Told | None = None
         self._events: deque[Event] = deque()
@@ -205,9 +214,13 @@ class Display:
         return device_info(self._link.info)
 
     def _turn(self, *, wait: bool = True) -> None:
-        """Write what may be written, wait for an answer or the time to ask, take what comes."""
+        """Write what may be written, wait for an answer or the time to ask, take what comes.
+
+        It does not wait while there is something to be coded: then it does a part of that.
+        """
+        self._code()
         try:
-            self._exchange(wait=wait)
+            self._exchange(wait=wait and self._coder is None)
         except (TransportClosed, TransportTimeout) as error:
             self._renew(error)
         while self._events:
@@ -220,6 +233,22 @@ class Display:
         wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
         data = self._transport.read(wait_s)
         self._events += self._link.receive(data, time.monotonic())
+
+    def _code(self) -> None:
+        """Code a part of a frame; begin the newest if there is none and the line needs it."""
+        if self._newest and not self._coder and self._may_begin:
+            frame, self._newest = self._newest, None
+            self._unwaited[self._hand_over(frame)] = frame
+        if coder := self._coder:
+            payloads = next(coder.payloads, None)
+            self._link.supply(coder.ticket, payloads or [], last=payloads is None)
+            if payloads is None:
+                self._coder = None
+
+    @property
+    def _may_begin(self) -> bool:
+        """Whether another frame keeps the line busy; more would make the display lag behind."""
+        return self._link.ready and self._link.backlog < _MOST_UNSHOWN and self._link.hungry
 
     def _renew(self, error: TransportError) -> None:
         """Wait for the device to come back, and have it show again what it showed."""
@@ -253,6 +282,7 @@ class Display:
             case PageRead(page):
                 self._pages.append(page)
             case Refused(error):
+                self._coder = None
                 raise device_error(error)
 
     def _check_same(self, info: Info) -> None:
@@ -372,8 +402,9 @@ class Display:
         meant = frame.copy()
         ticket = self._hand_over(meant)
         digest = self._shown_digest(ticket, progress)
+        repaired = None
         if digest is not None and digest != meant.digest():
-            ticket = self._repair(meant, digest)
+            ticket, repaired = self._repair(meant, digest)
             digest = meant.digest()
         self._last = meant
         self._frames += 1
@@ -387,15 +418,20 @@ class Display:
             retransmitted=sent.retransmitted - before.retransmitted,
             elapsed_s=time.monotonic() - began_s,
             digest=digest,
+            repaired=repaired,
         )
 
     def _payloads(self, frame: Frame) -> list[bytes]:
         return frame.payloads(self._link.payload_bytes, self._worth_using)
 
     @property
+    def _bytes_per_s(self) -> float | None:
+        return self._link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+
+    @property
     def _worth_using(self) -> tuple[str, ...]:
         """What the device announced, but for ARC on a line that is faster than its coder."""
-        rate = self._link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+        rate = self._bytes_per_s
         if rate is not None and rate < _SLOW_BYTES_PER_S:
             return self.info.features
         return tuple(name for name in self.info.features if name != "arc")
@@ -403,8 +439,8 @@ class Display:
     def _hand_over(self, frame: Frame) -> int:
         """Give a frame to the link: whole, or as its difference from what is on display."""
         known = self._known
-        whole = cache(partial(self._payloads, frame))
         if known and known.place == self._link.on_display and not self._link.backlog:
+            whole = cache(partial(self._payloads, frame))
             lit = len(frame.lit()[0])
             if 2 * len(frame.changed(known.frame)) < lit:
                 most, features = self._link.payload_bytes, self._worth_using
@@ -413,15 +449,19 @@ class Display:
                 # Where there is next to nothing to be sent, the whole frame need not be coded.
                 if size * _NEXT_TO_NOTHING < lit or size < sum(map(len, whole())):
                     return self._link.present_on(known.place, payloads, whole)
-        return self._link.present(whole())
+                return self._link.present(whole())
+        ticket = self._link.begin()
+        coded = frame.coded(self._link.payload_bytes, self._worth_using, self._bytes_per_s or 0.0)
+        self._coder = _Coder(ticket, coded)
+        return ticket
 
     def _shown_digest(self, ticket: int, progress: Progress | None = None) -> int | None:
         """Wait until a frame is on display; give the device's digest."""
-        total = max(1, self._link.payloads_left)
+        total = 1
         while ticket not in self._shown:
             self._turn()
-            if progress:
-                total = max(total, self._link.payloads_left)
+            total = max(total, self._link.payloads_in_all)
+            if progress and not self._coder:
                 progress(total - self._link.payloads_left, total)
         return self._shown.pop(ticket)
 
@@ -430,41 +470,43 @@ class Display:
         place = self._link.counters.sessions, ticket
         self._known = None if digest is None else _Known(frame, place)
 
-    def _repair(self, frame: Frame, digest: int) -> int:
+    def _repair(self, frame: Frame, digest: int) -> tuple[int, str]:
         """Find out what the display shows instead, and send the frame again; give its ticket."""
         self._known = None
         meant = frame.digest()
-        what = f"the display's digest is {digest:08x}, the frame's {meant:08x}"
+        what = _wrong_digest(digest, meant)
         if "read" in self.info.features:
             difference = _difference(frame.array(), self.read())
             what += f"; {difference or 'but its memory reads back as it was meant'}"
-        ticket = self._link.present(self._payloads(frame))
+        ticket = self._hand_over(frame)
         again = self._shown_digest(ticket)
         if again != meant:
             raise DesyncError(
                 f"{what}; sent once more, it is {again or 0:08x}",
-                hint="the device does not draw what protocol.md says, or its memory is faulty",
+                hint=_WRONG_TWICE,
             )
-        return ticket
+        return ticket, what
 
     def _present_newest(self, frame: Frame) -> None:
-        for ticket in list(self._unwaited):
-            if self._link.withdraw(ticket):
-                del self._unwaited[ticket]
-        meant = frame.copy()
-        self._unwaited[self._hand_over(meant)] = meant
+        self._newest = frame.copy()
         self.poll()
 
     def _settle(self, ticket: int, digest: int | None) -> None:
         """Note that a frame which nobody waited for is on display, and all before it are over."""
         frame = self._unwaited[ticket]
-        again = frame is self._last  # after a renewal
+        again = frame is self._last  # after a renewal, or as it was shown wrongly
         self._last, self._known = frame, None
         self._unwaited = {later: f for later, f in self._unwaited.items() if later > ticket}
         self._frames += not again
-        if digest is not None and digest != (meant := frame.digest()):
-            raise DesyncError(f"the display's digest is {digest:08x}, the frame's {meant:08x}")
-        self._know(frame, ticket, digest)
+        if digest is None or digest == (meant := frame.digest()):
+            self._wrong = 0
+            self._know(frame, ticket, digest)
+            return
+        self._wrong += 1
+        if self._wrong > 1:
+            raise DesyncError(_wrong_digest(digest, meant), hint=_WRONG_TWICE)
+        if not (self._link.backlog or self._newest):  # else the next one mends it
+            self._newest = frame
 
     def poll(self) -> None:
         """Do what can be done without waiting; for callers of ``present(wait=False)``."""
@@ -474,7 +516,7 @@ class Display:
     def flush(self) -> None:
         """Wait until every frame that was handed over is on display, or was skipped."""
         self._check_open()
-        while self._link.backlog:
+        while self._link.backlog or self._newest:
             self._turn()
 
     def clear(self) -> Receipt:
@@ -620,7 +662,7 @@ class Display:
         self._timeout_s = min(self._timeout_s, _LAST_S)
         self._unwaited.clear()
         self._events.clear()
-        self._known = self._last = None
+        self._known = self._last = self._newest = self._coder = None
         self._link = Link(new_session(), time.monotonic(), patience_s=self._timeout_s)
         self._greet()
         self._shown_digest(self._link.present([]))
@@ -635,6 +677,14 @@ class Display:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _Coder:
+    """A frame that is being coded: its payloads as they are ready, and the link's ticket."""
+
+    ticket: int
+    payloads: Iterator[list[bytes]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -655,6 +705,10 @@ class _Sent:
     def of(cls, link: Link) -> _Sent:
         counters = link.counters
         return cls(counters.packets, counters.wire_bytes, counters.retransmitted)
+
+
+def _wrong_digest(digest: int, meant: int) -> str:
+    return f"the display's digest is {digest:08x}, the frame's {meant:08x}"
 
 
 def _same(before: DeviceInfo, now: DeviceInfo) -> DeviceInfo:

@@ -8,8 +8,9 @@ pixels, and says what was lost in that. It knows nothing of packets on their way
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
@@ -85,6 +86,7 @@ class Frame:
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
         self._shared = False  # with a copy
         self._items: list[Items] = []
+        self._settled = False  # the painter's order: they are all seen
         self._has_base = False
         self._lit: tuple[NDArray[np.int64], Values] | None = None
         if palette is not None and self.format is not PixelFormat.INDEX8:
@@ -95,10 +97,11 @@ class Frame:
 
     def copy(self) -> Frame:
         """Give another frame of the same picture; quick, until one of the two is drawn on."""
+        self._seen(dark=True)  # once for both
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
         twin._items = list(self._items)  # noqa: SLF001 - of its own kind
-        if sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
+        if self._items and sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
             # Most of what was drawn is covered: the picture alone is less to keep.
             twin._items, twin._has_base = [], True  # noqa: SLF001
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
@@ -161,6 +164,7 @@ class Frame:
         item = Items(voxels, self.grid.index_of(voxels), values, owner, at_corner).only(inside)
         self._raster[item.index] = self.format.pixels(item.values)
         self._items.append(item)
+        self._settled = False
         return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
 
     def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
@@ -269,10 +273,29 @@ class Frame:
             What it announced, as in `DeviceInfo.features`. Nothing else is made use of.
 
         """
-        coding = self._coding(max_payload, features)
+        return list(chain.from_iterable(self.coded(max_payload, features)))
+
+    def coded(
+        self, max_payload: int, features: Collection[str] = (), bytes_per_s: float = 0.0
+    ) -> Iterator[list[bytes]]:
+        """Give payloads as `payloads` as soon as they are coded, a few at a time, or none.
+
+        The frame must stay as it is until all have been taken.
+
+        Parameters
+        ----------
+        max_payload, features
+            As of `payloads`.
+        bytes_per_s : float
+            What the line carries. On a fast one time is not spent on saving bytes that are sent
+            sooner than they are saved.
+
+        """
+        coding = self._coding(max_payload, features, bytes_per_s)
         items = self._seen(dark=False)
         index = _without(self.lit()[0], items) if self._has_base else _NONE
-        return self._encode(items, index, DEFAULT, coding)
+        yield []
+        yield from self._encode(items, index, DEFAULT, coding)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -294,7 +317,7 @@ class Frame:
             fresh = np.isin(items.index, changed)
             items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
         old = base._palette.colors if base._palette else DEFAULT
-        return self._encode(items, _without(changed, items), old, coding)
+        return list(chain.from_iterable(self._encode(items, _without(changed, items), old, coding)))
 
     def changed(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
@@ -307,9 +330,11 @@ class Frame:
         differs = mine != other
         return np.flatnonzero(differs.any(axis=1) if differs.ndim == 2 else differs)
 
-    def _coding(self, max_payload: int, features: Collection[str]) -> Coding:
+    def _coding(
+        self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
+    ) -> Coding:
         bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in set(features))
-        coding = Coding(self.grid, self.format, max_payload, bits)
+        coding = Coding(self.grid, self.format, max_payload, bits, bytes_per_s)
         if self.has_own_palette and not coding.has(spec.FEATURE_PALETTE):
             raise ValueError("this frame has a palette of its own, and the device keeps its own")
         return coding
@@ -318,9 +343,13 @@ class Frame:
         """Settle the painter's order: what a later item covers is not sent; nor is what is dark."""
         if not self._items:
             return None
-        items = join_items(self._items)
-        seen = self._values_at(items.index) == items.values
-        return items.only(seen if dark else seen & (items.values != 0))
+        if len(self._items) > 1 or not self._settled:
+            items = join_items(self._items)
+            # What is covered never comes to light again: then something newer has drawn it.
+            self._items = [items.only(self._values_at(items.index) == items.values)]
+            self._settled = True
+        (items,) = self._items
+        return items if dark else items.only(items.values != 0)
 
     def _encode(
         self,
@@ -328,7 +357,7 @@ class Frame:
         index: NDArray[np.int64],
         old: NDArray[np.uint8],
         coding: Coding,
-    ) -> list[bytes]:
+    ) -> Iterator[list[bytes]]:
         first = None
         if self._palette and len(entries := self._palette.differs_from(old)):
             first = color_pieces(entries, self._palette.colors, coding)

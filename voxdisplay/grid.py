@@ -87,6 +87,11 @@ class Grid(NamedTuple):
 
     def voxels_at(self, index: NDArray[np.integer]) -> NDArray[np.int32]:
         """Give the voxels, (N, 3) int32 with columns x, y, z, of scan-order indices, (N,)."""
-        rest, x = np.divmod(index, self.nx)
-        z, y = np.divmod(rest, self.ny)
-        return np.stack((x, y, z), axis=1).astype(np.int32)
+        # Several times as fast as divmod.
+        rest = index // self.nx
+        z = rest // self.ny
+        voxels = np.empty((len(index), 3), dtype=np.int32)
+        voxels[:, 0] = index - rest * self.nx
+        voxels[:, 1] = rest - z * self.ny
+        voxels[:, 2] = z
+        return voxels

@@ -15,7 +15,7 @@ from voxdisplay.cli.main import cli
 
 PUSH_KEYS = {
     "port", "device", "frame", "voxels", "packets", "wire_bytes", "retransmitted", "elapsed_s",
-    "digest", "verified",
+    "digest", "repaired", "verified",
 }  # fmt: skip
 OBJECT_KEYS = {
     "object", "type", "voxels", "closed", "pieces", "e_max", "e_av", "gaps", "contacts", "clipped",
@@ -38,6 +38,7 @@ def test_push_json_is_one_object_with_stable_keys(run):
     assert set(result) == PUSH_KEYS
     assert result["device"]["size"] == [128, 128, 128]
     assert result["verified"] is None, "nothing was read back"
+    assert result["repaired"] is None
     assert len(result["digest"]) == 8
 
 

@@ -1,5 +1,7 @@
 """Every vector of protocol.md, through both sides."""
 
+from itertools import chain
+
 import document
 import numpy as np
 import pytest
@@ -222,7 +224,7 @@ def test_coders_of_the_driver_by_a_plain_reading(vector):
     features = features_of(vector) - {"palette", "read", "digest", "arc"}
     bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in features)
     coding = Coding(Grid(*vector.grid), format_, 64, bits)
-    drawn = plain(encode(content, coding), vector.grid, format_)
+    drawn = plain(chain.from_iterable(encode(content, coding)), vector.grid, format_)
     assert drawn.page == meant.page
     assert not drawn.two_pixels
     assert {name.lower() for name in drawn.ops} & ALL_FEATURES <= features

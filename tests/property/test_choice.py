@@ -1,5 +1,7 @@
 """What a frame is coded as: what was meant, with what there is, in no more bytes than need be."""
 
+from itertools import chain
+
 import numpy as np
 import pytest
 from drawing import plain
@@ -10,6 +12,7 @@ import voxdisplay as vd
 from voxdisplay.frame import Frame
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
+from voxdisplay.wire import choice
 from voxdisplay.wire.bricks import encode_bricks
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.ops import Coding
@@ -103,6 +106,55 @@ def test_a_frame_is_drawn_with_what_was_announced(device, seed):
     frame = some_frame(np.random.default_rng(seed), device)
     frame.device = device
     assert_draws(frame.payloads(*device[2:]), frame)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(devices(), seeds, st.sampled_from([0.0, 1.2e6, 1e9]))
+def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_per_s):
+    frame = some_frame(np.random.default_rng(seed), device)
+    frame.device = device
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(choice, "_LARGE_SET", 100)
+        patch.setattr(choice, "_SLAB_VOXELS", 1)
+        patch.setattr(choice, "_PARSED_VOXELS", 150)
+        portions = list(frame.coded(*device[2:], bytes_per_s))
+    assert_draws([payload for portion in portions for payload in portion], frame)
+
+
+def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
+    rng = np.random.default_rng(1)
+    frame = Frame((128, 128, 32), "index8")
+    frame.set(rng.integers(1, 256, (32, 128, 128), dtype=np.uint8))
+    voxels = frame.grid.voxels
+    slow, fast = (list(filter(None, frame.coded(1024, (), rate))) for rate in (0.0, 1e9))
+    assert len(slow) == voxels // choice._PARSED_VOXELS
+    assert len(fast) == voxels // choice._SLAB_VOXELS
+    solid = Frame((128, 128, 32), "index8")
+    solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
+    assert len(list(filter(None, solid.coded(1024, ())))) == voxels // choice._SLAB_VOXELS
+    solid.draw([(1, 2, 3)], "red")
+    solid.device = (solid.grid, solid.format, 1024, frozenset())
+    assert_draws(solid.payloads(1024), solid)
+    half = solid.array()
+    half[16:] = 0
+    solid.set(half)
+    assert len(list(filter(None, solid.coded(1024, ())))) == 1, "the dark slab costs nothing"
+
+
+def test_a_curve_on_a_fast_line_goes_as_its_chain():
+    """Also a solid in the order of its voxels: what is drawn as a set is sent as one."""
+    frame = Frame(GRIDS[0], "mono1")
+    frame.draw(np.argwhere(np.ones((9, 9, 9))), "white")
+    features = ("box", "oct", "dots")
+    sizes = [
+        sum(len(payload) for portion in frame.coded(1024, features, rate) for payload in portion)
+        for rate in (0.0, 1.2e6)
+    ]
+    assert sizes[0] < 20 < sizes[1]
+    dots = Frame(GRIDS[0], "mono1")
+    dots.draw(np.argwhere(np.ones((4, 4, 4))) * 3, "white")
+    portions = dots.coded(1024, features, 1.2e6)
+    assert list(chain.from_iterable(portions)) == dots.payloads(1024, features)
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)

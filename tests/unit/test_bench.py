@@ -42,3 +42,9 @@ def test_the_table_of_the_link_runs():
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "paper R=40 w=4" in run.stdout
     assert "framing" in run.stdout
+
+
+def test_the_table_of_streams_runs():
+    command = [sys.executable, str(BENCH), "stream", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.count("\nhead, 8 bit ") == 2

@@ -172,6 +172,17 @@ def test_without_waiting_the_newest_frame_wins(opened):
     assert receipt.frame == pipe.device.swaps
 
 
+def test_no_more_than_two_frames_are_under_way(opened):
+    """A display that waits for its ticks never lags behind by what its buffer holds."""
+    display, pipe = opened(refresh=1000)
+    frames = [random_frame(display, seed, 0.01) for seed in range(20)]
+    for frame in frames:
+        display.present(frame, wait=False)
+        assert display._link.backlog <= 2
+    display.flush()
+    assert_shows(pipe, frames[-1])
+
+
 def test_polling_shows_it_in_the_end(opened):
     display, pipe = opened()
     frame = random_frame(display)
@@ -381,9 +392,34 @@ def test_a_page_that_differs_once_is_repaired(opened):
         pipe.device.memory.front.put(7, b"\x01\x02\x03")
 
     pipe.device.on_swap = disturb
-    assert display.present(frame).digest == frame.digest()
+    receipt = display.present(frame)
+    assert receipt.digest == frame.digest()
+    assert "1 voxels differ" in receipt.repaired
     assert_shows(pipe, frame)
     assert pipe.device.swaps == 2
+    assert display.present(frame).repaired is None
+
+
+@pytest.mark.parametrize("newer", [False, True])
+def test_a_page_that_differs_once_is_repaired_without_waiting_too(opened, newer):
+    display, pipe = opened()
+    shown = []
+
+    def disturb():
+        shown.append(pipe.bench.snapshot().digest)
+        if len(shown) == 1:
+            pipe.device.memory.front.put(7, b"\x01\x02\x03")
+            if newer:
+                display.present(last, wait=False)
+
+    first, last = random_frame(display, 1), random_frame(display, 2)
+    pipe.device.on_swap = disturb
+    display.present(first, wait=False)
+    display.flush()
+    frame = last if newer else first
+    assert_shows(pipe, frame)
+    assert shown == [first.digest(), frame.digest()]
+    assert display.present(first).frame == len(set(shown)) + 1
 
 
 def test_a_page_that_differs_again_and_again(opened):
@@ -424,7 +460,7 @@ def test_a_refused_packet_and_then_another(opened):
     display, pipe = opened()
     for _ in range(6):
         frame = random_frame(display)
-        frame.payloads = lambda *_device: [b"\xe0\x00"]
+        frame.coded = lambda *_device: iter([[b"\xe0\x00"]])
         with pytest.raises(vd.DeviceError, match=r"OP \(7\) at byte 3: op E0") as caught:
             display.present(frame)
         assert caught.value.code == spec.CODE_OP

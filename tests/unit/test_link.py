@@ -168,15 +168,66 @@ def test_a_frame_that_another_has_followed_is_over_without_word():
     assert told(link, ack(3, 2, frame=2, flags=1), 0.1) == [Shown(tickets[2], 0)]
 
 
-def test_only_a_frame_that_is_not_begun_can_be_withdrawn():
+def test_a_frame_is_sent_while_it_is_coded_and_its_last_packet_commits():
+    """6: "COMMIT is on the frame's last packet, and on no other"."""
     link = opened()
-    begun = link.present([b"\xa0"])
-    sent(link, 0.0)
-    waiting = link.present([b"\xa1"])
-    assert not link.withdraw(begun)
-    assert link.withdraw(waiting)
-    assert not link.withdraw(waiting)
+    ticket = link.begin()
+    behind = link.present([b"\xa7"])
     assert sent(link, 0.0) == []
+    for payloads, expected in (([], []), ([b"\xa0"], []), ([b"\xa1", b"\xa2"], [b"\xa0", b"\xa1"])):
+        link.supply(ticket, payloads, last=False)
+        packets_ = sent(link, 0.0)
+        assert [packet.ops for packet in packets_] == expected
+        assert not any(packet.flags & spec.DATA_FLAG_COMMIT for packet in packets_)
+    assert (link.payloads_in_all, link.payloads_left) == (4, 4)
+    told(link, ack(2, 1), 0.0)
+    assert link.payloads_left == 2
+    link.supply(ticket, [], last=True)
+    last, other = sent(link, 0.0)
+    assert (last.ops, last.frame) == (b"\xa2", 0)
+    assert last.flags == spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT
+    assert (other.ops, other.frame) == (b"\xa7", 1)
+    assert told(link, ack(4, 3, frame=1, flags=1), 0.1) == [Shown(behind, 0)]
+
+
+def test_a_frame_of_which_nothing_was_coded_is_an_empty_one():
+    link = opened()
+    link.supply(link.begin(), [], last=True)
+    (packet,) = sent(link, 0.0)
+    assert (packet.ops, packet.flags) == (b"", spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT)
+
+
+def test_what_is_not_queued_any_more_takes_no_payloads():
+    link = opened()
+    ticket = link.begin()
+    link.supply(ticket + 1, [b"\xa0"], last=True)
+    assert link.payloads_in_all == 0
+    assert sent(link, 0.0) == []
+
+
+def test_a_frame_that_was_half_coded_when_the_session_ended_goes_on():
+    link = opened()
+    ticket = link.begin()
+    link.supply(ticket, [b"\xa0", b"\xa1"], last=False)
+    assert [packet.ops for packet in sent(link, 0.0)] == [b"\xa0"]
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.1)
+    (hello,) = sent(link, 0.1)
+    told(link, dataclasses.replace(INFO, session=hello.session), 0.1)
+    link.supply(ticket, [b"\xa2"], last=True)
+    assert [packet.ops for packet in sent(link, 0.2)] == [b"\xa0", b"\xa1", b"\xa2"]
+
+
+def test_another_frame_is_wanted_before_the_line_runs_dry():
+    link = opened(rx_buffer=1 << 20)
+    assert link.hungry
+    ticket = link.begin()
+    link.supply(ticket, [bytes([0xA0])] * 4000, last=False)
+    assert link.hungry
+    link.supply(ticket, [bytes([0xA0])] * 400, last=False)
+    assert not link.hungry
+    sent(link, 0.0)
+    told(link, ack(1, 0, credit=1 << 20), 1e-5)  # a fast one has no more than it needs
+    assert link.hungry
 
 
 def test_a_packet_that_is_lost_again_and_again():

@@ -84,6 +84,9 @@ def push(
         with progress_bar("sending", hidden=quiet) as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
+        if receipt.repaired:
+            note(f"the display showed something else at first, and was sent the frame again: "
+                 f"{receipt.repaired}")  # fmt: skip
         page = None
         if verify or preview:
             with progress_bar("reading back", hidden=quiet) as progress:
@@ -104,6 +107,7 @@ def push(
                     "retransmitted": receipt.retransmitted,
                     "elapsed_s": round(receipt.elapsed_s, 6),
                     "digest": None if receipt.digest is None else f"{receipt.digest:08x}",
+                    "repaired": receipt.repaired,
                     "verified": verify or None,
                 }
             )

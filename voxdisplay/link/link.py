@@ -52,6 +52,7 @@ class _Frame:
     """A frame that is to be shown: its payloads, and how many are in the window already.
 
     With a ``base`` they are but the difference from what that stands for, and ``whole`` gives all.
+    An ``open`` one is still being coded: more payloads follow.
     """
 
     ticket: int
@@ -59,6 +60,7 @@ class _Frame:
     clear: bool
     base: OnDisplay | None = None
     whole: Callable[[], list[bytes]] = list
+    open: bool = False
     frame_id: int = -1
     entered: int = 0
 
@@ -68,7 +70,12 @@ class _Frame:
 
     @property
     def all_entered(self) -> bool:
-        return self.begun and self.entered == len(self.payloads)
+        return self.begun and not self.open and self.entered == len(self.payloads)
+
+    @property
+    def left(self) -> int:
+        """Payloads that may enter now: of an open one the last may be that with COMMIT."""
+        return max(0, len(self.payloads) - self.open - self.entered)
 
 
 @dataclass(slots=True)
@@ -139,6 +146,19 @@ class Link:
         return len(self._frames)
 
     @property
+    def hungry(self) -> bool:
+        """Whether another frame is needed now for the line to stay busy: none is too early."""
+        unsent = sum(
+            len(payload) for frame in self._frames for payload in frame.payloads[frame.entered :]
+        )
+        return self._pace.runs_out(unsent)
+
+    @property
+    def payloads_in_all(self) -> int:
+        """Payloads of all frames that have not been shown yet, as far as they are coded."""
+        return sum(len(frame.payloads) for frame in self._frames)
+
+    @property
     def payloads_left(self) -> int:
         """Payloads that have not been received yet."""
         waiting = sum(len(frame.payloads) - frame.entered for frame in self._frames)
@@ -181,6 +201,32 @@ class Link:
         self._frames.append(_Frame(self._tickets, payloads or [b""], clear))
         return self._tickets
 
+    def begin(self) -> int:
+        """Queue a frame that starts dark and is still being coded; give its ticket."""
+        self._tickets += 1
+        self._frames.append(_Frame(self._tickets, [], clear=True, open=True))
+        return self._tickets
+
+    def supply(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
+        """Add payloads to a frame that was begun; what is not queued any more takes none.
+
+        Parameters
+        ----------
+        ticket : int
+            Of a frame from `begin`, whose last payloads have not been supplied.
+        payloads : list of bytes
+            As of `present`. All but the last of them may be sent at once.
+        last : bool
+            Whether there are no more.
+
+        """
+        for frame in self._frames:
+            if frame.ticket == ticket:
+                frame.payloads += payloads
+                frame.open = not last
+                if last and not frame.payloads:
+                    frame.payloads = [b""]
+
     def present_on(
         self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
     ) -> int:
@@ -202,14 +248,6 @@ class Link:
         frame = _Frame(self._tickets, payloads or [b""], clear=False, base=base, whole=whole)
         self._frames.append(frame)
         return self._tickets
-
-    def withdraw(self, ticket: int) -> bool:
-        """Take back a frame of which nothing has been sent; tell whether that was so."""
-        for frame in self._frames:
-            if frame.ticket == ticket and not frame.begun:
-                self._frames.remove(frame)
-                return True
-        return False
 
     def read(self, start: int, count: int, *, back: bool = False) -> None:
         """Ask for pixels; `PageRead` brings them, or the first of them."""
@@ -321,12 +359,14 @@ class Link:
         for frame in self._frames:
             if not frame.begun:
                 self._check_base(frame)
-            while not frame.all_entered:
+            while frame.left:
                 size = self._wire_bound(frame)
                 if not self._window.has_room or self._too_much(size) or self._starves(size):
                     return
                 self.counters.packets += 1
                 yield self._send(self._enter(frame), now)
+            if frame.open:  # those behind it wait for its last
+                return
 
     def _send(self, seq: int, now: float) -> bytes:
         wire = self._window.send(seq, now, self._pace.delivered)

@@ -19,6 +19,8 @@ LEAST_PACKETS = 2
 MOST_PACKETS = 13
 # How late the caller may be: processes wait for their turn.
 LATE_S = 0.02
+# How long coding may take before it gives the first bytes of a frame.
+CODING_S = 0.06
 # How fast a rate that is not reached any more is forgotten, with each packet delivered.
 _FADE = 1 / 64
 
@@ -65,3 +67,7 @@ class Pace:
         busy = 1.25 * self._rate * self._round_trip_s if self._rate else 0.0
         in_time = size <= max(LEAST_BYTES, busy + self._rate * LATE_S)
         return in_time and (packets <= MOST_PACKETS or size <= busy)
+
+    def runs_out(self, size: int) -> bool:
+        """Tell whether so many bytes last no longer than what follows them takes to be coded."""
+        return size <= max(LEAST_BYTES, self._rate * CODING_S)

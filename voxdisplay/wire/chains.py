@@ -18,6 +18,15 @@ from voxdisplay.wire.pieces import Layout, Pieces
 
 Steps = NDArray[np.int32]
 _STEPS_PER_BYTE = 4
+# By main axis and the axes that move, three bits: those of the next axis and the one behind it.
+_CRUMB_OF = np.array(
+    [
+        axes >> (main + 1) % 3 & 1 | (axes >> (main + 2) % 3 & 1) << 1
+        for main in range(3)
+        for axes in range(8)
+    ],
+    dtype=np.uint8,
+)
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ def _octant_runs(steps: Steps, jump: Bools) -> tuple[Ints, Ints, Ints]:
     index = np.arange(m, dtype=np.int32)
 
     def next_where(condition: Bools) -> Steps:
-        found = np.where(condition, index, np.int32(m))
+        found = np.maximum(index, ~condition * np.int32(m))
         return np.minimum.accumulate(found[..., ::-1], axis=-1)[..., ::-1]
 
     still = next_where(steps == 0)
@@ -131,33 +140,36 @@ def _broken(ends: Ints, corners: Ints) -> Ints:
 
 def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
     """Follow the runs: first voxel and number of steps of each segment; a lone voxel has none."""
-    begin: list[int] = []
-    count: list[int] = []
-    end_of, is_jump, m = ends.tolist(), jump.tolist(), len(jump)
-    at, new = 0, True
+    m = len(jump)
+    ends = _trimmed(ends, jump)
+    following = (ends + jump).data  # a list of all would take longer than the few looked at
+    path = []
+    at = 0
     while at < m:
-        if is_jump[at]:
-            if new:  # nothing leads here or away
-                begin.append(at)
-                count.append(0)
-            new = True
-            at += 1
-            continue
-        end = end_of[at]
-        # The last, partly filled byte of crumbs may be the next segment's business.
-        left = (end - at) % _STEPS_PER_BYTE
-        if left and end < m and not is_jump[end] and end - left > at:
-            behind = end_of[end]
-            rest = (behind - end) % _STEPS_PER_BYTE
-            if rest and rest + left <= _STEPS_PER_BYTE and end_of[end - left] == behind:
-                end -= left
-        begin.append(at)
-        count.append(end - at)
-        at, new = end, False
-    if new and n:
-        begin.append(m)
-        count.append(0)
-    return np.array(begin, dtype=np.int64), np.array(count, dtype=np.int64)
+        path.append(at)
+        at = following[at]
+    begin = np.array(path, dtype=np.int64)
+    jumps = jump[begin]
+    new = np.concatenate(([True], jumps))  # nothing leads there
+    begin = np.append(begin, m)
+    kept = np.append(~jumps, False) | new
+    kept[-1] &= n > 0
+    count = np.append(ends, m)[begin] - begin
+    return begin[kept], count[kept]
+
+
+def _trimmed(ends: Ints, jump: Bools) -> Ints:
+    """End runs earlier whose last, partly filled byte of crumbs may be the next one's business."""
+    m = len(ends)
+    at = np.arange(m, dtype=np.int32)
+    left = (ends - at) & _STEPS_PER_BYTE - 1
+    inner = np.minimum(ends, m - 1)
+    behind = ends[inner]
+    rest = (behind - ends) & _STEPS_PER_BYTE - 1
+    fits = (left > 0) & (rest > 0) & (rest + left <= _STEPS_PER_BYTE)
+    fits &= (ends < m) & ~jump[inner] & (ends - left > at)
+    fits &= ends[np.minimum(ends - left, m - 1)] == behind
+    return np.asarray(ends - left * fits)
 
 
 def _lines(spots: Steps, begin: Ints, count: Ints, coding: Coding) -> Bools:
@@ -218,7 +230,7 @@ def _bodies(
     """Give the ops of all segments, and how many bytes each has."""
     lone = count == 0
     stepped = np.flatnonzero(~lone & ~lines)
-    crumbs, crumb_bytes = _crumbs(steps, begin[stepped], count[stepped], octant[stepped])
+    crumbs, crumb_bytes = _crumbs(steps, begin[stepped], count[stepped], octant[stepped] // 8)
     size = np.where(lone, 1, 1 + coding.move_bytes)
     size[stepped] = 2 + crumb_bytes
     at = np.cumsum(size) - size
@@ -231,16 +243,13 @@ def _bodies(
     return body, size
 
 
-def _crumbs(steps: Steps, begin: Ints, count: Ints, octant: Ints) -> tuple[Bytes, Ints]:
+def _crumbs(steps: Steps, begin: Ints, count: Ints, main: Ints) -> tuple[Bytes, Ints]:
     """Give the crumb bytes of segments, one after another, and how many each has."""
     sizes = -(-count // _STEPS_PER_BYTE)
-    starts = np.cumsum(sizes) - sizes
-    owner = np.repeat(np.arange(len(count)), count)
-    inner = ranges(np.zeros(len(count), dtype=np.int64), count)
-    moved = steps != 0
-    # By the main axis: which steps move on the next axis, and on the one behind it.
-    crumb_of = np.stack([moved[(main + 1) % 3] | moved[(main + 2) % 3] << 1 for main in range(3)])
-    crumb = crumb_of[octant[owner] // 8, begin[owner] + inner]
-    padded = np.zeros((int(sizes.sum()), _STEPS_PER_BYTE), dtype=np.uint8)
-    padded.reshape(-1)[starts[owner] * _STEPS_PER_BYTE + inner] = crumb
-    return padded @ np.array([1, 4, 16, 64], dtype=np.uint8), sizes
+    moved = (steps != 0).view(np.uint8)
+    axes = moved[0] | moved[1] << 1 | moved[2] << 2
+    crumb = _CRUMB_OF[np.repeat(main.astype(np.uint8) << 3, count) | axes[ranges(begin, count)]]
+    padded = np.zeros(_STEPS_PER_BYTE * int(sizes.sum()), dtype=np.uint8)
+    padded[ranges(_STEPS_PER_BYTE * (np.cumsum(sizes) - sizes), count)] = crumb
+    four = padded.reshape(-1, _STEPS_PER_BYTE).view("<u4")[:, 0]
+    return (four | four >> 6 | four >> 12 | four >> 18).astype(np.uint8), sizes

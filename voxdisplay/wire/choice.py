@@ -3,12 +3,13 @@
 Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as spans in scan order;
 what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
 saves the trouble. Range coding takes long: whoever has a fast link leaves ARC out of the features.
-Painter's order was settled before: no voxel has two pixels, so pieces may come in any order.
+Painter's order was settled before: no voxel has two pixels, so pieces may come in any order, and
+what is dense is coded in slabs, each by itself: the line need not wait for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -22,6 +23,16 @@ from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
 
 # Of many colours, voxels that mostly have other neighbours in their row make no bricks.
 _MANY_COLORS = 16
+_A_FEW = 512  # voxels, which mostly show already that there are as many
+# More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
+_LARGE_SET = 1 << 16
+_SLAB_VOXELS = 1 << 18
+_PARSED_VOXELS = 1 << 15  # take some 15 ms to be parsed
+# Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
+# and of one that carries pixels of many colours as they are faster than they are parsed.
+_CHAINS_FROM = 800_000
+_LONE = 16  # where one voxel of so many is alone, sets are tried all the same
+_PLAIN_FROM = 2_400_000
 
 
 @dataclass(frozen=True)
@@ -66,7 +77,10 @@ def join_items(parts: Sequence[Items]) -> Items:
     voxels, index, values, _, corners = (
         np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Items)
     )
-    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    # Those that were joined before have numbers from 0.
+    items = [int(part.owner[-1]) + 1 if len(part) else 0 for part in parts]
+    first = np.cumsum(items) - items
+    owner = np.concatenate([part.owner + n for part, n in zip(parts, first, strict=True)])
     return Items(voxels, index, values, owner, corners)
 
 
@@ -89,8 +103,11 @@ class Content:
     look: spans.Look
 
 
-def encode(content: Content, coding: Coding, first: Pieces | None = None) -> list[bytes]:
-    """Give the payloads that draw the content, in whatever order they arrive.
+def encode(content: Content, coding: Coding, first: Pieces | None = None) -> Iterator[list[bytes]]:
+    """Give the payloads that draw the content, in whatever order they arrive, bit by bit.
+
+    Coding goes on while they are taken. An empty list means that some of the work is done: whoever
+    has something else to do may do it now.
 
     Parameters
     ----------
@@ -99,36 +116,72 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> lis
     first : Pieces, optional
         What is to be sent besides.
 
-    Returns
-    -------
+    Yields
+    ------
     list of bytes
         At most ``coding.max_payload`` bytes each, none of them empty.
 
     """
-    best = _Cheapest(coding, first or no_pieces())
+    items, index = content.items, content.index
+    if len(index) > _LARGE_SET:
+        for slab in _slabs(index, content.look, coding):
+            yield from _encode(Content(None, slab, content.look), coding, first or no_pieces())
+            first = None
+        if not items:
+            return
+        index = index[:0]
+    yield from _encode(Content(items, index, content.look), coding, first or no_pieces())
+
+
+def _slabs(index: Ints, look: spans.Look, coding: Coding) -> Iterator[Ints]:
+    """Cut voxels into slabs along z, where bricks end; and those that make no bricks, further."""
+    layer = coding.grid.nx * coding.grid.ny
+    side = 1 << spec.LIMIT_MAX_LEVEL
+    thick = max(1, _SLAB_VOXELS // (layer * side)) * side
+    cuts = np.arange(thick, coding.grid.nz, thick) * layer
+    for slab in np.split(index, np.searchsorted(index, cuts)):
+        parsed = coding.bytes_per_s < _PLAIN_FROM and len(slab) and _is_noise(slab, look(slab))
+        for part in np.array_split(slab, -(-len(slab) // _PARSED_VOXELS)) if parsed else [slab]:
+            if len(part):
+                yield part
+
+
+def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[bytes]]:
+    best = _Cheapest(coding, first)
     items, look = content.items, content.look
     if items is None or not len(items):
         if len(content.index):
             _offer_sets(best, no_pieces(), content.index, look)
-        return best.payloads
+        yield best.payloads
+        return
     # A voxel that follows itself would end a chain.
     items = items.only(np.concatenate(([True], items.index[1:] != items.index[:-1])))
     chains = chain(items.voxels, items.values, coding, items.corners)
+    yield []
     if not len(content.index):
         best.offer(chains.pieces)
         if (items.values != items.values[0]).any():
             best.offer(_by_pen(chains.pieces))
+    lone = int(np.count_nonzero(chains.count == 0))
+    if coding.bytes_per_s >= _CHAINS_FROM and _LONE * lone < len(items) and not len(content.index):
+        yield best.payloads
+        return
+    yield []
     apart = _cheaper_as_set(chains, items, look, coding)
     if apart.any() or len(content.index):
         index = _united(items.index[_voxels_of(chains, apart)], content.index)
         kept = _by_pen(chains.pieces.take(np.flatnonzero(~apart)))
         _offer_sets(best, kept, index, look)
+        yield []
+    if coding.bytes_per_s >= _CHAINS_FROM:
+        yield best.payloads
+        return
     index = _united(items.index, content.index)
     if spans.least_bytes(index, coding) < best.total:
         best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
     if coding.has(spec.FEATURE_ARC) and not len(content.index):
         best.offer_payloads(encode_arcs(items.voxels, items.values, coding))
-    return best.payloads
+    yield best.payloads
 
 
 def _united(index: Ints, others: Ints) -> Ints:
@@ -193,7 +246,7 @@ def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Codi
     """
     pieces = chains.pieces
     apart: Bools = chains.count == 0
-    if not bricks.can_code(coding):
+    if not bricks.can_code(coding) or coding.bytes_per_s >= _CHAINS_FROM:
         return apart
     goes = np.concatenate(([True], pieces.at[1:] != pieces.at_after[:-1]))
     cost = pieces.size + goes * (coding.move_bytes + ~pieces.is_chain)
@@ -214,6 +267,9 @@ def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Codi
 def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> None:
     """Offer pieces together with a set of voxels, n >= 1, coded in each way."""
     coding, values = best.coding, look(index)
+    if coding.bytes_per_s >= _PLAIN_FROM and _is_noise(index, values):
+        best.offer(kept, spans.plain(index, look, coding))
+        return
     if bricks.can_code(coding) and not _is_noise(index, values):
         made = bricks.brick(index, values, coding)
         best.offer(kept, made.pieces)
@@ -232,8 +288,11 @@ def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) ->
 
 def _is_noise(index: Ints, values: NDArray[np.integer]) -> bool:
     """Tell whether bricks cannot be worth trying: many colours, and few voxels like the next."""
-    alike = (np.diff(index) == 1) & (values[1:] == values[:-1])
-    return bool(2 * int(alike.sum()) < len(index)) and len(np.unique(values)) > _MANY_COLORS
+    alike = (index[1:] - index[:-1] == 1) & (values[1:] == values[:-1])
+    if 2 * int(np.count_nonzero(alike)) >= len(index):
+        return False
+    some = values[:: -(-len(values) // _A_FEW)]
+    return len(np.unique(some)) > _MANY_COLORS or len(np.unique(values)) > _MANY_COLORS
 
 
 def _cheaper_as_spans(

@@ -35,6 +35,9 @@ class Coding:
         Bytes of the longest payload.
     features : int
         The bits of INFO: bit i is feature i. No op of another feature is ever made.
+    bytes_per_s : float
+        What the line carries; 0 for a slow one. What takes longer to find out than it saves there
+        is left undone.
 
     """
 
@@ -42,6 +45,7 @@ class Coding:
     format: PixelFormat
     max_payload: int
     features: int = 0
+    bytes_per_s: float = 0.0
 
     def has(self, feature: int) -> bool:
         """Tell whether the device announced a feature, ``spec.FEATURE_...``."""
