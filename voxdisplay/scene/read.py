@@ -51,8 +51,8 @@ def load_scene(path: str | Path) -> Scene:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        what = f"no such file: {excerpt(str(path))}"
-        raise SceneError(what, path="", hint=_similar(path)) from None
+        missing = f"no such file: {excerpt(str(path))}"
+        raise SceneError(missing, path="", hint=_similar(path)) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         what = error.strerror if isinstance(error, OSError) else error
         raise SceneError(f"cannot read {excerpt(str(path))}: {what}", path="") from error

@@ -4,7 +4,7 @@ Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as span
 what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
 saves the trouble. Range coding takes long: whoever has a fast link leaves ARC out of the features.
 Painter's order was settled before: no voxel has two pixels, so pieces may come in any order, and
-what is dense is coded in slabs, each by itself: the line need not wait for all of them.
+for a fast line what is dense is coded in slabs, each by itself: it need not wait for all of them.
 """
 
 from __future__ import annotations
@@ -27,12 +27,14 @@ _A_FEW = 512  # voxels, which mostly show already that there are as many
 # More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
 _LARGE_SET = 1 << 16
 _SLAB_VOXELS = 1 << 18
-_PARSED_VOXELS = 1 << 15  # take some 15 ms to be parsed
+_PARSED_VOXELS = 1 << 16  # take some 20 ms to be parsed
+# Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
+_SLABS_FROM = 100_000
 # Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
 # and of one that carries pixels of many colours as they are faster than they are parsed.
 _CHAINS_FROM = 800_000
 _LONE = 16  # where one voxel of so many is alone, sets are tried all the same
-_PLAIN_FROM = 2_400_000
+_PLAIN_FROM = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> Ite
 
     """
     items, index = content.items, content.index
-    if len(index) > _LARGE_SET:
+    if len(index) > _LARGE_SET and coding.bytes_per_s >= _SLABS_FROM:
         for slab in _slabs(index, content.look, coding):
             yield from _encode(Content(None, slab, content.look), coding, first or no_pieces())
             first = None

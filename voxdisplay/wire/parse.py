@@ -102,20 +102,23 @@ def cheapest(runs: Runs, coding: Coding) -> Ints:
 
 def _costs(runs: Runs, coding: Coding) -> dict[str, Costs]:
     """Give the bits of each way to draw each run, without those of an op that is open already."""
-    value = runs.value
-    length = np.minimum(runs.length, _LONG)
+    value = runs.value.astype(np.int32)
+    length = np.minimum(runs.length, _LONG).astype(np.int32)
     pixel = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    run = 8 * count_bytes(runs.length)
-    tail = 8 * count_bytes(np.maximum(runs.length - 1, 1))
-    before, before_skip = np.full((2, len(value)), 1 << 30)
+    run = 8 * count_bytes(runs.length).astype(np.int32)
+    tail = 8 * count_bytes(np.maximum(runs.length - 1, 1)).astype(np.int32)
+    before, before_skip = np.full((2, len(value)), 1 << 30, dtype=np.int32)
     before[1:] = value[:-1]
     before_skip[:1] = coding.format.full
     before_skip[2:] = np.where(runs.may_skip[1:-1], value[:-2], 1 << 30)
     may_diff = coding.has(spec.FEATURE_DIFF)
     writes, several = runs.may_write, runs.may_write & (length > 1)
 
-    def cost(way: int, bits: Ints | int, when: Bools) -> Costs:
-        return np.where(when, bits, _NEVER).astype(np.int32) << _CODE_BITS | way << _FROM_BITS
+    def cost(way: int, bits: Costs | int, when: Bools) -> Costs:
+        costs = np.where(when, np.int32(bits), np.int32(_NEVER))
+        costs <<= _CODE_BITS
+        costs |= way << _FROM_BITS
+        return costs
 
     return {
         "lit": cost(_ALL_LIT, pixel * length, writes),
@@ -131,7 +134,7 @@ def _costs(runs: Runs, coding: Coding) -> dict[str, Costs]:
     }
 
 
-def near(difference: Ints) -> Bools:
+def near(difference: Ints | Costs) -> Bools:
     """Tell which differences of pixels of a byte a nibble holds: -8 to 7, modulo 256."""
     return np.asarray((((difference + 8) & 255) < 16) & (np.abs(difference) < 256))
 

@@ -122,17 +122,20 @@ def least_bytes(index: Ints, coding: Coding) -> int:
 
 def span(runs: Runs, coding: Coding) -> Pieces:
     """Give the pieces that draw runs."""
-    ops = WAYS[cheapest(runs, coding)]
-    split = (ops[:, 1] != 0)[:, None]
-    count = np.where(split, np.stack((np.ones_like(runs.length), runs.length - 1), axis=1), 0)
-    count[:, 0] = np.where(split[:, 0], 1, runs.length)
-    start = np.stack((runs.start, runs.start + 1), axis=1)
-    value = np.repeat(runs.value, 2)
-    ops, count, start = ops.reshape(-1), count.reshape(-1), start.reshape(-1)
-    drawn = (count > 0) & (ops != SKIP)
+    way = cheapest(runs, coding)
+    op, rest = WAYS[:, 0][way], WAYS[:, 1][way]
+    split = np.flatnonzero(rest)
+    count = runs.length.copy()
+    count[split] = 1
+    behind = split + 1
+    op = np.insert(op, behind, rest[split])
+    start = np.insert(runs.start, behind, runs.start[split] + 1)
+    count = np.insert(count, behind, runs.length[split] - 1)
+    value = np.insert(runs.value, behind, runs.value[split])
+    drawn = op != SKIP
     if not drawn.any():
         return no_pieces()
-    return _pieces(ops[drawn], start[drawn], count[drawn], value[drawn], coding)
+    return _pieces(op[drawn], start[drawn], count[drawn], value[drawn], coding)
 
 
 def plain(index: Ints, look: Look, coding: Coding) -> Pieces:
