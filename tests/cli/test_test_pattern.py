@@ -103,12 +103,14 @@ def test_a_display_whose_axes_are_wired_wrongly(run, faulty, fault, lines):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("fault", ["swapped", "mirrored"])
-def test_a_display_of_which_only_some_ops_are_wired_wrongly(run, faulty, fault):
-    """The colours of this pattern come partly as runs, which are where they should be."""
+@pytest.mark.parametrize(
+    ("fault", "line"), [("swapped", "x grows right: no"), ("mirrored", "z grows up: no")]
+)
+def test_a_display_of_many_colours_that_is_wired_wrongly(run, faulty, fault, line):
+    """Its pattern comes by other ops than one of a single colour, by runs too perhaps."""
     done = run("test-pattern", "--port", faulty(fault), "--check")
     assert done.returncode == 1, done.stdout + done.stderr
-    assert "z grows up: no" in done.stdout
+    assert line in done.stdout
     assert "voxels differ" in done.stdout
 
 

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "transport": {"errors", "transport", "wire.spec"},
     "device": {"errors", "grid", "pixel", "wire"},
     "conformance": {"conformance", "errors", "transport", "wire.spec"},
-    "view": {"errors", "grid", "pixel", "view"},
+    "view": {"errors", "grid", "palette", "pixel", "view"},
     "plan": {"frame", "wire"},
     "baud": {"errors", "probe", "transport"},
     "probe": {"errors", "link", "transport", "wire"},

@@ -478,6 +478,26 @@ def test_a_server_that_went_away_while_we_send():
         connection.close()
 
 
+def test_a_server_that_crashes_while_we_wait():
+    at_once = struct.pack("ii", 1, 0)  # how a connection is reset, not ended
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        connection = usbip_host._Imported(socket.create_connection(listener.getsockname()), 1)
+        server, _ = listener.accept()
+
+        def crash():
+            server.recv(usbip.MESSAGE_BYTES, socket.MSG_WAITALL)
+            server.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
+            server.close()
+
+        thread = threading.Thread(target=crash)
+        thread.start()
+        urb = Urb(IN, length=8)
+        connection.transfer(urb, WAIT_S)
+        thread.join(WAIT_S)
+        assert urb.status == 108
+        connection.close()
+
+
 def test_nobody_there():
     with pytest.raises(usb.core.USBError) as error:
         found(open_usbip("usbip://127.0.0.1:1"))
