@@ -5,7 +5,8 @@
 beside other ways to do it (`bench_curves`); ``link`` what frames cost on the wire beside other
 codings, and how fast they are coded (`bench_link`); ``view`` what pictures cost (`bench_view`) and
 how fast the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare
-pipe below it (`bench_ports`); ``stream`` how full streaming keeps a line (`bench_stream`).
+pipe below it (`bench_ports`); ``stream`` how full streaming keeps a line (`bench_stream`);
+``goodput`` what bit errors leave of one (`bench_goodput`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_curves import bench_curves
+from bench_goodput import bench_goodput
 from bench_link import bench_link
 from bench_live import bench_live
 from bench_ports import bench_ports
@@ -232,6 +234,7 @@ TABLES = {
     "view": bench_views,
     "ports": bench_ports,
     "stream": bench_stream,
+    "goodput": bench_goodput,
 }
 
 
@@ -240,9 +243,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=[*TABLES, "push", "cold"])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument(
-        "--quick", action="store_true", help="curves, link, view, ports, stream: only a little"
-    )
+    parser.add_argument("--quick", action="store_true", help="only a little; not of push and cold")
     options = parser.parse_args()
     if table := TABLES.get(options.what):
         table(options.repeats, quick=options.quick)

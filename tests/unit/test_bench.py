@@ -48,3 +48,9 @@ def test_the_table_of_streams_runs():
     command = [sys.executable, str(BENCH), "stream", "--quick", "--repeats", "1"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert run.stdout.count("\nhead, 8 bit ") == 2
+
+
+def test_the_table_of_goodput_runs():
+    command = [sys.executable, str(BENCH), "goodput", "--quick"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.count("\n") == 3
