@@ -27,14 +27,14 @@ _A_FEW = 512  # voxels, which mostly show already that there are as many
 # More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
 _LARGE_SET = 1 << 16
 _SLAB_VOXELS = 1 << 18
-_PARSED_VOXELS = 1 << 16  # take some 20 ms to be parsed
+_PARSED_VOXELS = 1 << 15  # take some 15 ms to be parsed
 # Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
 _SLABS_FROM = 100_000
 # Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
 # and of one that carries pixels of many colours as they are faster than they are parsed.
 _CHAINS_FROM = 800_000
 _LONE = 16  # where one voxel of so many is alone, sets are tried all the same
-_PLAIN_FROM = 4_000_000
+_PLAIN_FROM = 2_400_000
 
 
 @dataclass(frozen=True)
