@@ -171,6 +171,32 @@ def test_a_watcher_that_does_not_read_holds_up_nobody() -> None:
     assert not tap._thread.is_alive()
 
 
+def test_of_two_hundred_that_do_not_read_one_is_sent_a_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The others stand in the system's queue, and cost the device nothing."""
+    looks, look = [], Tap._look
+    monkeypatch.setattr(Tap, "_look", lambda tap: looks.append(tap) or look(tap))
+    big = Device(Config((128, 128, 128), refresh=0))
+    big.receive(hello())
+    with tapped(big) as tap, contextlib.ExitStack() as stack:
+        threads = threading.active_count()
+        stack.enter_context(watch(tap)).sendall(NOTHING)
+        until(lambda: bool(looks))
+        host, port = tap.address.split(":")
+        for _ in range(199):
+            watcher = stack.enter_context(socket.socket())
+            watcher.setblocking(False)
+            watcher.connect_ex((host, int(port)))
+            with contextlib.suppress(OSError):  # not connected: the queue is short
+                watcher.send(NOTHING)
+        for number in range(20):
+            big.receive(data(number, number, DOT, CLEAR | COMMIT))
+        assert big.swaps == 20
+        assert threading.active_count() == threads
+        assert len(looks) == 1
+
+
 def test_a_bell_that_rings_already_is_not_waited_for() -> None:
     class Full:
         def send(self, _data: bytes) -> None:
