@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
-from simwire import CLEAR, COMMIT, data, hello
+from simwire import CLEAR, COMMIT, DOT, data, hello
 
 from firmware_sim import __main__ as program
 from firmware_sim import viewer as viewers
@@ -25,7 +25,6 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.tap import Tap
 
-DOT = b"\xa0"
 WAIT = 20  # seconds after which a test has failed; none takes so long
 ROOT = Path(__file__).parents[2]
 NOTHING = b"\xff" * 6
