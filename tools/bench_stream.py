@@ -23,8 +23,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import bench_link
+import numpy as np
 import stream_reader
 from bench_ports import in_another_process
+from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay import display as displays
@@ -283,6 +285,17 @@ def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
     frames[0].set(head)
     frames[1].set(head[:, :, ::-1])
     yield "head, 8 bit", frames
+    for frame, waves in zip(frames, (field(side), field(side)[::-1]), strict=True):
+        frame.set(waves)
+    yield "full, 8 bit", frames
+
+
+def field(side: int) -> NDArray[np.uint8]:
+    """Give a volume without a dark voxel: slow waves, and a measurement's noise."""
+    x, y, z = np.meshgrid(*(np.linspace(0, 7, side),) * 3)
+    noise = np.random.default_rng(bench_link.SEED).normal(0, 3, x.shape)
+    waves = 128 + 80 * np.sin(x) * np.cos(y) * np.sin(z + 1)
+    return np.asarray((waves + noise).clip(1, 255), dtype=np.uint8)
 
 
 def bench_stream(repeats: int, *, quick: bool = False) -> None:

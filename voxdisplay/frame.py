@@ -24,10 +24,11 @@ from voxdisplay.grid import Grid
 from voxdisplay.palette import DEFAULT, Palette
 from voxdisplay.pixel import PixelFormat, Pixels, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.choice import Content, Items, encode, join_items
+from voxdisplay.wire.choice import Content, Items, encode, encode_page, join_items
 from voxdisplay.wire.colors import color_pieces
 from voxdisplay.wire.digest import digest, palette_digest
 from voxdisplay.wire.ops import Coding
+from voxdisplay.wire.pieces import Pieces
 
 Color: TypeAlias = str | Sequence[str] | NDArray[np.uint8]
 
@@ -292,10 +293,14 @@ class Frame:
 
         """
         coding = self._coding(max_payload, features, bytes_per_s)
+        colors = self._color_pieces(DEFAULT, coding)
+        if self._has_base and (plain := encode_page(self._raster, coding, colors)):
+            yield from plain
+            return
         items = self._seen(dark=False)
         index = _without(self.lit()[0], items) if self._has_base else _NONE
         yield []
-        yield from self._encode(items, index, DEFAULT, coding)
+        yield from encode(Content(items, index, self._values_at), coding, colors)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -316,8 +321,9 @@ class Frame:
         if items:  # one that has not changed at all is there
             fresh = np.isin(items.index, changed)
             items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
+        content = Content(items, _without(changed, items), self._values_at)
         old = base._palette.colors if base._palette else DEFAULT
-        return list(chain.from_iterable(self._encode(items, _without(changed, items), old, coding)))
+        return list(chain.from_iterable(encode(content, coding, self._color_pieces(old, coding))))
 
     def changed(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
@@ -351,17 +357,11 @@ class Frame:
         (items,) = self._items
         return items if dark else items.only(items.values != 0)
 
-    def _encode(
-        self,
-        items: Items | None,
-        index: NDArray[np.int64],
-        old: NDArray[np.uint8],
-        coding: Coding,
-    ) -> Iterator[list[bytes]]:
-        first = None
+    def _color_pieces(self, old: NDArray[np.uint8], coding: Coding) -> Pieces | None:
+        """Give the pieces that make another palette this one, if it differs."""
         if self._palette and len(entries := self._palette.differs_from(old)):
-            first = color_pieces(entries, self._palette.colors, coding)
-        return encode(Content(items, index, self._values_at), coding, first)
+            return color_pieces(entries, self._palette.colors, coding)
+        return None
 
 
 _NONE = np.empty(0, dtype=np.int64)

@@ -11,15 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from itertools import chain as in_turn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.pixel import Pixels
 from voxdisplay.wire import bricks, spans, spec
 from voxdisplay.wire.arcs import encode_arcs
 from voxdisplay.wire.chains import Chains, chain
 from voxdisplay.wire.ops import Bools, Coding, Ints, ranges
 from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
+from voxdisplay.wire.plain import encode_plain, is_noise
 
 # Of many colours, voxels that mostly have other neighbours in their row make no bricks.
 _MANY_COLORS = 16
@@ -135,6 +138,30 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> Ite
     yield from _encode(Content(items, index, content.look), coding, first or no_pieces())
 
 
+def encode_page(
+    page: Pixels, coding: Coding, first: Pieces | None = None
+) -> Iterator[list[bytes]] | None:
+    """Give payloads that draw a page as it is, if a shorter coding would take longer than they.
+
+    Parameters
+    ----------
+    page : ndarray
+        The display's memory in scan order: (V,), or (V, 3) for rgb888.
+    coding, first
+        As of `encode`.
+
+    Returns
+    -------
+    iterator or None
+        As of `encode`; None if that should draw what is lit.
+
+    """
+    if coding.bytes_per_s < _PLAIN_FROM or not is_noise(page, coding):
+        return None
+    before = Layout(first, coding).payloads if first else []
+    return in_turn([before], encode_plain(page, coding))
+
+
 def _slabs(index: Ints, look: spans.Look, coding: Coding) -> Iterator[Ints]:
     """Cut voxels into slabs along z, where bricks end; and those that make no bricks, further."""
     layer = coding.grid.nx * coding.grid.ny
@@ -142,7 +169,7 @@ def _slabs(index: Ints, look: spans.Look, coding: Coding) -> Iterator[Ints]:
     thick = max(1, _SLAB_VOXELS // (layer * side)) * side
     cuts = np.arange(thick, coding.grid.nz, thick) * layer
     for slab in np.split(index, np.searchsorted(index, cuts)):
-        parsed = coding.bytes_per_s < _PLAIN_FROM and len(slab) and _is_noise(slab, look(slab))
+        parsed = len(slab) and _is_noise(slab, look(slab))
         for part in np.array_split(slab, -(-len(slab) // _PARSED_VOXELS)) if parsed else [slab]:
             if len(part):
                 yield part
@@ -269,9 +296,6 @@ def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Codi
 def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> None:
     """Offer pieces together with a set of voxels, n >= 1, coded in each way."""
     coding, values = best.coding, look(index)
-    if coding.bytes_per_s >= _PLAIN_FROM and _is_noise(index, values):
-        best.offer(kept, spans.plain(index, look, coding))
-        return
     if bricks.can_code(coding) and not _is_noise(index, values):
         made = bricks.brick(index, values, coding)
         best.offer(kept, made.pieces)

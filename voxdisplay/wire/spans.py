@@ -138,35 +138,6 @@ def span(runs: Runs, coding: Coding) -> Pieces:
     return _pieces(op[drawn], start[drawn], count[drawn], value[drawn], coding)
 
 
-def plain(index: Ints, look: Look, coding: Coding) -> Pieces:
-    """Give the pieces that write voxels, n >= 1, and narrow gaps between them, pixel by pixel.
-
-    Parameters
-    ----------
-    index, look
-        As of `set_runs`.
-    coding : Coding
-
-    """
-    wide = np.flatnonzero(index[1:] - index[:-1] > coding.move_bytes + 2)
-    start = index[np.concatenate(([0], wide + 1))]
-    count = index[np.append(wide, len(index) - 1)] + 1 - start
-    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    most = _most(coding.room + coding.pen_bytes, bits)  # it needs no pen
-    parts = -(-count // most)
-    done = ranges(np.zeros(len(count), dtype=np.int64), parts) * most
-    start = np.repeat(start, parts) + done
-    count = np.minimum(np.repeat(count, parts) - done, most)
-    pixel = look(ranges(start, count)).astype(np.int64)
-    at_pixel = np.cumsum(count) - count
-    op = np.full(len(start), LIT)
-    body, size = _bodies(op, count, at_pixel, pixel, pixel, coding)
-    last = pixel[at_pixel + count - 1]
-    any_ = np.full(len(start), ANY)
-    none = np.zeros(len(start), dtype=np.bool_)
-    return Pieces(body, size, any_, start, last, start + count, none)
-
-
 def _pieces(op: Ints, start: Ints, count: Ints, value: Ints, coding: Coding) -> Pieces:
     """Make pieces of stretches of equal pixels: those of one LIT, or one DIFF, are joined."""
     goes_on = np.zeros(len(op), dtype=np.bool_)
