@@ -1,4 +1,4 @@
-"""Pages that go as they lie in memory: what they draw, what they cost, and when they are worth it."""
+"""Pages that go as they lie in memory: what they draw, what they cost, when they are worth it."""
 
 import numpy as np
 import pytest
