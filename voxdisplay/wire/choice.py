@@ -23,6 +23,7 @@ from voxdisplay.wire.chains import Chains, chain
 from voxdisplay.wire.ops import Bools, Coding, Ints, ranges
 from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
 from voxdisplay.wire.plain import encode_plain, is_noise
+from voxdisplay.wire.steps import Steps, at_once
 
 # Of many colours, voxels that mostly have other neighbours in their row make no bricks.
 _MANY_COLORS = 16
@@ -30,7 +31,7 @@ _A_FEW = 512  # voxels, which mostly show already that there are as many
 # More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
 _LARGE_SET = 1 << 16
 _SLAB_VOXELS = 1 << 18
-_PARSED_VOXELS = 1 << 15  # take some 15 ms to be parsed
+_PARSED_VOXELS = 1 << 17
 # Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
 _SLABS_FROM = 100_000
 # Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
@@ -180,7 +181,7 @@ def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[by
     items, look = content.items, content.look
     if items is None or not len(items):
         if len(content.index):
-            _offer_sets(best, no_pieces(), content.index, look)
+            yield from _pauses(_offer_sets(best, no_pieces(), content.index, look))
         yield best.payloads
         return
     # A voxel that follows itself would end a chain.
@@ -200,17 +201,23 @@ def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[by
     if apart.any() or len(content.index):
         index = _united(items.index[_voxels_of(chains, apart)], content.index)
         kept = _by_pen(chains.pieces.take(np.flatnonzero(~apart)))
-        _offer_sets(best, kept, index, look)
+        yield from _pauses(_offer_sets(best, kept, index, look))
         yield []
     if coding.bytes_per_s >= _CHAINS_FROM:
         yield best.payloads
         return
     index = _united(items.index, content.index)
     if spans.least_bytes(index, coding) < best.total:
-        best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
+        best.offer(at_once(spans.span_set(index, look(index), look, coding)))
     if coding.has(spec.FEATURE_ARC) and not len(content.index):
         best.offer_payloads(encode_arcs(items.voxels, items.values, coding))
     yield best.payloads
+
+
+def _pauses(steps: Steps[None]) -> Iterator[list[bytes]]:
+    """Do steps, with nothing to be sent in between."""
+    for _ in steps:
+        yield []
 
 
 def _united(index: Ints, others: Ints) -> Ints:
@@ -293,23 +300,24 @@ def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Codi
     return apart
 
 
-def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> None:
-    """Offer pieces together with a set of voxels, n >= 1, coded in each way."""
+def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> Steps[None]:
+    """Offer pieces together with a set of voxels, n >= 1, coded in each way; in steps."""
     coding, values = best.coding, look(index)
     if bricks.can_code(coding) and not _is_noise(index, values):
         made = bricks.brick(index, values, coding)
+        yield
         best.offer(kept, made.pieces)
         in_spans = _cheaper_as_spans(index, values, made, coding)
         if in_spans.any() and not in_spans.all():
             there = in_spans[np.searchsorted(made.values, values)]
             brick_pieces = np.searchsorted(made.values, made.pieces.pen)
-            best.offer(
-                kept,
-                made.pieces.take(np.flatnonzero(~in_spans[brick_pieces])),
-                spans.span(spans.set_runs(index[there], values[there], look), coding),
-            )
+            in_bricks = made.pieces.take(np.flatnonzero(~in_spans[brick_pieces]))
+            rest = yield from spans.span_set(index[there], values[there], look, coding)
+            best.offer(kept, in_bricks, rest)
     if spans.least_bytes(index, coding) < best.total - int(kept.size.sum()):
-        best.offer(kept, spans.span(spans.set_runs(index, values, look), coding))
+        rows = yield from spans.span_set(index, values, look, coding)
+        yield
+        best.offer(kept, rows)
 
 
 def _is_noise(index: Ints, values: NDArray[np.integer]) -> bool:

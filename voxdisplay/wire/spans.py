@@ -27,6 +27,7 @@ from voxdisplay.wire.ops import (
 )
 from voxdisplay.wire.parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
 from voxdisplay.wire.pieces import ANY, Layout, Pieces, no_pieces
+from voxdisplay.wire.steps import Steps, at_once
 
 Look = Callable[[Ints], NDArray[np.integer]]
 
@@ -51,7 +52,7 @@ def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
         At most ``coding.max_payload`` bytes each; empty if all is dark.
 
     """
-    return Layout(span(page_runs(values), coding), coding).payloads
+    return Layout(at_once(span(page_runs(values), coding)), coding).payloads
 
 
 def page_runs(values: NDArray[np.integer]) -> Runs:
@@ -120,9 +121,17 @@ def least_bytes(index: Ints, coding: Coding) -> int:
     return 1 + int(np.minimum(skipped, drawn).sum())
 
 
-def span(runs: Runs, coding: Coding) -> Pieces:
-    """Give the pieces that draw runs."""
-    way = cheapest(runs, coding)
+def span_set(index: Ints, values: NDArray[np.integer], look: Look, coding: Coding) -> Steps[Pieces]:
+    """Make the pieces that draw voxels, in steps: the parameters are those of `set_runs`."""
+    runs = set_runs(index, values, look)
+    yield
+    return (yield from span(runs, coding))
+
+
+def span(runs: Runs, coding: Coding) -> Steps[Pieces]:
+    """Make the pieces that draw runs, in steps."""
+    way = yield from cheapest(runs, coding)
+    yield
     op, rest = WAYS[:, 0][way], WAYS[:, 1][way]
     split = np.flatnonzero(rest)
     count = runs.length.copy()
