@@ -1,7 +1,9 @@
 """The host's end of protocol.md, without any I/O: bytes in, events out, time is an argument."""
 
+from voxdisplay.link.counters import LinkCounters
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
-from voxdisplay.link.link import Link, LinkCounters, OnDisplay
+from voxdisplay.link.frames import OnDisplay
+from voxdisplay.link.link import Link
 
 __all__ = [
     "Event",

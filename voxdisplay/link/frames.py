@@ -1,0 +1,215 @@
+"""The frames that wait to be shown: their payloads, their order, their numbers.
+
+A frame is what it is made of, and how much of that has been put into packets. Knows no window, no
+credit and no clock: when a packet may go out, and whether it has come, is the business of others.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+
+_MODULUS = 256
+
+OnDisplay: TypeAlias = tuple[int, int]
+"""Which picture is on display: how many sessions there were, and the ticket of its frame or 0."""
+
+
+@dataclass(slots=True)
+class QueuedFrame:
+    """A frame that is to be shown: its payloads, and how many are in packets already.
+
+    With a ``base`` they are but the difference from what that stands for, and ``whole`` gives all.
+    An ``open`` one is still being coded: more payloads follow.
+    """
+
+    ticket: int
+    payloads: list[bytes]
+    clear: bool
+    base: OnDisplay | None = None
+    whole: Callable[[], list[bytes]] = list
+    open: bool = False
+    frame_id: int = -1
+    entered: int = 0
+
+    @property
+    def begun(self) -> bool:
+        """Whether it has a number, and packets."""
+        return self.frame_id >= 0
+
+    @property
+    def all_entered(self) -> bool:
+        """Whether all of it is in packets: then the device will show it."""
+        return self.begun and not self.open and self.entered == len(self.payloads)
+
+    @property
+    def left(self) -> int:
+        """Payloads that may enter now: of an open one the last may be that with COMMIT."""
+        return max(0, len(self.payloads) - self.open - self.entered)
+
+    @property
+    def next_payload(self) -> bytes:
+        """What the next packet brings, if any is left."""
+        return self.payloads[self.entered]
+
+
+class Frames:
+    """The frames of one link, the oldest first."""
+
+    def __init__(self) -> None:
+        self._queue: deque[QueuedFrame] = deque()
+        self._tickets = 0
+        self._next_id = 0
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    def __iter__(self) -> Iterator[QueuedFrame]:
+        return iter(self._queue)
+
+    # -- in
+
+    def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
+        """Queue a frame; give its ticket.
+
+        Parameters
+        ----------
+        payloads : list of bytes
+            Ops, each at most INFO's ``max_payload`` long. None at all is a frame without ops.
+        clear : bool
+            Whether the frame starts dark; otherwise as a copy of what is shown.
+
+        """
+        return self._add(QueuedFrame(self._new_ticket(), payloads or [b""], clear))
+
+    def begin(self) -> int:
+        """Queue a frame that starts dark and is still being coded; give its ticket."""
+        return self._add(QueuedFrame(self._new_ticket(), [], clear=True, open=True))
+
+    def supply(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
+        """Add payloads to a frame that was begun; what is not queued any more takes none.
+
+        Parameters
+        ----------
+        ticket : int
+            Of a frame from `begin`, whose last payloads have not been supplied.
+        payloads : list of bytes
+            As of `present`. All but the last of them may be sent at once.
+        last : bool
+            Whether there are no more.
+
+        """
+        for frame in self._queue:
+            if frame.ticket == ticket:
+                frame.payloads += payloads
+                frame.open = not last
+                if last and not frame.payloads:
+                    frame.payloads = [b""]
+
+    def present_on(
+        self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
+    ) -> int:
+        """Queue a frame as its difference from a picture on display; give its ticket.
+
+        Parameters
+        ----------
+        base : OnDisplay
+            The picture.
+        payloads : list of bytes
+            Ops that make the frame of it.
+        whole : callable
+            Gives the payloads that draw the frame from the dark. They are sent if the picture is
+            not on display any more when the frame's turn comes, or something is on its way, or the
+            session ends before the frame is shown.
+
+        """
+        ticket = self._new_ticket()
+        return self._add(
+            QueuedFrame(ticket, payloads or [b""], clear=False, base=base, whole=whole)
+        )
+
+    def _new_ticket(self) -> int:
+        self._tickets += 1
+        return self._tickets
+
+    def _add(self, frame: QueuedFrame) -> int:
+        self._queue.append(frame)
+        return frame.ticket
+
+    # -- how much there is
+
+    @property
+    def unsent_bytes(self) -> int:
+        """Bytes of payloads that are in no packet yet, as far as they are coded."""
+        return sum(
+            len(payload) for frame in self._queue for payload in frame.payloads[frame.entered :]
+        )
+
+    @property
+    def payloads(self) -> int:
+        """Payloads of all frames, as far as they are coded."""
+        return sum(len(frame.payloads) for frame in self._queue)
+
+    @property
+    def payloads_left(self) -> int:
+        """Payloads that are in no packet yet."""
+        return sum(len(frame.payloads) - frame.entered for frame in self._queue)
+
+    @property
+    def any_due(self) -> bool:
+        """Whether the device has, or will have, all of a frame that it has not shown yet."""
+        return any(frame.all_entered for frame in self._queue)
+
+    # -- out
+
+    def check_base(self, frame: QueuedFrame, on_display: OnDisplay | None) -> None:
+        """Make a difference the whole frame if it cannot be sent as such.
+
+        Parameters
+        ----------
+        frame : QueuedFrame
+            One whose turn has come.
+        on_display : OnDisplay or None
+            The picture on display; None while something is on its way that may change it.
+
+        """
+        fits = frame.base == on_display and frame is self._queue[0]
+        if frame.base is not None and not fits:
+            frame.payloads, frame.clear, frame.base = frame.whole() or [b""], True, None
+
+    def enter(self, frame: QueuedFrame, seq: int) -> packets.Data:
+        """Give a frame's next packet."""
+        if not frame.begun:
+            frame.frame_id = self._next_id
+            self._next_id = (frame.frame_id + 1) % _MODULUS
+        payload = frame.next_payload
+        frame.entered += 1
+        flags = spec.DATA_FLAG_CLEAR * frame.clear
+        flags |= spec.DATA_FLAG_COMMIT * frame.all_entered
+        return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=payload)
+
+    def shown(self, frame_id: int | None) -> int | None:
+        """Take out the frame of a number that is shown, and all before it; give its ticket.
+
+        None if there is no such frame, or it is not complete: then the number is an older frame's.
+        """
+        if not any(frame.all_entered and frame.frame_id == frame_id for frame in self._queue):
+            return None
+        while (frame := self._queue.popleft()).frame_id != frame_id:
+            pass
+        return frame.ticket
+
+    def rewind(self) -> None:
+        """Begin a session: all frames are to be sent again, from their beginnings."""
+        self._next_id = 0
+        for frame in self._queue:
+            frame.frame_id, frame.entered = -1, 0
+
+    def clear(self) -> None:
+        """Drop all frames."""
+        self._queue.clear()
