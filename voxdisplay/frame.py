@@ -22,11 +22,11 @@ from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
 from voxdisplay.grid import Grid
 from voxdisplay.palette import DEFAULT, Palette
-from voxdisplay.pixel import PixelFormat, Pixels, Values
+from voxdisplay.pixel import PixelFormat, Pixels, Values, lit
 from voxdisplay.wire import spec
 from voxdisplay.wire.choice import Content, Items, encode, encode_page, join_items
 from voxdisplay.wire.colors import color_pieces
-from voxdisplay.wire.digest import digest, palette_digest
+from voxdisplay.wire.digest import digest, page_digest, palette_digest
 from voxdisplay.wire.ops import Coding
 from voxdisplay.wire.pieces import Pieces
 
@@ -241,8 +241,7 @@ class Frame:
 
     def _find_lit(self) -> tuple[NDArray[np.int64], Values]:
         if self._has_base:
-            lit = self._raster != 0
-            index = np.flatnonzero(lit.any(axis=1) if lit.ndim == 2 else lit)
+            index = np.flatnonzero(lit(self._raster))
             return index, self._values_at(index)
         if not self._items:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
@@ -256,7 +255,9 @@ class Frame:
 
     def digest(self) -> int:
         """Give the digest that a display which shows this frame must report."""
-        found = digest(*self.lit())
+        # Of an array, much may be lit.
+        whole = self._has_base
+        found = page_digest(self._raster, self.format) if whole else digest(*self.lit())
         if self._palette and len(entries := self._palette.differs_from(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
         return found & 0xFFFFFFFF
@@ -333,8 +334,7 @@ class Frame:
         if not (self._has_base or base._has_base):
             index = np.union1d(self.lit()[0], base.lit()[0])
             return np.asarray(index[self._values_at(index) != base._values_at(index)])
-        differs = mine != other
-        return np.flatnonzero(differs.any(axis=1) if differs.ndim == 2 else differs)
+        return np.flatnonzero(lit(mine ^ other))
 
     def _coding(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0

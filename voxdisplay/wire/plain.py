@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.pixel import PixelFormat, Pixels
+from voxdisplay.pixel import PixelFormat, Pixels, lit
 from voxdisplay.wire import spec
 from voxdisplay.wire.ops import Bools, Coding, Ints, count_bytes, count_ops, ranges
 from voxdisplay.wire.pieces import fill
@@ -52,10 +52,10 @@ def is_noise(page: Pixels, coding: Coding) -> bool:
     if coding.format is PixelFormat.MONO1:
         written = int(np.count_nonzero(np.packbits(page)))
         return len(same) - alike > _MANY_CHANGES * written
-    lit = _lit(page)
-    if 2 * (alike - int(np.count_nonzero(same & ~lit[1:]))) >= np.count_nonzero(lit):
+    on = lit(page)
+    if 2 * (alike - int(np.count_nonzero(same & ~on[1:]))) >= np.count_nonzero(on):
         return False
-    places = np.flatnonzero(lit)
+    places = np.flatnonzero(on)
     some = page[places[:: -(-len(places) // _SOME)]]
     return len(np.unique(some, axis=0)) > _MANY_COLORS
 
@@ -84,18 +84,18 @@ def encode_plain(page: Pixels, coding: Coding) -> Iterator[list[bytes]]:
     for low in range(0, len(page), _SLAB_VOXELS):
         at = low // per_unit
         some = slice(at, at + _SLAB_VOXELS // per_unit)
-        yield _encode(_lit(units[some]), memory[some], low, len(page) - low, per_unit, coding)
+        yield _encode(lit(units[some]), memory[some], low, len(page) - low, per_unit, coding)
 
 
 def _encode(
-    lit: Bools, memory: NDArray[np.generic], low: int, voxels: int, per_unit: int, coding: Coding
+    on: Bools, memory: NDArray[np.generic], low: int, voxels: int, per_unit: int, coding: Coding
 ) -> list[bytes]:
     """Code a slab.
 
     Parameters
     ----------
-    lit : (n,) bool array
-        Which units are.
+    on : (n,) bool array
+        Which units are lit.
     memory : (n,) array
         All of them, as they go over the wire.
     low, voxels : int
@@ -105,10 +105,10 @@ def _encode(
     coding : Coding
 
     """
-    if not lit.any():
+    if not on.any():
         return []
     size = memory.itemsize
-    edges = np.flatnonzero(np.diff(lit, prepend=False, append=False))
+    edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
     wide = np.flatnonzero(edges[2::2] - edges[1:-1:2] > _NARROW // size)
     begin, end = edges[np.append(0, 2 * wide + 2)], edges[np.append(2 * wide + 1, -1)]
     # No LIT is longer than a payload takes, wherever it begins.
@@ -135,16 +135,10 @@ def _encode(
         op_bytes[counts == 0] = 0
         out[ranges(here, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
         here += op_bytes
-    written = memory[_mask(begin, end, len(lit))]
+    written = memory[_mask(begin, end, len(on))]
     out[_mask(here, here + count * size, len(out))] = written.view(np.uint8)
     data = out.tobytes()
     return [data[a:b] for a, b in pairwise([*offset, len(data)])]
-
-
-def _lit(page: NDArray[np.generic]) -> Bools:
-    """Tell what is not dark: (n,)."""
-    lit = page != 0
-    return lit[:, 0] | lit[:, 1] | lit[:, 2] if lit.ndim == 2 else np.asarray(lit)
 
 
 def _op_bytes(counts: Ints) -> Ints:
