@@ -138,8 +138,8 @@ def push_once(data: bytes, display: vd.Display, link: Stopwatch) -> dict[str, fl
     frame.digest()
     marks.append(time.perf_counter())
     link.seconds = 0.0
-    ticket = display._link.present(payloads)  # noqa: SLF001 - one stage of what present() does
-    while ticket not in display._shown:  # noqa: SLF001
+    ticket = display._connection.link.present(payloads)  # noqa: SLF001 - a stage of present()
+    while not display._presenter.is_shown(ticket):  # noqa: SLF001
         display._turn()  # noqa: SLF001
     marks.append(time.perf_counter())
     names = ("parse", "voxelise", "draw", "encode", "digest", "pipe")
@@ -191,8 +191,9 @@ def bench_scenes(size: str, scenes: dict[str, dict[str, Any]], repeats: int) -> 
     """Print a line for each scene, on an emulator of a size."""
     with emulator("--pty", "--size", size, "--refresh", "0") as port, vd.open(port) as display:
         link = Stopwatch()
-        display._link.transmit = link.wrap(display._link.transmit)  # type: ignore[method-assign]  # noqa: SLF001
-        display._link.receive = link.wrap(display._link.receive)  # type: ignore[method-assign]  # noqa: SLF001
+        watched = display._connection.link  # noqa: SLF001
+        watched.transmit = link.wrap(watched.transmit)  # type: ignore[method-assign]
+        watched.receive = link.wrap(watched.receive)  # type: ignore[method-assign]
         for name, scene in scenes.items():
             data = json.dumps(scene).encode()
             push_once(data, display, link)

@@ -29,7 +29,6 @@ from bench_ports import in_another_process
 from numpy.typing import NDArray
 
 import voxdisplay as vd
-from voxdisplay import display as displays
 from voxdisplay.device import device_info
 from voxdisplay.errors import TransportClosed
 from voxdisplay.frame import Frame
@@ -99,7 +98,7 @@ class OwnTime:
         self.bytes = 0
 
     def monotonic(self) -> float:
-        """Tell the time, as the module ``time`` does."""
+        """Tell the time, as ``time.monotonic`` does."""
         return time.process_time() + self._skipped_s
 
     def _wait_until(self, moment_s: float) -> None:
@@ -134,20 +133,15 @@ class OwnTime:
 def busy_in_own_time(frames: list[Frame], bytes_per_s: float, seconds: float) -> float:
     """Give how busy a line is while frames take turns, by the driver's own processor time."""
     pipe = OwnTime(info_for(frames[0]), bytes_per_s)
-    clock = displays.time
-    displays.time = pipe  # type: ignore[assignment] - it has the one function that is called
-    try:
-        display, turns = vd.open(pipe), itertools.cycle(frames)
+    display, turns = vd.open(pipe, clock=pipe.monotonic), itertools.cycle(frames)
 
-        def until(end_s: float) -> tuple[int, float]:
-            while pipe.monotonic() < end_s:
-                display.present(next(turns), wait=False)
-            return pipe.bytes, pipe.monotonic()
+    def until(end_s: float) -> tuple[int, float]:
+        while pipe.monotonic() < end_s:
+            display.present(next(turns), wait=False)
+        return pipe.bytes, pipe.monotonic()
 
-        before, began_s = until(pipe.monotonic() + min(1.0, seconds))
-        after, ended_s = until(pipe.monotonic() + seconds)
-    finally:
-        displays.time = clock
+    before, began_s = until(pipe.monotonic() + min(1.0, seconds))
+    after, ended_s = until(pipe.monotonic() + seconds)
     return (after - before) / (bytes_per_s * (ended_s - began_s))
 
 

@@ -28,7 +28,7 @@ from voxdisplay.curves import (
     TorusKnot,
 )
 from voxdisplay.device import DeviceInfo
-from voxdisplay.display import Display, Receipt, open  # noqa: A004 - vd.open(port)
+from voxdisplay.display import Display, Receipt
 from voxdisplay.errors import (
     CurveError,
     DesyncError,
@@ -47,6 +47,7 @@ from voxdisplay.errors import (
 )
 from voxdisplay.frame import Drawing, Frame
 from voxdisplay.grid import Grid
+from voxdisplay.opening import open  # noqa: A004 - vd.open(port)
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.scene import Scene, load_scene, read_scene
 from voxdisplay.voxelize import Report, Sequence, voxelize_many

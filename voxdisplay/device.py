@@ -89,6 +89,26 @@ def device_info(info: Info) -> DeviceInfo:
     )
 
 
+def check_same(before: DeviceInfo, now: DeviceInfo) -> None:
+    """Check that what was made for a device suits what is there now.
+
+    Raises
+    ------
+    IncompatibleDevice
+        If it has another grid or format, or does not take all that the other took.
+
+    """
+    if (now.grid, now.format) != (before.grid, before.format):
+        raise IncompatibleDevice(
+            f"the device came back as another: {now.grid} {now.format.value}, "
+            f"it was {before.grid} {before.format.value}"
+        )
+    if missing := set(before.features) - set(now.features):
+        raise IncompatibleDevice(f"the device came back without {', '.join(sorted(missing))}")
+    if now.max_payload_bytes < before.max_payload_bytes:
+        raise IncompatibleDevice("the device came back with less room for a packet")
+
+
 def device_error(error: Error) -> DeviceError:
     """Give what is raised for an ERROR."""
     name = _CODES.get(error.code, "an unknown code")

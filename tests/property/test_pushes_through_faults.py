@@ -15,7 +15,6 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.wire import Wire
-from voxdisplay import display as displays
 from voxdisplay.errors import TransportClosed
 
 GRID = (17, 9, 5)
@@ -130,22 +129,20 @@ def session(seed, pushes):
     }
     faults = faults_of(rng)
     line = Line(Device(Config(**config)), faults, seed)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(displays, "time", line)
-        truth = Truth(line)
-        truth.pages.add(bytes(len(truth.front)))  # dark: after a start
-        display, left, opened = None, pushes, 0
-        while left:
-            try:
-                if display is None:
-                    opened += 1
-                    assert opened < 40 * pushes, f"{faults}: nothing gets through"
-                    display = vd.open(line, timeout_s=2.0)
-                left -= 1
-                truth.push(display, random_frame(rng, display))
-            except vd.VoxDisplayError:
-                line.close()
-                display = None
+    truth = Truth(line)
+    truth.pages.add(bytes(len(truth.front)))  # dark: after a start
+    display, left, opened = None, pushes, 0
+    while left:
+        try:
+            if display is None:
+                opened += 1
+                assert opened < 40 * pushes, f"{faults}: nothing gets through"
+                display = vd.open(line, timeout_s=2.0, clock=line.monotonic)
+            left -= 1
+            truth.push(display, random_frame(rng, display))
+        except vd.VoxDisplayError:
+            line.close()
+            display = None
     return truth.told, faults
 
 

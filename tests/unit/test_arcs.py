@@ -79,9 +79,9 @@ def test_it_is_sent_where_it_was_announced_and_is_shorter():
 @pytest.mark.parametrize(("rate", "used"), [(None, False), (11_520, True), (300_000, False)])
 def test_it_is_sent_on_slow_lines(rate, used):
     with vd.open("sim:?size=128x128x128&format=index8") as display:
-        display._transport.bytes_per_s = rate
+        display._connection._transport.bytes_per_s = rate
         frame = display.frame()
         frame.draw(PAPER, "orange")
-        assert (display._payloads(frame)[-1][0] == spec.OP_ARC) == used
+        assert (display._presenter.payloads(frame)[-1][0] == spec.OP_ARC) == used
         assert display.present(frame).digest == frame.digest()
         display.verify(frame)

@@ -10,7 +10,6 @@ import voxdisplay as vd
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from voxdisplay import display as displays
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.stream import PacketStream
@@ -32,9 +31,6 @@ class Pipe:
         self.answers = lambda data: data  # what becomes of what the device says
         self.before_write = self.before_read = lambda: None
 
-    def monotonic(self):
-        return self.now
-
     def read(self, timeout_s):
         self.before_read()
         data = self.device.transmit()
@@ -54,13 +50,12 @@ class Pipe:
 
 
 @pytest.fixture
-def opened(monkeypatch):
+def opened():
     """Open a display on a new device: (display, pipe)."""
 
     def open_on(pipe=None, **config):
         pipe = pipe or Pipe(**config)
-        monkeypatch.setattr(displays, "time", pipe)
-        return vd.open(pipe, timeout_s=2.0), pipe
+        return vd.open(pipe, timeout_s=2.0, clock=lambda: pipe.now), pipe
 
     return open_on
 
@@ -76,7 +71,7 @@ def random_frame(display, seed=0, density=0.3):
 
 
 def payloads_of(display, frame):
-    return frame.payloads(display._link.payload_bytes, display.info.features)
+    return frame.payloads(display._connection.link.payload_bytes, display.info.features)
 
 
 def assert_shows(pipe, frame):
@@ -178,7 +173,7 @@ def test_no_more_than_two_frames_are_under_way(opened):
     frames = [random_frame(display, seed, 0.01) for seed in range(20)]
     for frame in frames:
         display.present(frame, wait=False)
-        assert display._link.backlog <= 2
+        assert display._connection.link.backlog <= 2
     display.flush()
     assert_shows(pipe, frames[-1])
 
@@ -582,7 +577,7 @@ def test_an_interrupted_read_does_not_disturb_the_next(opened):
 
     with pytest.raises(KeyboardInterrupt):
         display.read(progress=interrupt)
-    display._link.read(3, 4)  # as if it had been asked and not been fetched
+    display._connection.link.read(3, 4)  # as if it had been asked and not been fetched
     assert (display.read() == frame.array()).all()
 
 

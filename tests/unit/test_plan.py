@@ -90,7 +90,7 @@ def test_it_is_what_it_then_costs(density):
         frame = display.frame()
         frame = curves(frame.grid, "index8") if density is None else memory(
             frame.grid, "index8", density)  # fmt: skip
-        cost = plan(frame, display._link.payload_bytes, display._worth_using)
+        cost = plan(frame, display._connection.link.payload_bytes, display._presenter._worth_using)
         receipt = display.present(frame)
     assert receipt.retransmitted == 0
     assert (cost.packets, cost.wire_bytes) == (receipt.packets, receipt.wire_bytes)
