@@ -32,9 +32,8 @@ def rig_of(seed, device):
     longest = device["max_payload"] + spec.LIMIT_OVERHEAD
     least = longest + -(-longest // 254) + 1 + spec.LIMIT_RESERVE
     config = {key: value for key, value in device.items() if key != "room"}
-    # Where half the questions are lost and an answer takes 2 s, 20 s of silence do happen.
-    patience_s = 40 if device["delay_s"] == 1.0 else 20
-    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=patience_s, **config)
+    # Where two answers of three are lost, 20 s of silence do happen.
+    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=60, **config)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
