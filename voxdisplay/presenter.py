@@ -106,8 +106,13 @@ class Presenter:
             frame, self._newest = self._newest, None
             self._unwaited[self.present(frame)] = frame
         if coder := self._coder:
-            payloads = next(coder.payloads, None)
-            self._link.supply(coder.ticket, payloads or [], last=payloads is None)
+            try:
+                payloads = next(coder.payloads, None)
+                self._link.supply(coder.ticket, payloads or [], last=payloads is None)
+            except BaseException:  # an interrupt: what was lost by it nobody gives again
+                self._link.withdraw(coder.ticket)
+                self._coder = None
+                raise
             if payloads is None:
                 self._coder = None
 

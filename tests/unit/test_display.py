@@ -567,6 +567,31 @@ def test_an_interrupt_in_mid_present_leaves_it_usable(opened, where, moment):
     assert (display.read() == frame.array()).all()
 
 
+@pytest.mark.parametrize("wait", [True, False])
+def test_a_frame_whose_coding_is_interrupted_is_never_shown(opened, wait):
+    display, pipe = opened()
+    shown = []
+    pipe.device.on_swap = lambda: shown.append(pipe.bench.snapshot().digest)
+    first, broken, last = (random_frame(display, seed) for seed in range(3))
+    some = broken.payloads(64)[:3]
+
+    def coded(*_device):
+        yield some
+        raise KeyboardInterrupt
+
+    def show(frame):
+        display.present(frame, wait=wait)
+        display.flush()
+
+    show(first)
+    broken.coded = coded
+    with pytest.raises(KeyboardInterrupt):
+        show(broken)
+    assert display.present(last).frame == 2
+    assert shown == [first.digest(), last.digest()]
+    assert_shows(pipe, last)
+
+
 def test_an_interrupted_read_does_not_disturb_the_next(opened):
     display, _ = opened()
     frame = random_frame(display, 1, 0.9)

@@ -123,6 +123,13 @@ class Frames:
                 frame.supply(payloads if payloads or frame.payloads or not last else [b""])
                 frame.open = not last
 
+    def withdraw(self, ticket: int) -> None:
+        """Give up a frame from `begin` whose last payloads will not come.
+
+        What has been sent of it is followed by the next frame, and dropped (section 6, point 6).
+        """
+        self._queue = deque(frame for frame in self._queue if frame.ticket != ticket)
+
     def present_on(
         self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
     ) -> int:

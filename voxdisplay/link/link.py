@@ -124,6 +124,10 @@ class Link:
         """Add payloads to a frame that was begun. See `Frames.supply`."""
         self._frames.supply(ticket, payloads, last=last)
 
+    def withdraw(self, ticket: int) -> None:
+        """Give up a frame that is still being coded. See `Frames.withdraw`."""
+        self._frames.withdraw(ticket)
+
     def present_on(
         self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
     ) -> int:
