@@ -1,23 +1,28 @@
 """What a frame costs on the wire, before it is sent, and how many a second a line carries.
 
-Everything is counted on the packets themselves, as the link would send them. Knows no link, no port
-and no device but by what it announces.
+Everything is counted on the packets themselves, coded as they would be for such a line and such a
+device. Knows no port, no session, and no device but by what it announces.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Final
+from itertools import chain
+from typing import Final, Self
 
+from voxdisplay.device import DeviceInfo
 from voxdisplay.frame import Frame
+from voxdisplay.link.loss import FIRST_PAYLOAD, suited
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.listing import list_ops
 from voxdisplay.wire.ops import Coding
+from voxdisplay.worth import worth_using
 
-TYPICAL_MAX_PAYLOAD: Final = 1024
+EVERY_FEATURE: Final = tuple(
+    name.removeprefix("FEATURE_").lower() for name in vars(spec) if name.startswith("FEATURE_")
+)
 COMMON_BAUDS: Final = (
     115_200, 230_400, 460_800, 921_600, 1_000_000, 2_000_000, 3_000_000, 6_000_000, 12_000_000,
 )  # fmt: skip
@@ -54,6 +59,32 @@ COMMON_LINES: Final = (*map(Line.serial, COMMON_BAUDS), *USB_LINES)
 
 
 @dataclass(frozen=True, slots=True)
+class Receiver:
+    """What a device announces, as far as frames are coded by it.
+
+    Attributes
+    ----------
+    features : tuple of str
+        As in `DeviceInfo.features`; by default all that there are.
+    payload_bytes : int
+        The longest payload that it is sent while nothing has been lost.
+    refresh_hz : float
+        How many frames a second it shows at most; 0: any number.
+
+    """
+
+    features: tuple[str, ...] = EVERY_FEATURE
+    payload_bytes: int = FIRST_PAYLOAD
+    refresh_hz: float = 0.0
+
+    @classmethod
+    def of(cls, said: DeviceInfo) -> Self:
+        """Give the receiver that a device is."""
+        longest = suited(FIRST_PAYLOAD, said.max_payload_bytes, said.rx_buffer_bytes)
+        return cls(said.features, longest, said.refresh_hz)
+
+
+@dataclass(frozen=True, slots=True)
 class OpCost:
     """How often an op occurs, and how many bytes all of these have together."""
 
@@ -67,6 +98,9 @@ class Plan:
 
     Attributes
     ----------
+    line : Line
+    receiver : Receiver
+        What it was coded for.
     voxels : int
         Lit voxels.
     packets : int
@@ -82,6 +116,8 @@ class Plan:
 
     """
 
+    line: Line
+    receiver: Receiver
     voxels: int
     packets: int
     op_bytes: int
@@ -89,43 +125,39 @@ class Plan:
     answer_bytes: int
     ops: dict[str, OpCost]
 
-    def seconds_on(self, line: Line) -> float:
-        """Give how long a line is busy with the frame; both ways go at the same time."""
-        return max(self.wire_bytes, self.answer_bytes) / line.bytes_per_s
+    @property
+    def seconds(self) -> float:
+        """How long the line is busy with the frame; both ways go at the same time."""
+        return max(self.wire_bytes, self.answer_bytes) / self.line.bytes_per_s
 
-    def rate_on(self, line: Line, refresh_hz: float = 0.0) -> float:
-        """Give how many such frames a second a line carries, one behind the other.
+    @property
+    def frames_per_s(self) -> float:
+        """How many such frames the line carries, one behind the other, and the device shows.
 
         That is as many as there could be: a device may take longer to draw them than to get them.
-
-        Parameters
-        ----------
-        line : Line
-        refresh_hz : float
-            What the device shows at most; 0: any number.
-
         """
-        carried = 1 / self.seconds_on(line)
-        return min(carried, refresh_hz) if refresh_hz else carried
+        carried = 1 / self.seconds
+        most = self.receiver.refresh_hz
+        return min(carried, most) if most else carried
 
 
-def plan(
-    frame: Frame, max_payload: int = TYPICAL_MAX_PAYLOAD, features: Collection[str] = ()
-) -> Plan:
+def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
     """Find what it takes to show a frame.
 
     Parameters
     ----------
     frame : Frame
         Of the display's grid and format.
-    max_payload : int
-        The longest payload that the device takes.
-    features : collection of str
-        What it announces, as in `DeviceInfo.features`.
+    line : Line
+        What it is sent over. It is coded as the driver does when it knows that line.
+    receiver : Receiver
+        Who gets it.
 
     """
-    payloads = frame.payloads(max_payload, features) or [b""]
-    coding = Coding(frame.grid, frame.format, max_payload)
+    longest, speed = receiver.payload_bytes, line.bytes_per_s
+    coded = frame.coded(longest, worth_using(receiver.features, speed), speed)
+    payloads = list(chain.from_iterable(coded)) or [b""]
+    coding = Coding(frame.grid, frame.format, longest)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()
     wire_bytes = 0
@@ -138,6 +170,8 @@ def plan(
             count[name] += 1
             size[name] += op_bytes
     return Plan(
+        line=line,
+        receiver=receiver,
         voxels=len(frame.lit()[0]),
         packets=len(payloads),
         op_bytes=sum(map(len, payloads)),

@@ -10,6 +10,7 @@ import document
 import pytest
 from bench_top import BenchTop
 
+from firmware_sim import crc
 from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.decoder import Decoder, Refused
 from voxdisplay.conformance.mistakes import MISTAKES
@@ -195,7 +196,7 @@ def test_every_check_finds_a_fault():
 
 
 def test_a_wrong_check_value_is_named(monkeypatch):
-    monkeypatch.setattr(broken_devices.crc, "_TABLE", _castagnoli())
+    monkeypatch.setattr(crc, "_TABLE", _castagnoli())
     report = examined(device(), ["3"])
     assert report.said is None
     assert "CRC-32C" in report.results[0].likely
@@ -203,13 +204,12 @@ def test_a_wrong_check_value_is_named(monkeypatch):
 
 
 def _castagnoli():
-    monkey = broken_devices.crc
-    poly = monkey.spec.CRC_POLY
+    poly = crc.spec.CRC_POLY
     try:
-        monkey.spec.CRC_POLY = 0x1EDC6F41
-        return monkey._table()
+        crc.spec.CRC_POLY = 0x1EDC6F41
+        return crc._table()
     finally:
-        monkey.spec.CRC_POLY = poly
+        crc.spec.CRC_POLY = poly
 
 
 class Pipe:

@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "device": {"errors", "grid", "pixel", "wire"},
     "conformance": {"conformance", "errors", "transport", "wire.spec"},
     "view": {"errors", "grid", "palette", "pixel", "view"},
-    "plan": {"frame", "wire"},
+    "plan": {"device", "frame", "link.loss", "wire", "worth"},
     "baud": {"errors", "probe", "transport"},
     "probe": {"errors", "link", "transport", "wire"},
     "roll_call": {"baud", "device", "errors", "probe"},

@@ -37,7 +37,7 @@ _EXIT_BROKEN = 1
     at; 2 usage; 3 the port cannot be opened."""
 )
 @port_option
-@baud_option
+@baud_option()
 @timeout_option(1.0)
 @click.option(
     "--opening",

@@ -70,7 +70,8 @@ class BaudType(click.ParamType[Baud]):
         return [CompletionItem(rate) for rate in rates if rate.startswith(incomplete)]
 
 
-def _complete_port(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
+def complete_port(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
+    """Offer what can be opened."""
     del context, parameter
     return [found.port for found in all_ports() if found.port.startswith(typed)]
 
@@ -80,21 +81,26 @@ port_option = click.option(
     "-p",
     envvar="VOXDISPLAY_PORT",
     metavar="PORT",
-    shell_complete=_complete_port,
+    shell_complete=complete_port,
     help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
     "a pyserial URL. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
 )
 
 
-baud_option = click.option(
-    "--baud",
-    type=BaudType(),
-    default=str(DEFAULT_BAUD),
-    metavar="RATE",
-    show_default=True,
-    help="Bits per second of a serial line; auto: the fastest at which the display answers, which "
-    "takes some seconds to find.",
-)
+_RATE = BaudType()
+
+
+def baud_option(default: Baud | None = DEFAULT_BAUD, otherwise: str = "") -> Callable[[_C], _C]:
+    """Give ``--baud``, with its default, or what is done without it."""
+    return click.option(
+        "--baud",
+        type=_RATE,
+        default=None if default is None else str(default),
+        metavar="RATE",
+        show_default=otherwise or True,
+        help="Bits per second of a serial line; auto: the fastest at which the display answers, "
+        "which takes some seconds to find.",
+    )
 
 
 def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
@@ -112,7 +118,7 @@ def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
 
 def port_options(function: _C) -> _C:
     """Add ``--port``, ``--baud`` and ``--timeout``."""
-    for option in (timeout_option(), baud_option, port_option):
+    for option in (timeout_option(), baud_option(), port_option):
         function = option(function)
     return function
 

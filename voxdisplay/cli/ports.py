@@ -41,7 +41,7 @@ _SLACK_S = 2.0
     "not know.",
 )
 @timeout_option(3.0)
-@baud_option
+@baud_option()
 @json_option
 def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
     """List what can be opened: serial ports and displays on USB.

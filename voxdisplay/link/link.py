@@ -16,6 +16,7 @@ from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, S
 from voxdisplay.link.frames import Frames, OnDisplay
 from voxdisplay.link.greeting import Greeting, no_answer
 from voxdisplay.link.info import check_info
+from voxdisplay.link.loss import suited
 from voxdisplay.link.reads import Reads
 from voxdisplay.link.sender import Sender
 from voxdisplay.link.silence import Silence
@@ -25,7 +26,6 @@ from voxdisplay.wire.stream import PacketStream
 
 MOST_LATE_S = 0.25  # a caller that comes back later than this was away
 MOST_RESTARTS = 8  # without a frame shown
-_PACKETS_IN_BUFFER = 4  # so many must fit the device's buffer for the pipe to stay full
 
 
 class Link:
@@ -103,9 +103,8 @@ class Link:
         """
         if self.info is None:
             return spec.LIMIT_MIN_PAYLOAD
-        room = (self.info.rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER
-        wanted = min(self._sender.loss.best_payload, room - packets.wire_size(spec.LIMIT_OVERHEAD))
-        return min(max(wanted, spec.LIMIT_MIN_PAYLOAD), self.info.max_payload)
+        best = self._sender.loss.best_payload
+        return suited(best, self.info.max_payload, self.info.rx_buffer)
 
     @property
     def on_display(self) -> OnDisplay:

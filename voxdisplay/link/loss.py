@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from voxdisplay.wire import spec
+from voxdisplay.wire.packet import wire_size
 
 # Header and check value, one code byte of COBS and the 00 (protocol.md, sections 3 and 4).
 OVERHEAD_BYTES = spec.LIMIT_OVERHEAD + 2
@@ -21,7 +22,14 @@ _WEIGHT_BYTES = 1 << 16
 SHORTEST_PAYLOAD = 128
 # What is older than this counts half: lines get better and worse.
 _MEMORY_BYTES = 1 << 20
+_PACKETS_IN_BUFFER = 4  # so many must fit the device's buffer for the pipe to stay full
 _MODULUS = 1 << 16
+
+
+def suited(payload_bytes: int, max_payload: int, rx_buffer: int) -> int:
+    """Give what comes closest to a length of payloads and suits a device with such an INFO."""
+    room = (rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER - wire_size(spec.LIMIT_OVERHEAD)
+    return min(max(min(payload_bytes, room), spec.LIMIT_MIN_PAYLOAD), max_payload)
 
 
 class Loss:
