@@ -40,6 +40,7 @@ FEATURES = ("line", "box", "dots", "oct", "diff")
 MAX_PAYLOAD, RX_BUFFER = 4096, 1 << 16
 _HEARD = struct.Struct("<QQd")
 _CHUNK = 1 << 16
+_FRAMES = 2  # at least
 
 
 class Pipe:
@@ -218,7 +219,10 @@ class Streamed:
 def stream(
     frames: list[Frame], bytes_per_s: float, seconds: float, *, keep: bool = False
 ) -> Streamed:
-    """Present frames by turns, as fast as it goes, for so long behind the first second."""
+    """Present frames by turns, as fast as it goes, for so long behind the first second.
+
+    The first frames do not count: nobody knew the line.
+    """
     with reader(frames[0], bytes_per_s) as other:
         if keep:
             other.pipe.written = []
@@ -226,8 +230,10 @@ def stream(
             turn = 0
 
             def until(end_s: float) -> tuple[stream_reader.Heard, float]:
+                """Stream so long, and for some frames."""
                 nonlocal turn
-                while time.perf_counter() < end_s:
+                enough = other.heard().frames + _FRAMES
+                while time.perf_counter() < end_s or other.heard().frames < enough:
                     display.present(frames[turn % len(frames)], wait=False)
                     turn += 1
                 return other.heard(), time.process_time()
