@@ -10,7 +10,7 @@ from voxdisplay.wire import spec
 
 # What sets the value of a colour apart from that of a pixel.
 _COLOR = 0x1000000
-_BLOCK = 1 << 14  # voxels at once: what is computed of them stays in a core's cache
+_BLOCK = 1 << 15  # voxels at once: what is computed of them stays in a core's cache
 
 
 def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
@@ -49,24 +49,26 @@ def page_digest(page: Pixels, format_: PixelFormat) -> int:
     found = 0
     for low in range(0, len(page), _BLOCK):
         pixels = page[low : low + _BLOCK]
-        on = np.flatnonzero(lit(pixels))
-        if len(on):
-            pixels = pixels if len(on) == len(pixels) else pixels[on]
-            found += _of_block((low + on).astype(np.uint32), format_.values(pixels))
+        on = lit(pixels)
+        index = np.arange(low, low + len(on), dtype=np.uint32)
+        if not on.all():
+            index, pixels = index[on], pixels[on]
+        found += _of_block(index, format_.values(pixels))
     return found & 0xFFFFFFFF
 
 
 def _of_block(index: Values, values: NDArray[np.integer]) -> int:
-    """Give the sum of what voxels add."""
-    value = values.astype(np.uint32)
+    """Give the sum of what lit voxels add, modulo 2**32."""
     h = index * np.uint32(spec.DIGEST_MUL_INDEX)
-    h += value * np.uint32(spec.DIGEST_MUL_VALUE)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_1)
+    part = values.astype(np.uint32)
+    part *= np.uint32(spec.DIGEST_MUL_VALUE)
+    h += part
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_1), out=part)
     h *= np.uint32(spec.DIGEST_MUL_1)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_2)
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_2), out=part)
     h *= np.uint32(spec.DIGEST_MUL_2)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_3)
-    return int(h.sum(dtype=np.uint64))
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_3), out=part)
+    return int(h.sum(dtype=np.uint32))
 
 
 def palette_digest(voxels: int, entries: NDArray[np.integer], colors: NDArray[np.integer]) -> int:
