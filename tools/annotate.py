@@ -22,7 +22,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from annotate_rules import Monitor, Note
+from annotate_ops import Note
+from annotate_rules import Monitor
 
 from voxdisplay.conformance import packets
 from voxdisplay.transport.capture import VERSION

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from annotate_ops import Note, Reader, op_name
+
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.decoder import Decoder, Refused
 from voxdisplay.conformance.page import Page
@@ -17,97 +19,8 @@ from voxdisplay.conformance.said import Said
 from voxdisplay.wire import spec
 
 HOST, DEVICE = "host", "device"
-_OPS = {
-    spec.OP_END: "END",
-    spec.OP_PEN: "PEN",
-    spec.OP_MOVE: "MOVE",
-    spec.OP_LINE: "LINE",
-    spec.OP_BOX: "BOX",
-    spec.OP_DOTS: "DOTS",
-    spec.OP_COLORS: "COLORS",
-    spec.OP_ARC: "ARC",
-    spec.OP_STEP: "STEP",
-    spec.OP_FROM: "FROM",
-    spec.OP_OCT: "OCT",
-    spec.OP_SKIP: "SKIP",
-    spec.OP_RUN: "RUN",
-    spec.OP_LIT: "LIT",
-    spec.OP_DIFF: "DIFF",
-}
 _FROM_HOST = {spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ}
 _PAGE_OPS = {spec.OP_END, spec.OP_PEN, spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT}
-
-
-@dataclass(frozen=True)
-class Note:
-    """Something to say of a packet; with a section of protocol.md, if it breaks that."""
-
-    text: str
-    section: str = ""
-
-
-def op_name(op: int) -> str:
-    """Give the name of an op byte."""
-    return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
-
-
-class _Reader(Decoder):
-    """The plain decoder, which notes each op as it draws."""
-
-    def __init__(self, said: Said, page: Page) -> None:
-        super().__init__(said, page)
-        self.notes: list[Note] = []
-        self.written: dict[int, int] = {}
-        self.used: set[int] = set()
-        self._drawn = 0
-
-    def _op(self, op: int) -> None:
-        at, pen, self._drawn = self._op_at, self.pen, 0
-        super()._op(op)
-        self.used.add(op if op in _OPS else op & 0xE0)
-        self.notes.append(Note(f"{at + packets.HEADER_BYTES:>5}  {self._said_of(op, at, pen)}"))
-
-    def _said_of(self, op: int, at: int, pen: int) -> str:
-        operands = self._payload[at + 1 : self._at]
-        words = [f"{op_name(op):6}"]
-        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op != spec.OP_ARC:
-            main, signs = self.axes_of(op & 0x1F)
-            words.append("".join("-+"[sign > 0] + "xyz"[axis] for axis, sign in enumerate(signs)))
-            words.append(f"by {'xyz'[main]},")
-        elif op & 0xE0 == spec.OP_OCT:
-            words.append(f"side {1 << (op & 0x1F)},")
-        if op in {spec.OP_PEN, spec.OP_COLORS}:
-            words.append(operands[:16].hex(" ") + (" ..." if len(operands) > 16 else ""))
-        if self._drawn:
-            words.append(f"{self._drawn} voxels,")
-        if self.pen != pen and op != spec.OP_PEN:
-            words.append(f"pen {self.pen:X}h,")
-        if op != spec.OP_END:
-            words.append(f"cursor {self._cursor_place()}")
-        return " ".join(words)
-
-    def _cursor_place(self) -> str:
-        if self.cursor >= self.said.voxels:
-            return "behind the end"
-        return "({}, {}, {})".format(*self.said.place(self.cursor))
-
-    def count(self, index: int, value: int) -> None:
-        """Note a voxel that is written."""
-        self.written[index] = value
-        self._drawn += 1
-
-
-class _Watched(Page):
-    """A page that tells its reader what is written."""
-
-    def __init__(self, page: Page) -> None:
-        super().__init__(page.pixels, page.palette)
-        self.reader: _Reader | None = None
-
-    def write(self, index: int, value: int) -> None:
-        super().write(index, value)
-        if self.reader:
-            self.reader.count(index, value)
 
 
 @dataclass
@@ -292,8 +205,7 @@ class Monitor:
 
     def _ops(self, payload: bytes) -> dict[int, int]:
         """Note what ops do; give what they write."""
-        page = _Watched(Page())
-        page.reader = reader = _Reader(self._said, page)
+        reader = Reader(self._said)
         try:
             reader.draw(payload)
         except Refused as refused:
@@ -425,8 +337,7 @@ class Monitor:
 
     def _pixels(self, answer: packets.Answer) -> list[int] | None:
         """Read the ops of a PAGE: they draw from index 0 of a page that is long enough."""
-        page = _Watched(Page())
-        page.reader = reader = _Reader(self._said, page)
+        reader = Reader(self._said)
         try:
             reader.draw(answer.tail)
         except Refused as refused:
@@ -437,7 +348,7 @@ class Monitor:
         if reader.cursor != answer.count:
             self._note(f"its ops cover {reader.cursor} voxels, not {answer.count}", "10")
             return None
-        return [page.pixels.get(index, 0) for index in range(answer.count)]
+        return [reader.page.pixels.get(index, 0) for index in range(answer.count)]
 
     def _error(self, session: _Session, error: packets.Answer) -> None:
         if error.code == spec.CODE_NO_SESSION:

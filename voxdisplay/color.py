@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import re
 import reprlib
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from voxdisplay.errors import did_you_mean
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
+Color: TypeAlias = str | Sequence[str] | NDArray[np.uint8]
 
 
 def parse_color(text: str) -> tuple[int, int, int]:
@@ -59,6 +58,41 @@ def parse_colors(spec: str | Sequence[str]) -> NDArray[np.uint8]:
     if not names:
         raise ValueError("a list of colours needs at least one")
     return np.array([parse_color(name) for name in names], dtype=np.uint8)
+
+
+def as_colors(color: Color) -> NDArray[np.uint8]:
+    """Give colours, however they were given: (k, 3).
+
+    Raises
+    ------
+    ValueError
+        If they are none.
+
+    """
+    if isinstance(color, np.ndarray):
+        if (
+            color.ndim != 2
+            or color.shape[1] != 3
+            or len(color) == 0
+            or color.dtype.kind not in "iu"
+            or not 0 <= color.min() <= color.max() <= 255
+        ):
+            raise ValueError(
+                f"colours are a (k, 3) array of 0 to 255, k >= 1; this is {color.shape} of "
+                f"{color.dtype}"
+            )
+        return color.astype(np.uint8)
+    return parse_colors(color)
+
+
+def spread(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
+    """Spread k colours evenly along ``count`` voxels, blending between them: (count, 3)."""
+    if len(colors) == 1:
+        return np.broadcast_to(colors, (count, 3))
+    place = np.linspace(0, len(colors) - 1, count)
+    stops = np.arange(len(colors))
+    blended = [np.interp(place, stops, colors[:, channel]) for channel in range(3)]
+    return np.floor(np.stack(blended, axis=1) + 0.5).astype(np.uint8)
 
 
 # The named colours of CSS Color Module Level 4, section 6.1.

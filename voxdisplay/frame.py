@@ -8,16 +8,15 @@ pixels, and says what was lost in that. It knows nothing of packets on their way
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelize as voxelizing
-from voxdisplay.color import parse_colors
+from voxdisplay.color import Color, as_colors, spread
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
 from voxdisplay.grid import Grid
@@ -29,8 +28,6 @@ from voxdisplay.wire.colors import color_pieces
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
 from voxdisplay.wire.ops import Coding
 from voxdisplay.wire.pieces import Pieces
-
-Color: TypeAlias = str | Sequence[str] | NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +136,8 @@ class Frame:
         if isinstance(what, Curve):
             what = voxelizing.voxelize(what)
         if isinstance(what, voxelizing.Sequence):
-            return self._add(what.voxels, _as_colors(color), _corners(what))
-        return self._add(_as_voxels(what), _as_colors(color), _NONE)
+            return self._add(what.voxels, as_colors(color), _corners(what))
+        return self._add(_as_voxels(what), as_colors(color), _NONE)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves, in order: the same as `draw` on each, but found together."""
@@ -153,7 +150,7 @@ class Frame:
     ) -> Drawing:
         self._change()
         # One colour is looked up once.
-        rgb = colors if len(colors) == 1 else _spread(colors, len(voxels))
+        rgb = colors if len(colors) == 1 else spread(colors, len(voxels))
         found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
         exact = np.array_equal(self._colors_of(found), rgb)
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
@@ -392,30 +389,3 @@ def _as_voxels(what: ArrayLike) -> NDArray[np.integer]:
             f"this is {voxels.shape} of {voxels.dtype}"
         )
     return voxels.astype(np.int64)
-
-
-def _as_colors(color: Color) -> NDArray[np.uint8]:
-    if isinstance(color, np.ndarray):
-        if (
-            color.ndim != 2
-            or color.shape[1] != 3
-            or len(color) == 0
-            or color.dtype.kind not in "iu"
-            or not 0 <= color.min() <= color.max() <= 255
-        ):
-            raise ValueError(
-                f"colours are a (k, 3) array of 0 to 255, k >= 1; this is {color.shape} of "
-                f"{color.dtype}"
-            )
-        return color.astype(np.uint8)
-    return parse_colors(color)
-
-
-def _spread(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
-    """Spread k colours evenly along ``count`` voxels, blending between them: (count, 3)."""
-    if len(colors) == 1:
-        return np.broadcast_to(colors, (count, 3))
-    place = np.linspace(0, len(colors) - 1, count)
-    stops = np.arange(len(colors))
-    blended = [np.interp(place, stops, colors[:, channel]) for channel in range(3)]
-    return np.floor(np.stack(blended, axis=1) + 0.5).astype(np.uint8)

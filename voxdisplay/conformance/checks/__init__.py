@@ -15,6 +15,7 @@ from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is t
     window,
     credit,
     reading,
+    outside,
     refusals,
     malformed,
     answers,

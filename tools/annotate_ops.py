@@ -1,0 +1,104 @@
+"""What each op of a payload does, in a line: told by the plain decoder while it draws.
+
+Knows no packet but by its payload, and no rule but those of section 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from voxdisplay.conformance import packets
+from voxdisplay.conformance.decoder import Decoder
+from voxdisplay.conformance.page import Page
+from voxdisplay.conformance.said import Said
+from voxdisplay.wire import spec
+
+_OPS = {
+    spec.OP_END: "END",
+    spec.OP_PEN: "PEN",
+    spec.OP_MOVE: "MOVE",
+    spec.OP_LINE: "LINE",
+    spec.OP_BOX: "BOX",
+    spec.OP_DOTS: "DOTS",
+    spec.OP_COLORS: "COLORS",
+    spec.OP_ARC: "ARC",
+    spec.OP_STEP: "STEP",
+    spec.OP_FROM: "FROM",
+    spec.OP_OCT: "OCT",
+    spec.OP_SKIP: "SKIP",
+    spec.OP_RUN: "RUN",
+    spec.OP_LIT: "LIT",
+    spec.OP_DIFF: "DIFF",
+}
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something to say of a packet; with a section of protocol.md, if it breaks that."""
+
+    text: str
+    section: str = ""
+
+
+def op_name(op: int) -> str:
+    """Give the name of an op byte."""
+    return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
+
+
+class Reader(Decoder):
+    """The plain decoder, which notes each op as it draws."""
+
+    def __init__(self, said: Said) -> None:
+        super().__init__(said, _Watched(self))
+        self.notes: list[Note] = []
+        self.written: dict[int, int] = {}
+        self.used: set[int] = set()
+        self._drawn = 0
+
+    def _op(self, op: int) -> None:
+        at, pen, self._drawn = self._op_at, self.pen, 0
+        super()._op(op)
+        self.used.add(op if op in _OPS else op & 0xE0)
+        self.notes.append(Note(f"{at + packets.HEADER_BYTES:>5}  {self._said_of(op, at, pen)}"))
+
+    def _said_of(self, op: int, at: int, pen: int) -> str:
+        operands = self._payload[at + 1 : self._at]
+        words = [f"{op_name(op):6}"]
+        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op != spec.OP_ARC:
+            main, signs = self.axes_of(op & 0x1F)
+            words.append("".join("-+"[sign > 0] + "xyz"[axis] for axis, sign in enumerate(signs)))
+            words.append(f"by {'xyz'[main]},")
+        elif op & 0xE0 == spec.OP_OCT:
+            words.append(f"side {1 << (op & 0x1F)},")
+        if op in {spec.OP_PEN, spec.OP_COLORS}:
+            words.append(operands[:16].hex(" ") + (" ..." if len(operands) > 16 else ""))
+        if self._drawn:
+            words.append(f"{self._drawn} voxels,")
+        if self.pen != pen and op != spec.OP_PEN:
+            words.append(f"pen {self.pen:X}h,")
+        if op != spec.OP_END:
+            words.append(f"cursor {self._cursor_place()}")
+        return " ".join(words)
+
+    def _cursor_place(self) -> str:
+        if self.cursor >= self.said.voxels:
+            return "behind the end"
+        return "({}, {}, {})".format(*self.said.place(self.cursor))
+
+    def count(self, index: int, value: int) -> None:
+        """Note a voxel that is written."""
+        self.written[index] = value
+        self._drawn += 1
+
+
+class _Watched(Page):
+    """A page that tells its reader what is written."""
+
+    def __init__(self, reader: Reader) -> None:
+        super().__init__()
+        self._reader = reader
+
+    def write(self, index: int, value: int) -> None:
+        """See `Page.write`."""
+        super().write(index, value)
+        self._reader.count(index, value)
