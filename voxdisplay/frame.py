@@ -248,7 +248,7 @@ class Frame:
         return index[values != 0], values[values != 0]
 
     def _values_at(self, index: NDArray[np.int64]) -> Values:
-        return self.format.values(self._raster[index])
+        return self.format.values(self._raster.take(index, axis=0))
 
     def digest(self) -> int:
         """Give the digest that a display which shows this frame must report."""
