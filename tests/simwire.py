@@ -11,6 +11,9 @@ from firmware_sim.device import Device
 DATA, HELLO, STATUS, READ, ACK, INFO, PAGE, ERROR = 1, 3, 4, 5, 8, 9, 10, 11
 CLEAR, COMMIT = 1, 4
 SHOWN, PENDING, ASKED = 1, 2, 4
+NO_SESSION, TYPE, LENGTH, FIELD, SEQUENCE, FRAME, OP = range(1, 8)
+PADDING, OUTSIDE, OVERRUN = 10, 12, 13
+DOT = b"\xa0"  # RUN 1: lights voxel 0 with the full pixel
 SESSION = 0x1234
 BOOT = 0xB007
 
@@ -114,3 +117,18 @@ class Rig:
     @property
     def back(self) -> bytes:
         return bytes(self.device.memory.back.pixels)
+
+
+def block(rig: Rig) -> int:
+    """Let a packet wait; return how much of the credit it takes."""
+    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
+    wire = data(1, 1, DOT)
+    assert rig.say(wire) == []
+    return len(wire)
+
+
+def filling(seq: int, size: int) -> bytes:
+    """Return a DATA packet of so many bytes on the wire."""
+    wire = data(seq, 1, bytes(size - 9))  # END and what pads it
+    assert len(wire) == size
+    return wire

@@ -6,6 +6,7 @@ from broken_devices.mutant import Device, Session, around, mutant, on_hello
 from firmware_sim import device, spec
 from firmware_sim.refusal import Refusal
 from firmware_sim.session import State, Verdict
+from firmware_sim.wire import Wire
 
 
 def _ack(patch, change):
@@ -227,6 +228,35 @@ def credit_of_what_is_free(patch):
         return flags, seq, frame
 
     _ack(patch, change)
+
+
+def _idle(patch, lapse):
+    """Do something to a device when bytes come after a second without any."""
+
+    def receive(old, self, data):
+        now = self._clock()
+        if now - getattr(self, "heard_s", now) > 1:
+            lapse(self.device)
+        self.heard_s = now
+        old(self, data)
+
+    around(patch, Wire, "receive", receive)
+
+
+@mutant("9.2/does-not-lapse", likely="must not count the time")
+def credit_lapses(patch):
+    _idle(patch, lambda self: setattr(self, "lapsed", 20))
+
+    def change(self, flags, seq, frame, values):
+        values[4] -= getattr(self, "lapsed", 0)
+        return flags, seq, frame
+
+    _ack(patch, change)
+
+
+@mutant("9.2/does-not-lapse", likely="must not count the time")
+def session_lapses(patch):
+    _idle(patch, lambda self: setattr(self, "session", None))
 
 
 @mutant("9/status-length", "11/order-of-packet")

@@ -5,16 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 import struct
 import threading
 import time
 import urllib.error
+import urllib.parse
 import urllib.request
+from collections import Counter
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -150,8 +154,6 @@ def test_a_tap_brings_the_palette():
 
 def test_what_is_no_tap_is_refused(tmp_path):
     del tmp_path
-    import socket  # noqa: PLC0415
-
     with socket.create_server(("127.0.0.1", 0)) as listener:
         source = TapSource("127.0.0.1", listener.getsockname()[1], "")
         peer, _ = listener.accept()
@@ -342,6 +344,45 @@ def test_a_slow_browser_holds_up_nobody():
                 assert read_back(quick.recv(WAIT))[0]["number"] == number
                 quick.send("shown")
                 source.push()
+
+
+def open_and_never_read(url):
+    """Become a browser that looks at nothing it is sent."""
+    place = urllib.parse.urlsplit(url)
+    browser = socket.create_connection((place.hostname, place.port), WAIT)
+    browser.sendall(
+        f"GET /live HTTP/1.1\r\nHost: {place.netloc}\r\nConnection: Upgrade\r\n"
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    answer = b""
+    while not answer.endswith(b"\r\n\r\n"):
+        answer += browser.recv(1)
+    assert answer.startswith(b"HTTP/1.1 101 ")
+    return browser
+
+
+def test_two_hundred_that_never_read_are_sent_two_pictures_each(monkeypatch):
+    sent, send = Counter(), ServerConnection.send
+
+    def counted(browser, message):
+        sent[browser] += 1
+        return send(browser, message)
+
+    monkeypatch.setattr(ServerConnection, "send", counted)
+    source = Pushed()
+    with served(source) as url, contextlib.ExitStack() as stack:
+        for _ in range(200):
+            stack.enter_context(open_and_never_read(url))
+        quick = stack.enter_context(connect(url.replace("http", "ws") + "live"))
+        for number in range(1, 20):
+            assert read_back(quick.recv(WAIT))[0]["number"] == number
+            quick.send("shown")
+            source.push()
+        quick.recv(WAIT)
+        counts = sorted(sent.values())
+    assert len(counts) == 201
+    assert counts[-2:] == [2, 20]
 
 
 def test_who_says_more_than_it_has_shown_is_sent_away():

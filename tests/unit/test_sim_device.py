@@ -1,4 +1,4 @@
-"""What the device answers: sections 4 to 6 and 9 to 13."""
+"""What the device answers: sections 4, 5 and 10 to 13."""
 
 import random
 import struct
@@ -14,18 +14,29 @@ from simwire import (
     CLEAR,
     COMMIT,
     DATA,
+    DOT,
     ERROR,
+    FIELD,
+    FRAME,
     HELLO,
     INFO,
+    LENGTH,
+    NO_SESSION,
+    OP,
+    OUTSIDE,
+    OVERRUN,
     PAGE,
-    PENDING,
     READ,
+    SEQUENCE,
     SESSION,
     SHOWN,
     STATUS,
+    TYPE,
     Rig,
     answers,
+    block,
     data,
+    filling,
     hello,
     packet,
     read,
@@ -34,13 +45,8 @@ from simwire import (
 
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
-from firmware_sim.device import TX_BUFFER, Device
+from firmware_sim.device import Device
 from firmware_sim.memory import FORMATS
-
-DOT = b"\xa0"  # RUN 1: lights voxel 0 with the full pixel
-NO_SESSION, TYPE, LENGTH, FIELD, SEQUENCE, FRAME, OP = range(1, 8)
-PADDING, OUTSIDE, OVERRUN = 10, 12, 13
-
 
 # HELLO and INFO, section 5
 
@@ -218,400 +224,6 @@ def test_damage_is_counted_and_answered_in_a_session() -> None:
     assert rig.ask(bad).damaged == 0
 
 
-# ACK and the window: section 9
-
-
-def test_an_ack_says_everything() -> None:
-    rig = Rig(rx_buffer=4096)
-    rig.show(0, 0, DOT)
-    rig.ask(data(3, 1, DOT))
-    ack = rig.ask(data(5, 1, DOT))
-    assert (ack.kind, ack.flags, ack.seq, ack.frame, ack.last) == (ACK, SHOWN, 1, 0, 5)
-    assert (ack.session, ack.boot, ack.received, ack.credit) == (SESSION, BOOT, 0b1010, 4096)
-    assert ack.digest == rig.device.memory.front.digest
-    assert len(ack.payload) == 19
-
-
-def test_a_status_asks_for_an_ack_and_its_tag_is_not_kept() -> None:
-    """ASKED answers a STATUS, whose tag is in `last`; else the last DATA, 255 before the first."""
-    rig = Rig()
-    ack = rig.ask(status(99))
-    assert (ack.flags, ack.last) == (ASKED, 99)
-    assert rig.ask(b"\x02" * 8 + b"\0").last == 255
-    rig.ask(data(0, 0))
-    rig.ask(status(98))
-    assert rig.ask(b"\x02" * 8 + b"\0").last == 0
-
-
-def test_packets_may_come_in_any_order() -> None:
-    rig = Rig()
-    order = [4, 1, 0, 31, 2, 3]
-    nexts = [0, 0, 2, 2, 3, 5]
-    for seq, following in zip(order, nexts, strict=True):
-        place = bytes((0x80 | seq - 1,)) if seq else b""
-        ack = rig.ask(data(seq, 0, place + DOT))
-        assert (ack.seq, ack.last) == (following, seq)
-    assert ack.received == 1 << 31 - 5 - 1
-    assert [i for i, value in enumerate(rig.back[::3]) if value] == [0, 1, 2, 3, 4, 31]
-
-
-def test_a_duplicate_is_answered_and_not_applied() -> None:
-    """The device MUST NOT apply it again, and answers with ACK."""
-    rig = Rig()
-    for seq in (0, 2):
-        rig.ask(data(seq, 0))
-    for seq in (0, 2, 255, 225):
-        ack = rig.ask(data(seq, 77, b"\xff", CLEAR))
-        assert (ack.kind, ack.seq, ack.last, ack.received) == (ACK, 1, seq, 1)
-
-
-@pytest.mark.parametrize("seq", [32, 100, 223])
-def test_what_is_outside_the_window_is_refused(seq: int) -> None:
-    assert Rig().ask(data(seq, 0)).error == (SEQUENCE, 1)
-
-
-@pytest.mark.parametrize("seq", [224, 255])
-def test_what_is_behind_the_window_is_a_duplicate(seq: int) -> None:
-    assert Rig().ask(data(seq, 0)).last == seq
-
-
-def test_numbers_go_round() -> None:
-    rig = Rig()
-    for number in range(600):
-        ack = rig.ask(data(number % 256, 0))
-        assert ack.seq == (number + 1) % 256
-    ack = rig.ask(data((600 + 31) % 256, 0))
-    assert ack.received == 1 << 30
-
-
-def test_acks_may_be_left_out_while_more_can_be_taken() -> None:
-    """MAY leave out this ACK, but not for more than 8 packets in a row."""
-    rig = Rig(silent=8)
-    acks = rig.say(*(data(seq, 0) for seq in range(20)))
-    assert [ack.last for ack in acks] == [8, 17, 19]
-    assert rig.ask(data(20, 0)).last == 20
-    asked, done = rig.say(data(21, 0), status(7), data(22, 0))
-    assert (asked.flags, asked.last, asked.seq) == (ASKED, 7, 22)
-    assert done.last == 22
-    assert rig.ask(data(23, 0) + hello(5)).kind == INFO
-
-
-# Frames: section 6
-
-
-def test_a_frame_starts_dark_or_as_a_copy() -> None:
-    """The back page becomes dark (CLEAR) or a copy of the front page."""
-    rig = Rig(pixel_format="index8")
-    assert rig.show(0, 0, DOT).frame == 0
-    rig.show(1, 1, b"\x80\xa0", flags=0)
-    assert rig.front[:3] == b"\xff\xff\0"
-    rig.show(2, 2, b"\x81\xa0")
-    assert rig.front[:3] == b"\0\0\xff"
-    rig.show(3, 3, b"", flags=0)
-    assert rig.front[:3] == b"\0\0\xff"
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_a_swap_happens_at_the_tick_and_is_told(name: str) -> None:
-    """At the next refresh tick the device MUST exchange the pages and send an ACK."""
-    rig = Rig(pixel_format=name)
-    assert rig.tick() == []
-    ack = rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert (ack.flags, ack.digest) == (PENDING, 0)
-    assert not any(rig.front)
-    (ack,) = rig.tick()
-    assert (ack.flags, ack.frame, ack.last, ack.seq) == (SHOWN, 0, 0, 1)
-    assert ack.digest == rig.device.memory.front.digest != 0
-    assert rig.front[: FORMATS[name].size] == FORMATS[name].full
-    assert rig.tick() == []
-
-
-def test_without_ticks_a_swap_happens_at_once() -> None:
-    """If `refresh` is 0, that is at once, and one ACK serves packet and swap."""
-    rig = Rig(refresh=0)
-    ack = rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert (ack.flags, ack.frame) == (SHOWN, 0)
-    assert rig.tick() == []
-    ack = rig.ask(data(1, 1, b"", COMMIT))
-    assert (ack.flags, ack.frame) == (SHOWN, 1)
-
-
-def test_a_frame_is_whole_when_all_before_its_commit_is_there() -> None:
-    """A frame that is not whole MUST NOT be shown."""
-    rig = Rig()
-    for seq, flags in ((2, CLEAR | COMMIT), (0, CLEAR)):
-        assert not rig.ask(data(seq, 0, DOT, flags)).flags & PENDING
-        assert rig.tick() == []
-    assert rig.ask(data(1, 0, DOT)).flags == PENDING
-    assert [ack.frame for ack in rig.tick()] == [0]
-
-
-def test_a_frame_may_begin_with_any_of_its_packets() -> None:
-    """Packets with lower sequence numbers that are missing can only be its own."""
-    rig = Rig()
-    rig.show(0, 0, DOT)
-    assert rig.ask(data(3, 1, b"\x83\xa0")).received == 0b10
-    rig.ask(data(2, 1, b"\x82\xa0", CLEAR | COMMIT))
-    assert rig.ask(data(1, 1, b"\x81\xa0")).flags & PENDING
-    assert [i for i, value in enumerate(rig.back[::3]) if value] == [2, 3, 4]
-
-
-def test_the_next_frame_is_dropped_while_packets_are_missing() -> None:
-    """MUST drop this packet without marking it as received, and answer with ACK."""
-    rig = Rig()
-    rig.ask(data(0, 0))
-    for frame in (1, 2, 200):
-        ack = rig.ask(data(3, frame, b"\xff"))
-        assert (ack.kind, ack.seq, ack.received, ack.last) == (ACK, 1, 0, 3)
-
-
-def test_after_a_shown_frame_a_later_one_is_dropped_while_packets_are_missing() -> None:
-    rig = Rig()
-    rig.show(0, 0, DOT)
-    ack = rig.ask(data(2, 2, DOT, CLEAR | COMMIT))
-    assert (ack.kind, ack.flags, ack.received) == (ACK, SHOWN, 0)
-    rig.ask(data(1, 1, DOT, CLEAR | COMMIT))
-    rig.tick()
-    assert rig.show(2, 2, DOT).frame == 2
-
-
-def test_a_frame_may_be_given_up() -> None:
-    """If f is not whole and none is missing: f is dropped, and f + 1 begins."""
-    rig = Rig(pixel_format="index8")
-    rig.ask(data(0, 0, DOT))
-    rig.ask(data(1, 1, b"\x80\xa0"))
-    assert rig.back[:2] == b"\0\xff"
-    ack = rig.show(2, 2, b"\x81\xa0")
-    assert (ack.frame, rig.front[:3]) == (2, b"\0\0\xff")
-
-
-@pytest.mark.parametrize("frame", [0, 1, 3, 255])
-def test_another_frame_is_refused_if_nothing_is_missing(frame: int) -> None:
-    """Otherwise it is refused (FRAME)."""
-    rig = Rig()
-    rig.show(0, 0, DOT)
-    rig.ask(data(1, 1))
-    if frame == 1:
-        rig = Rig()
-    assert rig.ask(data(2 if frame != 1 else 0, frame)).error == (FRAME, 2)
-
-
-@pytest.mark.parametrize("seq", [0, 3])
-def test_frame_255_is_not_a_first_frame(seq: int) -> None:
-    assert Rig().ask(data(seq, 255)).error == (FRAME, 2)
-
-
-def test_a_frame_that_is_whole_takes_no_more() -> None:
-    """Refused (FRAME) if f is pending or on display."""
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert rig.ask(data(1, 0)).error == (FRAME, 2)
-    assert rig.tick() == []  # the session has ended, and what waited is dropped
-    rig = Rig()
-    rig.show(0, 0, DOT)
-    assert rig.ask(data(2, 0)).error == (FRAME, 2)
-
-
-def test_a_frame_ends_at_its_commit() -> None:
-    """Refused if a COMMIT of f with a lower sequence number has been received."""
-    rig = Rig()
-    rig.ask(data(2, 0, b"", CLEAR | COMMIT))
-    rig.ask(data(1, 0))
-    assert rig.ask(data(3, 0)).error == (FRAME, 2)
-
-
-def test_the_lowest_commit_counts() -> None:
-    rig = Rig()
-    rig.ask(data(3, 0, b"", CLEAR | COMMIT))
-    rig.ask(data(1, 0, b"", CLEAR | COMMIT))
-    assert rig.ask(data(0, 0)).flags & PENDING
-
-
-def test_the_later_commit_does_not_count() -> None:
-    rig = Rig()
-    rig.ask(data(2, 0, b"", CLEAR | COMMIT))
-    rig.ask(data(1, 0, b"", CLEAR | COMMIT))
-    rig.ask(data(0, 0, b"", CLEAR | COMMIT))
-    assert [ack.seq for ack in rig.tick()] == [3]
-
-
-def test_all_packets_of_a_frame_have_the_same_clear_flag() -> None:
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, CLEAR))
-    assert rig.ask(data(1, 0, DOT, COMMIT)).error == (FRAME, 0)
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, 0))
-    assert rig.ask(data(1, 0, DOT, CLEAR)).error == (FRAME, 0)
-
-
-def test_frames_go_round() -> None:
-    rig = Rig()
-    for number in range(300):
-        ack = rig.show(number % 256, number % 256, DOT)
-        assert (ack.frame, ack.flags) == (number % 256, SHOWN)
-
-
-# Waiting: section 6, points 6 and 7
-
-
-def test_the_next_frame_waits_for_the_tick_and_all_behind_it() -> None:
-    """MUST NOT take the packet, nor anything that came after it, before the tick."""
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert rig.ask(status(1)).flags == PENDING | ASKED
-    assert rig.ask(data(0, 0, DOT, CLEAR | COMMIT)).flags == PENDING  # a duplicate does not wait
-    assert rig.ask(read(0, 1)).kind == PAGE
-    assert rig.say(data(1, 1, b"\x80\xa0"), status(2), read(0, 3), b"\x02" * 8 + b"\0") == []
-    swap, applied, asked, page, damage = rig.tick()
-    assert (swap.flags, swap.seq, swap.frame) == (SHOWN, 1, 0)
-    assert (applied.last, applied.seq) == (1, 2)
-    assert (asked.flags, asked.last) == (SHOWN | ASKED, 2)
-    assert page.kind == PAGE
-    assert damage.damaged == 1
-
-
-def test_frame_after_frame_waits() -> None:
-    rig = Rig()
-    wire = b"".join(data(n, n, DOT, CLEAR | COMMIT) for n in range(5))
-    (first,) = rig.say(wire)
-    assert first.flags == PENDING
-    for frame in range(4):
-        swap, applied = rig.tick()
-        assert (swap.frame, swap.seq) == (frame, frame + 1)
-        assert (applied.last, applied.flags) == (frame + 1, SHOWN | PENDING)
-    assert [ack.frame for ack in rig.tick()] == [4]
-    assert rig.tick() == []
-
-
-@pytest.mark.parametrize(
-    ("wire", "error"),
-    [
-        (data(1, 2), (FRAME, 2)),
-        (data(100, 1), (SEQUENCE, 1)),
-        (data(1, 1, DOT, 2), (FIELD, 0)),
-        (data(1, 1, b"\xff"), (OP, 3)),
-    ],
-)
-def test_what_will_be_refused_waits_too(wire: bytes, error: tuple[int, int]) -> None:
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert rig.say(wire) == []
-    swap, refused = rig.tick()
-    assert swap.frame == 0
-    assert refused.error == error
-
-
-def test_a_hello_does_not_wait_but_behind_a_packet_that_waits() -> None:
-    rig = Rig()
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert rig.ask(hello(5)).kind == INFO
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    assert rig.say(data(1, 1), hello(6)) == []
-    swap, ack, info = rig.tick()
-    assert (swap.kind, ack.kind, info.session) == (ACK, ACK, 6)
-
-
-# Credit and the receive ring: section 9.2
-
-
-def block(rig: Rig) -> int:
-    """Let a packet wait; return how much of the credit it takes."""
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
-    wire = data(1, 1, DOT)
-    assert rig.say(wire) == []
-    return len(wire)
-
-
-def filling(seq: int, size: int) -> bytes:
-    """Return a DATA packet of so many bytes on the wire."""
-    wire = data(seq, 1, bytes(size - 9))  # END and what pads it
-    assert len(wire) == size
-    return wire
-
-
-def test_the_credit_can_be_used_to_the_last_byte() -> None:
-    """`credit`: bytes that the device has room for behind the packet named by `last`."""
-    rig = Rig(rx_buffer=1200)
-    used = block(rig)
-    last = filling(3, 1200 - used - 600)
-    wire = b"\0\0" + filling(2, 600) + b"\0\0\0" + last + b"\0"  # 00 is outside the credit
-    for k in range(0, len(wire), 7):
-        assert rig.say(wire[k : k + 7]) == []
-    assert rig.say(b"\0\0\0", b"\0") == []
-    assert [ack.last for ack in rig.tick()] == [0, 1, 2, 3]
-
-
-def test_one_byte_more_is_an_overrun() -> None:
-    """OVERRUN is sent once for each time that bytes were lost, with seq and frame 0."""
-    rig = Rig(rx_buffer=1200)
-    used = block(rig)
-    assert rig.say(filling(2, 600), filling(3, 1200 - used - 600)) == []
-    error, ack = rig.say(status(1))
-    assert error.error == (OVERRUN, 0)
-    assert (error.seq, error.frame, error.session) == (0, 0, SESSION)
-    assert (ack.damaged, ack.seq) == (1, 1)
-    assert rig.say(status(2)) == rig.say(b"") == rig.say(status(3)[:4]) == []
-    assert [ack.last for ack in rig.tick()] == [0, 1, 2, 3]
-    # What was cut goes on to the next 00.
-    assert rig.say(status(3)[4:-1]) == []
-    assert [a.last for a in rig.say(b"\0", status(4))] == [4]
-    assert Bench(rig.device).counters().overruns == 1
-
-
-def test_a_packet_that_is_cut_by_an_overrun_is_damaged() -> None:
-    rig = Rig(rx_buffer=1200)
-    block(rig)
-    error, ack = rig.say(filling(2, 600), filling(3, 600), filling(4, 600))
-    assert error.error == (OVERRUN, 0)
-    assert ack.damaged == 1
-    assert [ack.last for ack in rig.tick()] == [0, 1, 2]
-    (ack,) = rig.say(filling(3, 600))  # the loss ended with a 00
-    assert (ack.last, ack.seq, ack.damaged) == (3, 4, 1)
-
-
-def test_bytes_may_be_lost_again_and_again() -> None:
-    rig = Rig(rx_buffer=1200)
-    block(rig)
-    assert rig.say(filling(2, 600), filling(3, 600))[0].error == (OVERRUN, 0)
-    rig.tick()
-    rig.ask(data(3, 1, DOT, CLEAR | COMMIT))
-    assert rig.say(data(4, 2), filling(5, 1100)) == []
-    assert rig.say(filling(6, 600))[0].error == (OVERRUN, 0)
-    assert Bench(rig.device).counters().overruns == 2
-
-
-def test_a_stream_without_end_is_bounded() -> None:
-    rig = Rig(rx_buffer=1200)
-    block(rig)
-    sent = [answer.kind for _ in range(50) for answer in rig.say(b"\x33" * 1000)]
-    assert sent == [ERROR, ACK]
-    assert len(rig.device._ring) <= 1200
-
-
-def test_a_host_that_does_not_read_is_not_read_either() -> None:
-    rig = Rig(rx_buffer=1200)
-    longest = 0
-    for tag in range(4000):
-        rig.device.receive(status(tag % 256))
-        longest = max(longest, len(rig.device._out))
-    assert longest < TX_BUFFER + 100
-    first = answers(rig.device.transmit())
-    assert rig.device.pending is False
-    assert first[-2].error == (OVERRUN, 0)
-    rest = answers(rig.device.transmit())
-    assert [ack.flags for ack in rest] == [ASKED] * (1200 // 9)
-    assert rig.ask(status(5)).last == 5
-
-
-def test_a_clogged_device_that_lost_everything_goes_on() -> None:
-    rig = Rig(rx_buffer=1200)
-    while len(rig.device._out) < TX_BUFFER:
-        rig.device.receive(status(1))
-    rig.device.receive(b"\x33" * 2000)
-    rig.device.transmit()
-    assert [a.last for a in rig.say(b"\0", status(5))] == [5]
-
-
 # READ and PAGE: section 10
 
 
@@ -697,34 +309,6 @@ def test_a_lie_is_kept_or_comes_out() -> None:
     assert rig.ask(status()).boot == BOOT
     rig = Rig(lies=frozenset({"format"}), pixel_format="mono1")
     assert rig.ask(data(0, 0, b"\1\2")).error == (11, 3)
-
-
-# The palette
-
-
-def test_a_palette_belongs_to_its_page() -> None:
-    """Each page has a palette of its own, which is shown with it."""
-    rig = Rig(pixel_format="index8")
-    bench = Bench(rig.device)
-    default = bench.snapshot().palette
-    assert default[:6] == b"\0\0\0\0\0\x55"
-    assert len(default) == 768
-    rig.ask(data(0, 0, b"\6\1\0abc", CLEAR | COMMIT))
-    assert bench.snapshot().palette == default
-    (ack,) = rig.tick()
-    assert bench.snapshot().palette == default[:3] + b"abc" + default[6:]
-    assert bench.snapshot().digest == ack.digest != 0
-    rig.show(1, 1, b"\6\2\0def", flags=0)
-    assert bench.snapshot().palette == default[:3] + b"abcdef" + default[9:]
-    assert rig.show(2, 2, b"").digest == 0
-    assert bench.snapshot().palette == default
-    rig.show(3, 3, b"\6\1\0abc")
-    rig.ask(hello())
-    rig.show(0, 0, b"", flags=0)  # the front page stays as it is, with its palette
-    assert bench.snapshot().palette == default[:3] + b"abc" + default[6:]
-    bench.power_cycle()
-    assert bench.snapshot().palette == default
-    assert Bench(Rig().device).snapshot().palette == b""
 
 
 # The device as a whole

@@ -13,6 +13,7 @@ from simwire import (
     BOOT,
     CLEAR,
     COMMIT,
+    DOT,
     INFO,
     PENDING,
     SHOWN,
@@ -28,7 +29,6 @@ from firmware_sim.fault_kinds import Event
 from firmware_sim.faults import DIRECTIONS, KINDS, Line, Spec, parse_faults
 from firmware_sim.wire import Wire
 
-DOT = b"\xa0"
 NO_SESSION = 1
 BOTH = ("down", "up")
 

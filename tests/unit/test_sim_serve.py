@@ -14,7 +14,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simwire import ACK, CLEAR, COMMIT, INFO, PENDING, SHOWN, Answer, answers, data, hello, status
+from simwire import (
+    ACK,
+    CLEAR,
+    COMMIT,
+    DOT,
+    INFO,
+    PENDING,
+    SHOWN,
+    Answer,
+    answers,
+    data,
+    hello,
+    status,
+)
 
 from firmware_sim import __main__ as program
 from firmware_sim import in_process, serve
@@ -32,7 +45,6 @@ from firmware_sim.serve import (
 )
 from firmware_sim.wire import Wire
 
-DOT = b"\xa0"
 WAIT = 20  # seconds after which a test has failed; none takes so long
 ROOT = Path(__file__).parents[2]
 

@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
-from simwire import CLEAR, COMMIT, data, hello
+from simwire import CLEAR, COMMIT, DOT, data, hello
 
 from firmware_sim import __main__ as program
 from firmware_sim import viewer as viewers
@@ -25,7 +25,6 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.tap import Tap
 
-DOT = b"\xa0"
 WAIT = 20  # seconds after which a test has failed; none takes so long
 ROOT = Path(__file__).parents[2]
 NOTHING = b"\xff" * 6
@@ -169,6 +168,32 @@ def test_a_watcher_that_does_not_read_holds_up_nobody() -> None:
         assert big.swaps == 1
         watcher.recv(1)
     assert not tap._thread.is_alive()
+
+
+def test_of_two_hundred_that_do_not_read_one_is_sent_a_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The others stand in the system's queue, and cost the device nothing."""
+    looks, look = [], Tap._look
+    monkeypatch.setattr(Tap, "_look", lambda tap: looks.append(tap) or look(tap))
+    big = Device(Config((128, 128, 128), refresh=0))
+    big.receive(hello())
+    with tapped(big) as tap, contextlib.ExitStack() as stack:
+        threads = threading.active_count()
+        stack.enter_context(watch(tap)).sendall(NOTHING)
+        until(lambda: bool(looks))
+        host, port = tap.address.split(":")
+        for _ in range(199):
+            watcher = stack.enter_context(socket.socket())
+            watcher.setblocking(False)
+            watcher.connect_ex((host, int(port)))
+            with contextlib.suppress(OSError):  # not connected: the queue is short
+                watcher.send(NOTHING)
+        for number in range(20):
+            big.receive(data(number, number, DOT, CLEAR | COMMIT))
+        assert big.swaps == 20
+        assert threading.active_count() == threads
+        assert len(looks) == 1
 
 
 def test_a_bell_that_rings_already_is_not_waited_for() -> None:

@@ -8,7 +8,7 @@ import document
 import pytest
 import usb.core
 import usb.util
-from simwire import ACK, CLEAR, COMMIT, INFO, PENDING, SHOWN, answers, data, hello, status
+from simwire import ACK, CLEAR, COMMIT, DOT, INFO, PENDING, SHOWN, answers, data, hello, status
 from usb_gadget import NUMBER, GadgetDevice
 
 from firmware_sim.config import Config
@@ -30,7 +30,6 @@ from firmware_sim.usb.host import SET_CONFIGURATION, Bus
 from firmware_sim.wire import Wire
 
 OUT, IN = 0x01, 0x81
-DOT = b"\xa0"
 
 
 def made(function=DisplayFunction, packet=512, **config):

@@ -193,9 +193,13 @@ class Dialogue:
     def let_ticks_pass(self) -> None:
         """Wait for two refresh ticks, and a little."""
         if self.said.refresh:
-            until_s = self.clock() + 2 * self.said.period_s + 0.01
-            while (left_s := until_s - self.clock()) > 0:
-                self._listen(left_s)
+            self.rest(2 * self.said.period_s + 0.01)
+
+    def rest(self, seconds: float) -> None:
+        """Send nothing for so long; what comes is heard."""
+        until_s = self.clock() + seconds
+        while (left_s := until_s - self.clock()) > 0:
+            self._listen(left_s)
 
     def _note(self, *, sent: bool, data: bytes, text: str) -> None:
         if len(self.log) < _KEPT_LINES:

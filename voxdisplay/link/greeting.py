@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.wire import packet as packets
+from voxdisplay.wire.stream import PacketStream
 
 HELLO_INTERVAL_S = 0.25
 
@@ -46,12 +47,31 @@ class Greeting:
         return (self._count - 1) * len(self._wire)
 
 
-def no_answer(patience_s: float, noise: bytes) -> TransportTimeout:
-    """Give what is raised if nothing has answered for so long, but what came instead."""
-    heard = f"what came was no packet: {noise[:24]!r}" if noise else "nothing came at all"
-    return TransportTimeout(
-        f"nothing answered HELLO within {patience_s:g} s; {heard}",
-        hint="is this the display's port, and its baud rate right?"
-        if noise
-        else "is the display switched on, and this its port?",
-    )
+def no_answer(patience_s: float, stream: PacketStream, zeros: int) -> TransportTimeout:
+    """Give what is raised if nothing has answered for so long: with what came instead.
+
+    Parameters
+    ----------
+    patience_s : float
+    stream : PacketStream
+        Where all went that came.
+    zeros : int
+        How many 00 were in it: by themselves they are no packet, and no noise.
+
+    """
+    if noise := stream.noise:
+        heard = f"what came was no packet: {noise[:24]!r}"
+        hint = "is this the display's port, and its baud rate right?"
+    elif stream.counters.packets or stream.counters.unknown:
+        heard = "packets came, but none that answers it"
+        hint = "does another program talk to this display at the same time?"
+    elif zeros:
+        heard = f"only zeros came, {zeros} of them"
+        hint = (
+            "is the line held low, by a wire to ground, wrong levels or a display that is off? "
+            "Or its rate far below ours?"
+        )
+    else:
+        heard = "nothing came at all"
+        hint = "is the display switched on, and this its port?"
+    return TransportTimeout(f"nothing answered HELLO within {patience_s:g} s; {heard}", hint=hint)

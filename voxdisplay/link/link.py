@@ -50,6 +50,7 @@ class Link:
         self._frames = Frames()
         self._reads = Reads()
         self._sender = Sender(self._frames, self._reads, self.counters)
+        self._zeros = 0  # that came before the first session
         self._shown_ticket = 0  # in this session
         self._restarts = 0
         self._greeting = Greeting(session, now)
@@ -192,7 +193,7 @@ class Link:
         if now >= self._silence.end_s:
             if self.counters.sessions:
                 raise self._silence.error(now)
-            raise no_answer(self._patience_s, self.stream.noise)
+            raise no_answer(self._patience_s, self.stream, self._zeros)
         return self._greeting.hello(now)
 
     # -- silence
@@ -253,6 +254,8 @@ class Link:
             If the device breaks protocol.md.
 
         """
+        if not self.counters.sessions:
+            self._zeros += data.count(0)
         events: list[Event] = []
         for packet in self._packets(data):
             events += self._take(packet, now)

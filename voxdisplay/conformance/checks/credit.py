@@ -5,11 +5,12 @@ from __future__ import annotations
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.catalogue import check, ticking
 from voxdisplay.conformance.checks.waiting import shown_at
-from voxdisplay.conformance.packets import ASKED, CLEAR, COMMIT, data, wire
+from voxdisplay.conformance.packets import ASKED, CLEAR, COMMIT, data, status, wire
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 _BURST_BYTES = 1 << 16
+_IDLE_S = 1.5
 
 
 def filling(probe: Probe, first: int, frame: int, room: int) -> list[bytes]:
@@ -67,6 +68,22 @@ def not_withdrawn(probe: Probe) -> None:
         )
         promised = reach
     probe.demand_ack(probe.state, next=len(burst))
+
+
+@check("9.2", "does-not-lapse", "credit, and its session, stay as they are while nothing is sent")
+def does_not_lapse(probe: Probe) -> None:
+    probe.sync()
+    before = probe.state
+    probe.rest(_IDLE_S + 2 * probe.said.period_s)
+    probe.sync()
+    likely = "a host that has nothing to say says nothing: the device must not count the time"
+    probe.demand_ack(probe.state, likely, session=probe.session)
+    left = before.credit - len(wire(status(0)))
+    probe.demand(probe.state.credit >= left, f"credit {left} at least", probe.state, likely)
+    burst = filling(probe, 0, 0, min(left, _BURST_BYTES) - spec.LIMIT_RESERVE)
+    for answer in probe.say(*burst):
+        probe.demand(answer.kind != spec.TYPE_ERROR, "all packets are taken", answer, likely)
+    probe.demand_ack(probe.state, likely, next=len(burst), damaged=before.damaged)
 
 
 @check(
