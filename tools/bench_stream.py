@@ -23,8 +23,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import bench_link
+import numpy as np
 import stream_reader
 from bench_ports import in_another_process
+from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay.device import device_info
@@ -38,6 +40,7 @@ FEATURES = ("line", "box", "dots", "oct", "diff")
 MAX_PAYLOAD, RX_BUFFER = 4096, 1 << 16
 _HEARD = struct.Struct("<QQd")
 _CHUNK = 1 << 16
+_FRAMES = 2  # at least
 
 
 class Pipe:
@@ -216,7 +219,10 @@ class Streamed:
 def stream(
     frames: list[Frame], bytes_per_s: float, seconds: float, *, keep: bool = False
 ) -> Streamed:
-    """Present frames by turns, as fast as it goes, for so long behind the first second."""
+    """Present frames by turns, as fast as it goes, for so long behind the first second.
+
+    The first frames do not count: nobody knew the line.
+    """
     with reader(frames[0], bytes_per_s) as other:
         if keep:
             other.pipe.written = []
@@ -224,8 +230,10 @@ def stream(
             turn = 0
 
             def until(end_s: float) -> tuple[stream_reader.Heard, float]:
+                """Stream so long, and for some frames."""
                 nonlocal turn
-                while time.perf_counter() < end_s:
+                enough = other.heard().frames + _FRAMES
+                while time.perf_counter() < end_s or other.heard().frames < enough:
                     display.present(frames[turn % len(frames)], wait=False)
                     turn += 1
                 return other.heard(), time.process_time()
@@ -277,6 +285,17 @@ def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
     frames[0].set(head)
     frames[1].set(head[:, :, ::-1])
     yield "head, 8 bit", frames
+    for frame, waves in zip(frames, (field(side), field(side)[::-1]), strict=True):
+        frame.set(waves)
+    yield "full, 8 bit", frames
+
+
+def field(side: int) -> NDArray[np.uint8]:
+    """Give a volume without a dark voxel: slow waves, and a measurement's noise."""
+    x, y, z = np.meshgrid(*(np.linspace(0, 7, side),) * 3)
+    noise = np.random.default_rng(bench_link.SEED).normal(0, 3, x.shape)
+    waves = 128 + 80 * np.sin(x) * np.cos(y) * np.sin(z + 1)
+    return np.asarray((waves + noise).clip(1, 255), dtype=np.uint8)
 
 
 def bench_stream(repeats: int, *, quick: bool = False) -> None:

@@ -111,10 +111,15 @@ class Connection:
             self._renew(error)
 
     def _exchange(self, *, wait: bool) -> None:
+        if not wait:  # the caller was away: what has come since is not to count as newer than this
+            self._hear(0.0)
         if out := self.link.transmit(self._clock()):
             self._transport.write(out, self._timeout_s)
-        wait_s = self.link.next_timeout(self._clock()) if wait else 0.0
-        wait_s = _LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S)
+        if wait:
+            wait_s = self.link.next_timeout(self._clock())
+            self._hear(_LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S))
+
+    def _hear(self, wait_s: float) -> None:
         data = self._transport.read(wait_s)
         self._events += self.link.receive(data, self._clock())
 

@@ -21,12 +21,13 @@ from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
 from voxdisplay.grid import Grid
 from voxdisplay.palette import DEFAULT, Palette
-from voxdisplay.pixel import PixelFormat, Pixels, Values
+from voxdisplay.pixel import PixelFormat, Pixels, Values, lit
 from voxdisplay.wire import spec
-from voxdisplay.wire.choice import Content, Items, encode, join_items
+from voxdisplay.wire.choice import Content, Items, encode, encode_page, join_items
 from voxdisplay.wire.colors import color_pieces
-from voxdisplay.wire.digest import digest, palette_digest
+from voxdisplay.wire.digest import digest, page_digest, palette_digest
 from voxdisplay.wire.ops import Coding
+from voxdisplay.wire.pieces import Pieces
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,8 +238,7 @@ class Frame:
 
     def _find_lit(self) -> tuple[NDArray[np.int64], Values]:
         if self._has_base:
-            lit = self._raster != 0
-            index = np.flatnonzero(lit.any(axis=1) if lit.ndim == 2 else lit)
+            index = np.flatnonzero(lit(self._raster))
             return index, self._values_at(index)
         if not self._items:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
@@ -248,11 +248,13 @@ class Frame:
         return index[values != 0], values[values != 0]
 
     def _values_at(self, index: NDArray[np.int64]) -> Values:
-        return self.format.values(self._raster[index])
+        return self.format.values(self._raster.take(index, axis=0))
 
     def digest(self) -> int:
         """Give the digest that a display which shows this frame must report."""
-        found = digest(*self.lit())
+        # Of an array, much may be lit.
+        whole = self._has_base
+        found = page_digest(self._raster, self.format) if whole else digest(*self.lit())
         if self._palette and len(entries := self._palette.differs_from(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
         return found & 0xFFFFFFFF
@@ -289,10 +291,14 @@ class Frame:
 
         """
         coding = self._coding(max_payload, features, bytes_per_s)
+        colors = self._color_pieces(DEFAULT, coding)
+        if self._has_base and (plain := encode_page(self._raster, coding, colors)):
+            yield from plain
+            return
         items = self._seen(dark=False)
         index = _without(self.lit()[0], items) if self._has_base else _NONE
         yield []
-        yield from self._encode(items, index, DEFAULT, coding)
+        yield from encode(Content(items, index, self._values_at), coding, colors)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -313,8 +319,9 @@ class Frame:
         if items:  # one that has not changed at all is there
             fresh = np.isin(items.index, changed)
             items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
+        content = Content(items, _without(changed, items), self._values_at)
         old = base._palette.colors if base._palette else DEFAULT
-        return list(chain.from_iterable(self._encode(items, _without(changed, items), old, coding)))
+        return list(chain.from_iterable(encode(content, coding, self._color_pieces(old, coding))))
 
     def changed(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
@@ -324,8 +331,7 @@ class Frame:
         if not (self._has_base or base._has_base):
             index = np.union1d(self.lit()[0], base.lit()[0])
             return np.asarray(index[self._values_at(index) != base._values_at(index)])
-        differs = mine != other
-        return np.flatnonzero(differs.any(axis=1) if differs.ndim == 2 else differs)
+        return np.flatnonzero(lit(mine ^ other))
 
     def _coding(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
@@ -348,17 +354,11 @@ class Frame:
         (items,) = self._items
         return items if dark else items.only(items.values != 0)
 
-    def _encode(
-        self,
-        items: Items | None,
-        index: NDArray[np.int64],
-        old: NDArray[np.uint8],
-        coding: Coding,
-    ) -> Iterator[list[bytes]]:
-        first = None
+    def _color_pieces(self, old: NDArray[np.uint8], coding: Coding) -> Pieces | None:
+        """Give the pieces that make another palette this one, if it differs."""
         if self._palette and len(entries := self._palette.differs_from(old)):
-            first = color_pieces(entries, self._palette.colors, coding)
-        return encode(Content(items, index, self._values_at), coding, first)
+            return color_pieces(entries, self._palette.colors, coding)
+        return None
 
 
 _NONE = np.empty(0, dtype=np.int64)

@@ -98,9 +98,11 @@ class PixelFormat(enum.Enum):
     def values(self, array: NDArray[np.generic]) -> Values:
         """Give the pixel values, flat in scan order, of an array of this format."""
         if self is PixelFormat.RGB888:
-            channels = array.reshape(-1, 3).astype(np.uint32)
-            shifted = channels << np.array([0, 8, 16], dtype=np.uint32)
-            return np.asarray(shifted.sum(axis=1, dtype=np.uint32))
+            channels = array.reshape(-1, 3)
+            padded = np.zeros((len(channels), 4), dtype=np.uint8)
+            for channel in range(3):  # all at once takes three times as long
+                padded[:, channel] = channels[:, channel]
+            return padded.view("<u4").reshape(-1).astype(np.uint32, copy=False)
         return array.reshape(-1).astype(np.uint32)
 
     def pixels(self, values: NDArray[np.integer]) -> Pixels:
@@ -131,6 +133,12 @@ class PixelFormat(enum.Enum):
             )
         if self is PixelFormat.MONO1 and (array.astype(np.uint8) > 1).any():
             raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
+
+
+def lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Tell which pixels, (n,) or (n, 3), are not dark: (n,)."""
+    on = pixels != 0
+    return on[:, 0] | on[:, 1] | on[:, 2] if on.ndim == 2 else np.asarray(on)
 
 
 def _level(channel: NDArray[np.integer], top: int) -> NDArray[np.integer]:

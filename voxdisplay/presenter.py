@@ -16,7 +16,7 @@ from voxdisplay.errors import DesyncError
 from voxdisplay.frame import Frame
 from voxdisplay.link import OnDisplay
 from voxdisplay.proof import WRONG_TWICE, wrong_digest
-from voxdisplay.worth import worth_using
+from voxdisplay.worth import UNKNOWN_BYTES_PER_S, worth_using
 
 # So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
 _NEXT_TO_NOTHING = 64
@@ -71,7 +71,7 @@ class Presenter:
                     return link.present_on(link.on_display, payloads, whole)
                 return link.present(whole())
         ticket = link.begin()
-        bytes_per_s = self._connection.bytes_per_s or 0.0
+        bytes_per_s = self._connection.bytes_per_s or UNKNOWN_BYTES_PER_S
         coded = frame.coded(link.payload_bytes, self._worth_using, bytes_per_s)
         self._coder = _Coder(ticket, coded)
         return ticket

@@ -10,6 +10,9 @@ from typing import Final
 
 # Range coding saves about a bit a voxel and takes some 5 us for it: it pays below this.
 SLOW_BYTES_PER_S: Final = 25_000
+# What a line is taken for that nobody knows: it has work soon, as what is large is coded in parts,
+# and no bytes are spent to save time.
+UNKNOWN_BYTES_PER_S: Final = 200_000
 
 
 def worth_using(features: Collection[str], bytes_per_s: float | None) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from voxdisplay.frame import Frame
 from voxdisplay.grid import Grid
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire import choice
+from voxdisplay.wire import plain as plainly
 from voxdisplay.wire.bricks import encode_bricks
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.ops import Coding
@@ -117,6 +118,7 @@ def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_pe
         patch.setattr(choice, "_LARGE_SET", 100)
         patch.setattr(choice, "_SLAB_VOXELS", 1)
         patch.setattr(choice, "_PARSED_VOXELS", 150)
+        patch.setattr(plainly, "_SLAB_VOXELS", 160)
         portions = list(frame.coded(*device[2:], bytes_per_s))
     assert_draws([payload for portion in portions for payload in portion], frame)
 
@@ -132,7 +134,7 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
 
     assert portions(11_520) == 1, "in one piece it is shorter, and the line is busy for seconds"
     assert portions(1.2e6) == voxels // choice._PARSED_VOXELS
-    assert portions(1e9) == voxels // choice._SLAB_VOXELS
+    assert portions(1e9) == voxels // plainly._SLAB_VOXELS
     solid = Frame((128, 128, 32), "index8")
     solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
     assert len(list(filter(None, solid.coded(1024, (), 1e9)))) == voxels // choice._SLAB_VOXELS

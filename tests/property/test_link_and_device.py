@@ -13,7 +13,6 @@ from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire import spec
 from voxdisplay.wire.spans import decode_spans
 
-PATIENCE_S = 20
 seeds = st.integers(0, 2**32 - 1)
 devices = st.fixed_dictionaries(
     {
@@ -33,7 +32,8 @@ def rig_of(seed, device):
     longest = device["max_payload"] + spec.LIMIT_OVERHEAD
     least = longest + -(-longest // 254) + 1 + spec.LIMIT_RESERVE
     config = {key: value for key, value in device.items() if key != "room"}
-    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=PATIENCE_S, **config)
+    # Where two answers of three are lost, 20 s of silence do happen.
+    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=60, **config)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -71,8 +71,7 @@ def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
     for frame in drawn[:2]:
         rig.present(frame)
     for _ in range(rig.rng.randrange(80)):
-        if rig.now < PATIENCE_S / 2:  # or it may be lost in all good time
-            rig.step()
+        rig.step()
     rig.down.faults = rig.up.faults = None
     tickets = [rig.present(frame) for frame in drawn[2:]]
     rig.run()

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from firmware_sim.memory import Page
+from voxdisplay.pixel import PixelFormat
+from voxdisplay.wire import digest as digests
 from voxdisplay.wire.digest import digest
 
 D = document.literals()
@@ -71,3 +73,17 @@ def test_the_device_agrees_after_many_writes():
         page.put(start, rng.integers(0, 256, 3 * 20, dtype=np.uint8).tobytes())
     raw = np.frombuffer(bytes(page.pixels), dtype=np.uint8).reshape(-1, 3).astype(int)
     assert page.digest == digest(np.arange(300), raw @ [1, 256, 65536])
+
+
+@pytest.mark.parametrize("format_", PixelFormat)
+@pytest.mark.parametrize("block", [7, 1 << 14])
+def test_a_page_has_the_digest_of_its_voxels(format_, block, monkeypatch):
+    monkeypatch.setattr(digests, "_BLOCK", block)
+    rng = np.random.default_rng(3)
+    values = rng.integers(1, format_.full + 1, 3 * 5 * 7)
+    values[rng.random(values.size) < 0.3] = 0
+    values[:20] = 0
+    index = np.flatnonzero(values)
+    page = format_.pixels(values)
+    assert digests.page_digest(page, format_) == digests.digest(index, values[index])
+    assert digests.page_digest(page * 0, format_) == 0

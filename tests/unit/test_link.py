@@ -8,6 +8,7 @@ import pytest
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link import Link, PageRead, Ready, Refused, Restarted, Shown, Told
 from voxdisplay.link.info import check_info
+from voxdisplay.link.sender import PORTION_BYTES
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.stream import PacketStream
@@ -238,6 +239,24 @@ def test_another_frame_is_wanted_before_the_line_runs_dry():
     sent(link, 0.0)
     told(link, ack(1, 0, credit=1 << 20), 1e-5)  # a fast one has no more than it needs
     assert link.hungry
+
+
+def test_what_is_much_goes_out_in_portions():
+    """The device is at work on the first while the next is made."""
+    link = opened(max_payload=4096, rx_buffer=1 << 16)
+    link.present([bytes(4096)] * 200)
+    now, taken, most = 0.0, 0, 0
+    while taken < 200:
+        portions = [sent(link, now)]
+        while link.next_timeout(now) == 0:
+            portions.append(sent(link, now))
+        most = max(most, len(portions))
+        assert max(map(len, portions)) * 4096 <= PORTION_BYTES
+        assert portions[0], "nothing is left behind until the device answers"
+        taken += sum(map(len, portions))
+        now += 1e-3
+        told(link, ack(taken % 256, (taken - 1) % 256, credit=1 << 16), now)
+    assert most > 1
 
 
 def test_a_packet_that_is_lost_again_and_again():

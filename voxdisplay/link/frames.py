@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from voxdisplay.wire import packet as packets
@@ -36,6 +36,20 @@ class QueuedFrame:
     open: bool = False
     frame_id: int = -1
     entered: int = 0
+    unsent_bytes: int = field(init=False)  # of payloads that are in no packet yet
+
+    def __post_init__(self) -> None:
+        self.rewind()
+
+    def rewind(self) -> None:
+        """Begin again: nothing of it is in a packet."""
+        self.frame_id, self.entered = -1, 0
+        self.unsent_bytes = sum(map(len, self.payloads))
+
+    def supply(self, payloads: list[bytes]) -> None:
+        """Add payloads."""
+        self.payloads += payloads
+        self.unsent_bytes += sum(map(len, payloads))
 
     @property
     def begun(self) -> bool:
@@ -106,10 +120,8 @@ class Frames:
         """
         for frame in self._queue:
             if frame.ticket == ticket:
-                frame.payloads += payloads
+                frame.supply(payloads if payloads or frame.payloads or not last else [b""])
                 frame.open = not last
-                if last and not frame.payloads:
-                    frame.payloads = [b""]
 
     def withdraw(self, ticket: int) -> None:
         """Give up a frame from `begin` whose last payloads will not come.
@@ -153,9 +165,7 @@ class Frames:
     @property
     def unsent_bytes(self) -> int:
         """Bytes of payloads that are in no packet yet, as far as they are coded."""
-        return sum(
-            len(payload) for frame in self._queue for payload in frame.payloads[frame.entered :]
-        )
+        return sum(frame.unsent_bytes for frame in self._queue)
 
     @property
     def payloads(self) -> int:
@@ -188,6 +198,7 @@ class Frames:
         fits = frame.base == on_display and frame is self._queue[0]
         if frame.base is not None and not fits:
             frame.payloads, frame.clear, frame.base = frame.whole() or [b""], True, None
+            frame.rewind()
 
     def enter(self, frame: QueuedFrame, seq: int) -> packets.Data:
         """Give a frame's next packet."""
@@ -196,6 +207,7 @@ class Frames:
             self._next_id = (frame.frame_id + 1) % _MODULUS
         payload = frame.next_payload
         frame.entered += 1
+        frame.unsent_bytes -= len(payload)
         flags = spec.DATA_FLAG_CLEAR * frame.clear
         flags |= spec.DATA_FLAG_COMMIT * frame.all_entered
         return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=payload)
@@ -215,7 +227,7 @@ class Frames:
         """Begin a session: all frames are to be sent again, from their beginnings."""
         self._next_id = 0
         for frame in self._queue:
-            frame.frame_id, frame.entered = -1, 0
+            frame.rewind()
 
     def clear(self) -> None:
         """Drop all frames."""

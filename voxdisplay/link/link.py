@@ -165,7 +165,7 @@ class Link:
     # -- what goes out
 
     def transmit(self, now: float) -> bytes:
-        """Give the bytes to write now: as many as window and credit allow.
+        """Give the bytes to write now: as many as window and credit allow, or a portion of them.
 
         Raises
         ------
@@ -237,6 +237,8 @@ class Link:
         silence = self._silence
         if self.info is None:
             return max(0.0, min(self._greeting.due_s, silence.end_s) - now)
+        if self._sender.goes_on:
+            return 0.0
         if not self._waiting:
             return None
         return max(0.0, min(silence.ask_due_s, silence.end_s) - now)

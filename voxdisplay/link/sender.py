@@ -19,6 +19,7 @@ from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
 MOST_TRANSMISSIONS = 30
+PORTION_BYTES = 1 << 14
 _MODULUS = 256
 
 
@@ -42,6 +43,7 @@ class Sender:
         self._window = Window(0)
         self.loss = Loss()
         self.pace = Pace()
+        self.goes_on = False  # there may be more to be sent at once
         self.starved = False  # something is to be sent, and there is no credit for it
         self.all_damaged = False  # all that was on its way at the last ACK: no answer comes of it
         self._tag = 0
@@ -71,15 +73,23 @@ class Sender:
     def outgoing(self, now: float, on_display: OnDisplay) -> Iterator[bytes]:
         """Give what window and credit allow: what is lost comes first, as all waits for it.
 
+        Of much it gives a portion, so that the device is at work while the next one is made.
+
         Raises
         ------
         TransportTimeout
             If a packet was lost too often.
 
         """
-        self.starved = False
+        self.starved = self.goes_on = False
+        size = 0
         for part in (self._lost(now), self._new(now, on_display), self._asked()):
-            yield from part
+            for wire in part:
+                yield wire
+                size += len(wire)
+                if size >= PORTION_BYTES:
+                    self.goes_on = True
+                    return
             if self.starved:
                 return
 

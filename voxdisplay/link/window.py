@@ -47,6 +47,9 @@ class Window:
         self._ordinal = 0
         self._position = 0
         self._limit = credit  # absolute: bytes of the stream up to here fit
+        self._lost = 0  # how many of the flights are
+        # How many are not, and their bytes: asked for with each packet, so not counted anew.
+        self.on_the_way = (0, 0)
         self.taken = 0  # the newest ordinal that the device has taken
         self._data_marks: dict[int, _Mark] = {}
         self._tag_marks: dict[int, _Mark] = {}
@@ -55,12 +58,6 @@ class Window:
     def has_room(self) -> bool:
         """Whether another sequence number fits the window."""
         return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
-
-    @property
-    def on_the_way(self) -> tuple[int, int]:
-        """Packets that are neither received nor lost, as far as we know, and their bytes."""
-        sizes = [len(flight.wire) for flight in self.flights.values() if not flight.lost]
-        return len(sizes), sum(sizes)
 
     def fits(self, size: int) -> bool:
         """Tell whether credit allows another ``size`` bytes of DATA or READ.
@@ -71,6 +68,8 @@ class Window:
 
     def lost(self) -> int | None:
         """Give the oldest packet that is known to be lost, or None."""
+        if not self._lost:
+            return None
         order = sorted(self.flights, key=lambda seq: (seq - self._base) % _MODULUS)
         return next((seq for seq in order if self.flights[seq].lost), None)
 
@@ -84,6 +83,9 @@ class Window:
     def send(self, seq: int, now: float, delivered: int = 0) -> bytes:
         """Note that a packet goes out now, when so much had arrived; give its bytes."""
         flight = self.flights[seq]
+        count, bytes_ = self.on_the_way
+        self.on_the_way = count + 1, bytes_ + len(flight.wire)
+        self._lost -= flight.lost
         flight.delivered = delivered
         self._data_marks[seq] = mark = self._mark(len(flight.wire))
         flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
@@ -123,6 +125,9 @@ class Window:
             self.taken = max(self.taken, mark.ordinal)
             for flight in self.flights.values():
                 flight.lost = flight.lost or flight.ordinal <= self.taken
+        sizes = [len(flight.wire) for flight in self.flights.values() if not flight.lost]
+        self.on_the_way = len(sizes), sum(sizes)
+        self._lost = len(self.flights) - len(sizes)
         return done
 
     def _named(self, ack: Ack) -> _Mark | None:

@@ -11,15 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from itertools import chain as in_turn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.pixel import Pixels
 from voxdisplay.wire import bricks, spans, spec
 from voxdisplay.wire.arcs import encode_arcs
 from voxdisplay.wire.chains import Chains, chain
 from voxdisplay.wire.ops import Bools, Coding, Ints, ranges
 from voxdisplay.wire.pieces import Layout, Pieces, join, no_pieces
+from voxdisplay.wire.plain import encode_plain, is_noise
+from voxdisplay.wire.steps import Steps, at_once
 
 # Of many colours, voxels that mostly have other neighbours in their row make no bricks.
 _MANY_COLORS = 16
@@ -27,7 +31,7 @@ _A_FEW = 512  # voxels, which mostly show already that there are as many
 # More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
 _LARGE_SET = 1 << 16
 _SLAB_VOXELS = 1 << 18
-_PARSED_VOXELS = 1 << 15  # take some 15 ms to be parsed
+_PARSED_VOXELS = 1 << 17
 # Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
 _SLABS_FROM = 100_000
 # Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
@@ -135,6 +139,30 @@ def encode(content: Content, coding: Coding, first: Pieces | None = None) -> Ite
     yield from _encode(Content(items, index, content.look), coding, first or no_pieces())
 
 
+def encode_page(
+    page: Pixels, coding: Coding, first: Pieces | None = None
+) -> Iterator[list[bytes]] | None:
+    """Give payloads that draw a page as it is, if a shorter coding would take longer than they.
+
+    Parameters
+    ----------
+    page : ndarray
+        The display's memory in scan order: (V,), or (V, 3) for rgb888.
+    coding, first
+        As of `encode`.
+
+    Returns
+    -------
+    iterator or None
+        As of `encode`; None if that should draw what is lit.
+
+    """
+    if coding.bytes_per_s < _PLAIN_FROM or not is_noise(page, coding):
+        return None
+    before = Layout(first, coding).payloads if first else []
+    return in_turn([before], encode_plain(page, coding))
+
+
 def _slabs(index: Ints, look: spans.Look, coding: Coding) -> Iterator[Ints]:
     """Cut voxels into slabs along z, where bricks end; and those that make no bricks, further."""
     layer = coding.grid.nx * coding.grid.ny
@@ -142,7 +170,7 @@ def _slabs(index: Ints, look: spans.Look, coding: Coding) -> Iterator[Ints]:
     thick = max(1, _SLAB_VOXELS // (layer * side)) * side
     cuts = np.arange(thick, coding.grid.nz, thick) * layer
     for slab in np.split(index, np.searchsorted(index, cuts)):
-        parsed = coding.bytes_per_s < _PLAIN_FROM and len(slab) and _is_noise(slab, look(slab))
+        parsed = len(slab) and _is_noise(slab, look(slab))
         for part in np.array_split(slab, -(-len(slab) // _PARSED_VOXELS)) if parsed else [slab]:
             if len(part):
                 yield part
@@ -153,7 +181,7 @@ def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[by
     items, look = content.items, content.look
     if items is None or not len(items):
         if len(content.index):
-            _offer_sets(best, no_pieces(), content.index, look)
+            yield from _pauses(_offer_sets(best, no_pieces(), content.index, look))
         yield best.payloads
         return
     # A voxel that follows itself would end a chain.
@@ -173,17 +201,23 @@ def _encode(content: Content, coding: Coding, first: Pieces) -> Iterator[list[by
     if apart.any() or len(content.index):
         index = _united(items.index[_voxels_of(chains, apart)], content.index)
         kept = _by_pen(chains.pieces.take(np.flatnonzero(~apart)))
-        _offer_sets(best, kept, index, look)
+        yield from _pauses(_offer_sets(best, kept, index, look))
         yield []
     if coding.bytes_per_s >= _CHAINS_FROM:
         yield best.payloads
         return
     index = _united(items.index, content.index)
     if spans.least_bytes(index, coding) < best.total:
-        best.offer(spans.span(spans.set_runs(index, look(index), look), coding))
+        best.offer(at_once(spans.span_set(index, look(index), look, coding)))
     if coding.has(spec.FEATURE_ARC) and not len(content.index):
         best.offer_payloads(encode_arcs(items.voxels, items.values, coding))
     yield best.payloads
+
+
+def _pauses(steps: Steps[None]) -> Iterator[list[bytes]]:
+    """Do steps, with nothing to be sent in between."""
+    for _ in steps:
+        yield []
 
 
 def _united(index: Ints, others: Ints) -> Ints:
@@ -266,26 +300,24 @@ def _cheaper_as_set(chains: Chains, items: Items, look: spans.Look, coding: Codi
     return apart
 
 
-def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> None:
-    """Offer pieces together with a set of voxels, n >= 1, coded in each way."""
+def _offer_sets(best: _Cheapest, kept: Pieces, index: Ints, look: spans.Look) -> Steps[None]:
+    """Offer pieces together with a set of voxels, n >= 1, coded in each way; in steps."""
     coding, values = best.coding, look(index)
-    if coding.bytes_per_s >= _PLAIN_FROM and _is_noise(index, values):
-        best.offer(kept, spans.plain(index, look, coding))
-        return
     if bricks.can_code(coding) and not _is_noise(index, values):
         made = bricks.brick(index, values, coding)
+        yield
         best.offer(kept, made.pieces)
         in_spans = _cheaper_as_spans(index, values, made, coding)
         if in_spans.any() and not in_spans.all():
             there = in_spans[np.searchsorted(made.values, values)]
             brick_pieces = np.searchsorted(made.values, made.pieces.pen)
-            best.offer(
-                kept,
-                made.pieces.take(np.flatnonzero(~in_spans[brick_pieces])),
-                spans.span(spans.set_runs(index[there], values[there], look), coding),
-            )
+            in_bricks = made.pieces.take(np.flatnonzero(~in_spans[brick_pieces]))
+            rest = yield from spans.span_set(index[there], values[there], look, coding)
+            best.offer(kept, in_bricks, rest)
     if spans.least_bytes(index, coding) < best.total - int(kept.size.sum()):
-        best.offer(kept, spans.span(spans.set_runs(index, values, look), coding))
+        rows = yield from spans.span_set(index, values, look, coding)
+        yield
+        best.offer(kept, rows)
 
 
 def _is_noise(index: Ints, values: NDArray[np.integer]) -> bool:

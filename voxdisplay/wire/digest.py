@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.pixel import PixelFormat, Pixels, Values, lit
 from voxdisplay.wire import spec
 
 # What sets the value of a colour apart from that of a pixel.
 _COLOR = 0x1000000
+_BLOCK = 1 << 15  # voxels at once: what is computed of them stays in a core's cache
 
 
 def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
@@ -27,16 +29,46 @@ def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
         0 <= digest < 2**32; 0 for a dark page.
 
     """
-    value = np.asarray(values).astype(np.uint32)
-    lit = value != 0
-    h = np.asarray(index).astype(np.uint32) * np.uint32(spec.DIGEST_MUL_INDEX)
-    h += value * np.uint32(spec.DIGEST_MUL_VALUE)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_1)
+    index, values = np.asarray(index), np.asarray(values)
+    index, values = index[values != 0], values[values != 0]
+    blocks = (slice(low, low + _BLOCK) for low in range(0, len(values), _BLOCK))
+    found = sum(_of_block(index[some].astype(np.uint32), values[some]) for some in blocks)
+    return found & 0xFFFFFFFF
+
+
+def page_digest(page: Pixels, format_: PixelFormat) -> int:
+    """Give the digest of a whole page, as it lies in the display's memory; as `digest` does.
+
+    Parameters
+    ----------
+    page : ndarray
+        In scan order: (V,), or (V, 3) for rgb888.
+    format_ : PixelFormat
+
+    """
+    found = 0
+    for low in range(0, len(page), _BLOCK):
+        pixels = page[low : low + _BLOCK]
+        on = lit(pixels)
+        index = np.arange(low, low + len(on), dtype=np.uint32)
+        if not on.all():
+            index, pixels = index[on], pixels[on]
+        found += _of_block(index, format_.values(pixels))
+    return found & 0xFFFFFFFF
+
+
+def _of_block(index: Values, values: NDArray[np.integer]) -> int:
+    """Give the sum of what lit voxels add, modulo 2**32."""
+    h = index * np.uint32(spec.DIGEST_MUL_INDEX)
+    part = values.astype(np.uint32)
+    part *= np.uint32(spec.DIGEST_MUL_VALUE)
+    h += part
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_1), out=part)
     h *= np.uint32(spec.DIGEST_MUL_1)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_2)
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_2), out=part)
     h *= np.uint32(spec.DIGEST_MUL_2)
-    h ^= h >> np.uint32(spec.DIGEST_SHIFT_3)
-    return int(h[lit].sum(dtype=np.uint64)) & 0xFFFFFFFF
+    h ^= np.right_shift(h, np.uint32(spec.DIGEST_SHIFT_3), out=part)
+    return int(h.sum(dtype=np.uint32))
 
 
 def palette_digest(voxels: int, entries: NDArray[np.integer], colors: NDArray[np.integer]) -> int:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire import spec
 from voxdisplay.wire.ops import Bools, Coding, Ints, count_bytes
+from voxdisplay.wire.steps import Steps
 
 # States: what the run before was drawn by.
 _LIT, _DIFF, _RUN, _SKIP = range(4)
@@ -37,6 +38,8 @@ _DIFF_BITS = _OP_BITS + 2
 _LONG = 1 << 12
 # Runs of a stretch, where there are many, or few; the first of a stretch cannot be a DIFF.
 _STRETCH, _LEAST_STRETCH = 96, 24
+# Rows of all stretches that are looked at in one step.
+_STEP = 16
 
 Costs = NDArray[np.int32]
 
@@ -62,14 +65,15 @@ class Runs:
     may_write: Bools
 
 
-def cheapest(runs: Runs, coding: Coding) -> Ints:
-    """Give the row of `WAYS` by which each run is drawn in the fewest bytes."""
+def cheapest(runs: Runs, coding: Coding) -> Steps[Ints]:
+    """Find the row of `WAYS` by which each run is drawn in the fewest bytes, in steps."""
     n = len(runs.start)
     if n == 0:
         return np.empty(0, dtype=np.int64)
     height = max(_LEAST_STRETCH, min(_STRETCH, n // 64), int((n / 16) ** 0.5))
     height = min(n, height)
     width = -(-n // height)
+    yield
     of = {name: _folded(cost, height, width) for name, cost in _costs(runs, coding).items()}
     # At the top of a stretch the pen is not known, but for the first: a packet begins so.
     for name in ("no_diff", "no_diff_behind_skip", "same_run"):
@@ -83,6 +87,8 @@ def cheapest(runs: Runs, coding: Coding) -> Ints:
     new = np.empty_like(cost)
     into_lit, into_diff = _OP_BITS << _CODE_BITS, _DIFF_BITS << _CODE_BITS
     for row in range(height):
+        if row % _STEP == 0:
+            yield
         lit, diff, run, skip = cost
         drawn = np.minimum(np.minimum(lit, diff), run)
         any_ = np.minimum(drawn, skip)
@@ -97,6 +103,7 @@ def cheapest(runs: Runs, coding: Coding) -> Ints:
         np.add(drawn, of["skip"][row], out=new[_SKIP])
         back[row] = np.bitwise_and(new, _CODE, dtype=np.int32)
         cost = (new & ~_CODE) + states
+    yield
     return _traced(back, cost.argmin(axis=0)).T.reshape(-1)[:n]
 
 

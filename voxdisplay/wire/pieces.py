@@ -195,5 +195,5 @@ def fill(first: Ints, following: Ints, limit: int) -> Ints:
     while begin < len(first):
         heads.append(begin)
         room = limit - first[begin] + total[begin + 1]
-        begin = max(int(np.searchsorted(total, room, side="right")) - 1, begin + 1)
+        begin = max(int(total.searchsorted(room, side="right")) - 1, begin + 1)
     return np.array(heads, dtype=np.int64)

@@ -27,6 +27,7 @@ from voxdisplay.wire.ops import (
 )
 from voxdisplay.wire.parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
 from voxdisplay.wire.pieces import ANY, Layout, Pieces, no_pieces
+from voxdisplay.wire.steps import Steps, at_once
 
 Look = Callable[[Ints], NDArray[np.integer]]
 
@@ -51,7 +52,7 @@ def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
         At most ``coding.max_payload`` bytes each; empty if all is dark.
 
     """
-    return Layout(span(page_runs(values), coding), coding).payloads
+    return Layout(at_once(span(page_runs(values), coding)), coding).payloads
 
 
 def page_runs(values: NDArray[np.integer]) -> Runs:
@@ -120,9 +121,17 @@ def least_bytes(index: Ints, coding: Coding) -> int:
     return 1 + int(np.minimum(skipped, drawn).sum())
 
 
-def span(runs: Runs, coding: Coding) -> Pieces:
-    """Give the pieces that draw runs."""
-    way = cheapest(runs, coding)
+def span_set(index: Ints, values: NDArray[np.integer], look: Look, coding: Coding) -> Steps[Pieces]:
+    """Make the pieces that draw voxels, in steps: the parameters are those of `set_runs`."""
+    runs = set_runs(index, values, look)
+    yield
+    return (yield from span(runs, coding))
+
+
+def span(runs: Runs, coding: Coding) -> Steps[Pieces]:
+    """Make the pieces that draw runs, in steps."""
+    way = yield from cheapest(runs, coding)
+    yield
     op, rest = WAYS[:, 0][way], WAYS[:, 1][way]
     split = np.flatnonzero(rest)
     count = runs.length.copy()
@@ -136,35 +145,6 @@ def span(runs: Runs, coding: Coding) -> Pieces:
     if not drawn.any():
         return no_pieces()
     return _pieces(op[drawn], start[drawn], count[drawn], value[drawn], coding)
-
-
-def plain(index: Ints, look: Look, coding: Coding) -> Pieces:
-    """Give the pieces that write voxels, n >= 1, and narrow gaps between them, pixel by pixel.
-
-    Parameters
-    ----------
-    index, look
-        As of `set_runs`.
-    coding : Coding
-
-    """
-    wide = np.flatnonzero(index[1:] - index[:-1] > coding.move_bytes + 2)
-    start = index[np.concatenate(([0], wide + 1))]
-    count = index[np.append(wide, len(index) - 1)] + 1 - start
-    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    most = _most(coding.room + coding.pen_bytes, bits)  # it needs no pen
-    parts = -(-count // most)
-    done = ranges(np.zeros(len(count), dtype=np.int64), parts) * most
-    start = np.repeat(start, parts) + done
-    count = np.minimum(np.repeat(count, parts) - done, most)
-    pixel = look(ranges(start, count)).astype(np.int64)
-    at_pixel = np.cumsum(count) - count
-    op = np.full(len(start), LIT)
-    body, size = _bodies(op, count, at_pixel, pixel, pixel, coding)
-    last = pixel[at_pixel + count - 1]
-    any_ = np.full(len(start), ANY)
-    none = np.zeros(len(start), dtype=np.bool_)
-    return Pieces(body, size, any_, start, last, start + count, none)
 
 
 def _pieces(op: Ints, start: Ints, count: Ints, value: Ints, coding: Coding) -> Pieces:
