@@ -38,6 +38,7 @@ class Polyline(Curve):
 
     """
 
+    degree = 1
     _least = 2
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:

@@ -45,6 +45,11 @@ class Bezier(Curve):
         self.family = len(self._points)
         self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
 
+    @property
+    def degree(self) -> int:
+        """How often t is multiplied by itself, at most."""
+        return len(self._points) - 1
+
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
         return _de_casteljau(self._points[:, :, None], t)

@@ -38,6 +38,11 @@ class Transformed(Curve):
         if curve.family is not None:
             self.family = (type(curve).together, curve.family)
 
+    @property
+    def degree(self) -> int | None:
+        """That of the curve inside, see `Curve.degree`."""
+        return self.curve.degree
+
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
         return self.scale * self.curve.position(t) + self.offset[:, None]
