@@ -7,7 +7,6 @@ through, and are the business of whoever draws the curve.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, overload
 
 import numpy as np
@@ -127,7 +126,7 @@ class Parametric(Curve):
             formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
             for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
         ]
-        self._position = partial(expression.rows, formulas)
+        self._position = expression.rows(formulas)
         self._derivative = _stacked(slopes)
 
     def position(self, t: Floats) -> Floats:

@@ -28,6 +28,8 @@ NUDGE = 1e-9
 # A corner must be better by this much, in square voxels, to be preferred to the nearest one.
 MARGIN = 1e-8
 
+Ends = tuple[Floats, Floats]
+
 
 @dataclass(frozen=True, slots=True)
 class Crossings:
@@ -196,20 +198,17 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
     return Crossings(events.take(found), better[:, found], gain[found])
 
 
-def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Floats, Floats]:
+def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
     """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
     left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
     begin = _of_axis(knots.points[:, left], axis)
     length = _of_axis(knots.points[:, left + 1], axis) - begin
     h = knots.t[left + 1] - knots.t[left]
-    bracket = np.stack((knots.t[left], knots.t[left] + h))
-    ends = np.stack((begin - level, begin + length - level))
-    after = (miss[off] < 0) == (ends[0] < 0)  # the crossing comes after the guess
-    bracket[0] = np.where(after, t, bracket[0])
-    ends[0] = np.where(after, miss[off], ends[0])
-    bracket[1] = np.where(after, bracket[1], t)
-    ends[1] = np.where(after, ends[1], miss[off])
-    return bracket, ends
+    low, high = knots.t[left], knots.t[left] + h
+    at_low, at_high = begin - level, begin + length - level
+    after = (miss[off] < 0) == (at_low < 0)  # the crossing comes after the guess
+    bracket = np.where(after, t, low), np.where(after, high, t)
+    return bracket, (np.where(after, miss[off], at_low), np.where(after, at_high, miss[off]))
 
 
 @twin
@@ -244,8 +243,9 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
     """
     left, axis, tau = aims.knot, aims.axis, aims.tau
     nearest = np.floor(points + NUDGE)
+    plane = aims.level - 0.5
     for row in range(3):
-        np.copyto(nearest[row], aims.level - 0.5, where=axis == row)
+        np.copyto(nearest[row], plane, where=axis == row)
     h = knots.t[left + 1] - knots.t[left]
     tangent = slopes.take(left, axis=1) * h  # per step, not per t
     after = slopes.take(left + 1, axis=1) * h

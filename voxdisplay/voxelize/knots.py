@@ -142,11 +142,13 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
         second[:-1] = np.maximum(second[:-1], turn)
         bend = h * h * second / 4
         wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+    parts = np.ones(h.size, dtype=np.int64)
+    cut = np.flatnonzero(joined & (wanted > 1))  # not where the bend is not a number
+    if cut.size:
         # Parts must stay distinct parameters.
-        possible = np.floor(h / resolution[samples.curve[samples.piece[:-1]]])
-        parts = np.minimum(np.minimum(wanted, possible), PARTS)
-    parts[~(joined & (parts > 1))] = 1.0  # and where the bend is not a number
-    return parts.astype(np.int64), chord
+        possible = np.floor(h[cut] / resolution[samples.curve[samples.piece[cut]]])
+        parts[cut] = np.maximum(np.minimum(np.minimum(wanted[cut], possible), PARTS), 1)
+    return parts, chord
 
 
 def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:

@@ -14,7 +14,12 @@ TOLERANCE = 2e-3
 
 
 def cross(
-    batch: Batch, curve: Ints, axis: Ints, level: Floats, bracket: Floats, ends: Floats
+    batch: Batch,
+    curve: Ints,
+    axis: Ints,
+    level: Floats,
+    bracket: tuple[Floats, Floats],
+    ends: tuple[Floats, Floats],
 ) -> tuple[Floats, Floats, Bools]:
     """Find where coordinates take given values, by bracketed secants (the Illinois rule).
 
@@ -26,9 +31,9 @@ def cross(
         Which curve, ascending, and which of its coordinates.
     level : (n,) float64 array
         The value to be taken, in voxels.
-    bracket : (2, n) float64 array
+    bracket : (n,), (n,) float64 arrays
         Parameters with the crossing between them.
-    ends : (2, n) float64 array
+    ends : (n,), (n,) float64 arrays
         Coordinate minus level at the bracket's ends: of opposite sign, or 0.
 
     Returns
@@ -53,8 +58,11 @@ def cross(
         there = batch.evaluate(curve[left], guess)
         value = there[axis[left], np.arange(left.size)] - level[left]
         done = np.abs(value) <= TOLERANCE
+        there = there.take(done.nonzero()[0], axis=1)
         hit = left[done]
-        t[hit], points[:, hit], found[hit] = guess[done], there[:, done], True
+        t[hit], points[:, hit], found[hit] = guess[done], there, True
+        if hit.size == left.size:
+            break
         lost = high - low <= batch.resolution[curve[left]] / 4
         on = ~(done | lost)
         if not on.any():
