@@ -35,7 +35,7 @@ class Curves:
     def __init__(self, curves: Sequence[Curve]) -> None:
         self._curves = curves
         families = defaultdict(list)
-        for index, curve in enumerate(curves):
+        for index, curve in enumerate(curves if len(curves) >= SMALLEST else ()):
             if curve.family is not None:
                 families[curve.together, curve.family].append(index)
         self._evaluate: list[Evaluate] = []

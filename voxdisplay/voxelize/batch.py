@@ -59,11 +59,11 @@ class Samples:
     @property
     def bounds(self) -> Ints:
         """Index of the first sample of each piece, and K: (pieces + 1,)."""
-        return np.searchsorted(self.piece, np.arange(self.curve.size + 1))
+        return self.piece.searchsorted(np.arange(self.curve.size + 1))
 
     def curve_starts(self, curves: int) -> Ints:
         """Index of the first sample of each of so many curves: (curves,)."""
-        return self.bounds[np.searchsorted(self.curve, np.arange(curves))]
+        return self.bounds[self.curve.searchsorted(np.arange(curves))]
 
 
 class Batch:
@@ -141,9 +141,9 @@ class Batch:
             Into how many parts each step is cut; 1 leaves it as it is.
 
         """
-        cut = np.flatnonzero(parts > 1)
+        cut = (parts > 1).nonzero()[0]
         count = parts[cut] - 1
-        left = np.repeat(cut, count)
+        left = cut.repeat(count)
         nth = spread(np.ones_like(count), count)
         t_left = samples.t[left]
         t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])

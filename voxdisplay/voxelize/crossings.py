@@ -130,9 +130,9 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
         (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
     ).astype(np.int8)
     passed = _of_axis(cells[:, 1:] - cells[:, :-1], axis)
-    step = np.flatnonzero(
-        (passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])
-    )
+    step = ((passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])).nonzero()[
+        0
+    ]
     axis, passed = axis[step], passed[step]
     left = low + step
     at = axis * np.int64(knots.t.size) + left  # of flat rows
@@ -168,7 +168,7 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
     points = batch.evaluate(curve, t)
     found = np.ones(t.size, dtype=bool)
     miss = _of_axis(points, axis) - aims.level
-    off = np.flatnonzero(np.abs(miss) > TOLERANCE)
+    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
     if off.size:
         level = aims.level[off]
         bracket, ends = _brackets(knots, aims, miss, off)
@@ -179,7 +179,7 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
         tau[off] = (t[off] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
 
     nearest, better, gain, foot = corners(knots, slopes, aims, points)
-    check = np.flatnonzero(np.isfinite(foot))
+    check = np.isfinite(foot).nonzero()[0]
     if check.size:  # at the foot of the perpendicular the curve must be near enough
         left = aims.knot[check]
         t_foot = np.clip(
@@ -272,7 +272,7 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
 
     nearest = nearest.astype(np.int32)
     better, gain, foot = nearest.copy(), np.full(axis.size, np.inf), np.full(axis.size, np.inf)
-    moved = np.flatnonzero(best < 0)
+    moved = (best < 0).nonzero()[0]
     gain[moved] = -best[moved]
     axis, both, other = axis[moved], both[moved], other[moved]
     apart, along = apart.take(moved, axis=1), along.take(moved, axis=1)
@@ -282,7 +282,7 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
         step = np.where(apart[across, each] > 0, -1, 1) * moves
         better[across, moved] += step
         apart[across, each] += step
-    far = np.flatnonzero((apart * apart).sum(axis=0) > 0.5)
+    far = ((apart * apart).sum(axis=0) > 0.5).nonzero()[0]
     foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
     return Corners(nearest, better, gain, foot)
 

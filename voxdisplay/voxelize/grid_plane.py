@@ -75,7 +75,7 @@ def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     ends = bounds.repeat(2)[1:-1]
     ends[1::2] -= 1
     piece = knots.piece[ends].astype(np.int32)
-    around = np.searchsorted(inner.piece, np.arange(bounds.size))
+    around = inner.piece.searchsorted(np.arange(bounds.size))
     at = around.repeat(2)[1:-1]
 
     voxels = np.floor(knots.points.take(ends, axis=1)).astype(np.int32)

@@ -143,7 +143,7 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
         bend = h * h * second / 4
         wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
     parts = np.ones(h.size, dtype=np.int64)
-    cut = np.flatnonzero(joined & (wanted > 1))  # not where the bend is not a number
+    cut = (joined & (wanted > 1)).nonzero()[0]  # not where the bend is not a number
     if cut.size:
         # Parts must stay distinct parameters.
         possible = np.floor(h[cut] / resolution[samples.curve[samples.piece[cut]]])
@@ -161,7 +161,7 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
-    excess = np.flatnonzero((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    excess = ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles).nonzero()[0]
     if not excess.size:
         return
     index = int(excess[0])

@@ -68,7 +68,7 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
         change[stop] -= 1
         thin = without_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
     # A piece ends where it ends, even if its last voxel was reached before.
-    last, thin_last = (np.flatnonzero(np.append(~each.joined, True)) for each in (full, thin))
+    last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
     thin.t[thin_last] = full.t[last]
     return thin
 
@@ -81,7 +81,7 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     heading, size = events.heading, events.t.size
     on = np.zeros(size, dtype=bool)
     on[1:] = events.joined & (heading[1:] == heading[:-1]) & (heading[1:] != OTHER)
-    along = np.flatnonzero(on)
+    along = on.nonzero()[0]
     at = (heading[along] >> 1) * np.int64(size) + along  # of flat rows
     step = events.voxels.take(at) - events.voxels.take(at - 1)
     on[along] = step == 1 - 2 * (heading[along] & 1)
@@ -94,15 +94,15 @@ def _short_cuts(
     """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
-    turn = np.flatnonzero(~runs_on(events))
+    turn = (~runs_on(events)).nonzero()[0]
     reach = np.bincount(np.maximum(turn - WINDOW, 0), minlength=size + 1)
     reach -= np.bincount(np.minimum(turn + WINDOW, size), minlength=size + 1)
-    look = np.flatnonzero(np.cumsum(reach[:-1]) > 0)
+    look = (np.cumsum(reach[:-1]) > 0).nonzero()[0]
     if look.size < 3:
         return look[:0], look[:0]
     stretch = look - np.arange(look.size) + events.piece[look]
     leap = furthest(events.voxels.take(look, axis=1), stretch)
-    short = np.flatnonzero(leap > 1)
+    short = (leap > 1).nonzero()[0]
     if not short.size:
         return short, short
     starts, stops = look[short], look[short] + leap[short]
