@@ -148,11 +148,11 @@ def rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
     """Prepare to evaluate k expressions at t, (n,) float64, to (k, n): as `Expression.value`."""
     programs = [_plain(each.program) for each in expressions]
 
+    @np.errstate(all="ignore")
     def evaluate(t: Floats) -> Floats:
         out = np.empty((len(programs), t.size))
-        with np.errstate(all="ignore"):
-            for row, program in zip(out, programs, strict=True):
-                row[:] = _run(program, t)
+        for row, program in zip(out, programs, strict=True):
+            row[:] = _run(program, t)
         return out
 
     return evaluate
@@ -178,12 +178,12 @@ def together(expressions: Sequence[Expression]) -> Evaluate:
     ]
     plain = _plain(programs[0])
 
+    @np.errstate(all="ignore")
     def evaluate(which: Ints, t: Floats) -> Floats:
         values = iter([column[which] if column.ndim else column for column in columns])
         program = [(0, next(values)) if arity == 0 else (arity, step) for arity, step in plain]
         out = np.empty_like(t, dtype=np.float64)
-        with np.errstate(all="ignore"):
-            out[...] = _run(program, t)
+        out[...] = _run(program, t)
         return out
 
     return evaluate

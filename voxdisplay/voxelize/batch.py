@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,8 @@ class Batch:
     def __init__(self, curves: Iterable[Curve], number: int | None = None) -> None:
         self.curves = list(curves)
         self._number = number
-        ranges = np.array([curve.t_range for curve in self.curves], dtype=float).reshape(-1, 2)
+        ends = chain.from_iterable([curve.t_range for curve in self.curves])
+        ranges = np.fromiter(ends, dtype=float).reshape(-1, 2)
         self.first, self.last = ranges.T
         good = np.isfinite(ranges).all(axis=1) & (self.first < self.last)
         if not good.all():
@@ -103,6 +105,7 @@ class Batch:
         """Give the beginning of a message about a curve: nothing if it is the only one."""
         return "" if self._number is None else f"curve {self._number + index}: "
 
+    @np.errstate(all="ignore")
     def evaluate(self, curve: Ints, t: Floats) -> Floats:
         """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).
 
@@ -112,10 +115,9 @@ class Batch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        with np.errstate(all="ignore"):
-            points = self._positions(curve, t)
-            # And so not where P is not a number: it would be least and greatest.
-            near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
+        points = self._positions(curve, t)
+        # And so not where P is not a number: it would be least and greatest.
+        near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
         if not near:
             at = int(np.argmin((np.abs(points) < FARTHEST).all(axis=0)))
             raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])

@@ -70,11 +70,14 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     Their events are connected only where one axis goes on to dominate.
     """
     slopes = slopes_at(knots)
-    starts = knots.curve_starts(len(batch.curves))
-    found = [
-        _crossings_of(batch, knots, slopes, aim(knots, slopes, low, high))
-        for low, high in blocks(starts, knots.t.size, BLOCK)
-    ]
+
+    def crossings_of(block: tuple[int, int]) -> Crossings:
+        return _crossings_of(batch, knots, slopes, aim(knots, slopes, *block))
+
+    parts = [(0, knots.t.size)]
+    if knots.t.size > BLOCK:
+        parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
+    found = list(map(crossings_of, parts))
     crossings = found[0]
     if len(found) > 1:
         events = Events(
@@ -95,29 +98,31 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
 
 
 @twin
+@np.errstate(all="ignore")
 def slopes_at(knots: Samples) -> Floats:
     """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
     joined = knots.joined
     h = np.where(joined, knots.t[1:] - knots.t[:-1], 1.0)
     slopes = np.zeros_like(knots.points)
-    with np.errstate(all="ignore"):
-        velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
-        slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
-        inner = np.zeros(knots.t.size, dtype=bool)
-        inner[1:-1] = joined[1:] & joined[:-1]
-        bounds = knots.bounds
-        first, last = bounds[:-1], bounds[1:] - 1
-        slopes[:, first[first == last]] = 0.0
-        first, last = first[first < last], last[first < last]
-        for end, other, step in ((first, first + 1, first), (last, last - 1, last - 1)):
-            # On a parabola the slopes at both ends of a step average to its velocity.
-            slopes[:, end] = np.where(
-                inner[other], 2 * velocity[:, step] - slopes[:, other], velocity[:, step]
-            )
+    velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
+    slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
+    inner = np.zeros(knots.t.size, dtype=bool)
+    inner[1:-1] = joined[1:] & joined[:-1]
+    bounds = knots.bounds
+    first, last = bounds[:-1], bounds[1:] - 1
+    alone = first == last
+    if alone.any():
+        slopes[:, first[alone]] = 0.0
+        first, last = first[~alone], last[~alone]
+    end, other = np.concatenate((first, last)), np.concatenate((first + 1, last - 1))
+    step = velocity.take(np.concatenate((first, last - 1)), axis=1)
+    # On a parabola the slopes at both ends of a step average to its velocity.
+    slopes[:, end] = np.where(inner[other], 2 * step - slopes.take(other, axis=1), step)
     return slopes
 
 
 @twin
+@np.errstate(all="ignore")
 def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
     stop = min(high + 1, knots.t.size)
@@ -139,9 +144,8 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     h = knots.t[left + 1] - knots.t[left]
     begin = knots.points.take(at)
     length = knots.points.take(at + 1) - begin
-    with np.errstate(all="ignore"):
-        m_left = length / (slopes.take(at) * h)
-        m_right = length / (slopes.take(at + 1) * h)
+    m_left = length / (slopes.take(at) * h)
+    m_right = length / (slopes.take(at + 1) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
     m_left[~((m_left > 0) & (m_left < 3))] = 1.0
     m_right[~((m_right > 0) & (m_right < 3))] = 1.0

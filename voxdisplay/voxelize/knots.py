@@ -126,6 +126,7 @@ def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> 
 
 
 @twin
+@np.errstate(all="ignore")
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
@@ -133,15 +134,14 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     step = samples.points[:, 1:] - samples.points[:, :-1]
     chord = np.abs(step).max(axis=0)
     chord[~joined] = 0.0
-    with np.errstate(all="ignore"):
-        velocity = step / h
-        turn = np.abs(velocity[:, 1:] - velocity[:, :-1]).max(axis=0) / (h[1:] + h[:-1])
-        turn[~(joined[1:] & joined[:-1])] = 0.0
-        second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
-        second[1:] = turn
-        second[:-1] = np.maximum(second[:-1], turn)
-        bend = h * h * second / 4
-        wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+    velocity = step / h
+    turn = np.abs(velocity[:, 1:] - velocity[:, :-1]).max(axis=0) / (h[1:] + h[:-1])
+    turn[~(joined[1:] & joined[:-1])] = 0.0
+    second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
+    second[1:] = turn
+    second[:-1] = np.maximum(second[:-1], turn)
+    bend = h * h * second / 4
+    wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
     parts = np.ones(h.size, dtype=np.int64)
     cut = (joined & (wanted > 1)).nonzero()[0]  # not where the bend is not a number
     if cut.size:

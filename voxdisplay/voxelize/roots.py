@@ -13,6 +13,7 @@ from voxdisplay.voxelize.batch import Batch, Bools, Floats, Ints
 TOLERANCE = 2e-3
 
 
+@np.errstate(all="ignore")
 def cross(
     batch: Batch,
     curve: Ints,
@@ -51,8 +52,7 @@ def cross(
     (low, high), (at_low, at_high) = bracket, ends
     side = np.zeros(curve.size, dtype=np.int8)
     for turn in range(60):
-        with np.errstate(all="ignore"):
-            ratio = at_low / (at_low - at_high)
+        ratio = at_low / (at_low - at_high)
         ratio = np.where(np.isfinite(ratio) & (turn % 4 != 3), ratio, 0.5)
         guess = np.minimum(np.maximum(low + ratio * (high - low), low), high)
         there = batch.evaluate(curve[left], guess)
