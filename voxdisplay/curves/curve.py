@@ -48,7 +48,7 @@ class Curve(ABC):
         super().__init_subclass__(**named)
         own = vars(cls)
         # What it inherits would speak of another formula, and prove another curve.
-        for name in ("degree", "together", "enclosure"):
+        for name in ("degree", "reentrant", "together", "enclosure"):
             if "position" in own and name not in own:
                 setattr(cls, name, vars(Curve)[name])
 
@@ -59,6 +59,11 @@ class Curve(ABC):
         A hint for sampling: a curve that turns rarely needs no close look.
         """
         return None
+
+    @property
+    def reentrant(self) -> bool:
+        """Whether it may be asked where it is from several threads at once."""
+        return False
 
     @abstractmethod
     def position(self, t: Floats) -> Floats:

@@ -129,6 +129,11 @@ class Parametric(Curve):
         self._position = expression.rows(formulas)
         self._derivative = _stacked(slopes)
 
+    @property
+    def reentrant(self) -> bool:
+        """Whether it is given by expressions, see `Curve.reentrant`: callables may not bear it."""
+        return bool(self._formulas)
+
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
         return self._position(t)

@@ -37,6 +37,7 @@ class Bezier(Curve):
     """
 
     t_range = (0.0, 1.0)
+    reentrant = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
@@ -105,6 +106,8 @@ class BSpline(Curve):
         True without knots: the curve is periodic, as smooth where it closes as anywhere.
 
     """
+
+    reentrant = True
 
     def __init__(
         self,
@@ -230,6 +233,8 @@ class CatmullRom(Curve):
         True: the curve goes on to the first point, smoothly.
 
     """
+
+    reentrant = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed

@@ -101,6 +101,11 @@ class Batch:
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
+    @property
+    def reentrant(self) -> bool:
+        """Whether `evaluate` may be called from several threads at once."""
+        return all(curve.reentrant for curve in self.curves)
+
     def name(self, index: int) -> str:
         """Give the beginning of a message about a curve: nothing if it is the only one."""
         return "" if self._number is None else f"curve {self._number + index}: "

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay import threads
 from voxdisplay.compiled import twin
 from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
 from voxdisplay.voxelize.events import Events, Voxels
@@ -22,6 +23,8 @@ from voxdisplay.voxelize.roots import TOLERANCE, cross
 # Knot intervals handled at once: enough to forget what a call costs, few enough for what is
 # computed per crossing to stay in cache.
 BLOCK = 1 << 14
+# So many blocks are worth threads.
+MANY = 8
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
 # the last bit, or lines along edges and diagonals waver.
 NUDGE = 1e-9
@@ -77,7 +80,8 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     parts = [(0, knots.t.size)]
     if knots.t.size > BLOCK:
         parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
-    found = list(map(crossings_of, parts))
+    apart = len(parts) >= MANY and batch.reentrant
+    found = list((threads.in_order if apart else map)(crossings_of, parts))
     crossings = found[0]
     if len(found) > 1:
         events = Events(
