@@ -39,6 +39,8 @@ TOGETHER = 1000
 ROUNDED = 1 << 18
 # Time enough to repeat what is slow, for each line of the table.
 PATIENCE_S = 6.0
+# What is fast is repeated for so long: a few runs of some milliseconds say little.
+ENOUGH_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -207,10 +209,12 @@ def opened(voxels: Voxels, closed: bool) -> Voxels:
 
 
 def timed(function: Callable[[], object], repeats: int) -> tuple[float, int]:
-    """Give the median of a few runs after a first one, in seconds, and how many there were."""
+    """Give the median of some runs after a first one, in seconds, and how many there were."""
     seconds: list[float] = []
     first_s = stopwatch(function)
-    while len(seconds) < repeats and (len(seconds) + 1) * first_s < PATIENCE_S:
+    while (len(seconds) < repeats or sum(seconds) < ENOUGH_S) and (
+        (len(seconds) + 1) * first_s < PATIENCE_S
+    ):
         seconds.append(stopwatch(function))
     return statistics.median(seconds or [first_s]), max(len(seconds), 1)
 

@@ -82,7 +82,7 @@ def jit(function: Kernel) -> Kernel:
 
     # No fastmath, and a division by 0 is infinite: all as in numpy.
     try:
-        kernel: Kernel = njit(cache=True, error_model="numpy")(function)
+        kernel: Kernel = njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # there is no place to keep it
-        kernel = njit(error_model="numpy")(function)
+        kernel = njit(nogil=True, error_model="numpy")(function)
     return kernel

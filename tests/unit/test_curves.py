@@ -407,3 +407,26 @@ class TestParametric:
 def test_what_curves_cannot_be_made_from(make: object, message: str) -> None:
     with pytest.raises(CurveError, match=message):
         make()  # type: ignore[operator]
+
+
+def test_polynomials_say_their_degree() -> None:
+    spline = Bezier(ZIGZAG)
+    assert spline.degree == len(ZIGZAG) - 1
+    assert Transformed(spline, 2.0).degree == spline.degree
+    assert Segment((1, 2, 3), (2, 4, 7)).degree == Polyline(ZIGZAG).degree == 1
+    assert Circle((0, 0, 0), 1).degree is None
+
+
+def test_a_subclass_with_another_position_has_no_degree() -> None:
+    class Waves(Bezier):
+        def position(self, t: np.ndarray) -> np.ndarray:
+            return super().position(t) + np.sin(99 * t)
+
+    class Shifted(Bezier):
+        degree = 5
+
+        def position(self, t: np.ndarray) -> np.ndarray:
+            return super().position(t) + t**5
+
+    assert Waves(ZIGZAG).degree is None
+    assert Shifted(ZIGZAG).degree == 5

@@ -48,10 +48,22 @@ class Curve(ABC):
         super().__init_subclass__(**named)
         own = vars(cls)
         # What it inherits would speak of another formula, and prove another curve.
-        if "position" in own and "together" not in own:
-            cls.together = staticmethod(Curve.together)  # type: ignore[method-assign]
-        if "position" in own and "enclosure" not in own:
-            cls.enclosure = Curve.enclosure  # type: ignore[method-assign]
+        for name in ("degree", "reentrant", "together", "enclosure"):
+            if "position" in own and name not in own:
+                setattr(cls, name, vars(Curve)[name])
+
+    @property
+    def degree(self) -> int | None:
+        """That of the polynomials of t that x, y and z are, between breaks; None: they are not.
+
+        A hint for sampling: a curve that turns rarely needs no close look.
+        """
+        return None
+
+    @property
+    def reentrant(self) -> bool:
+        """Whether it may be asked where it is from several threads at once."""
+        return False
 
     @abstractmethod
     def position(self, t: Floats) -> Floats:

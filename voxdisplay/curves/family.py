@@ -9,16 +9,20 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from voxdisplay import threads
 from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
 
 # Points per call: what is computed for so many stays in a core's cache. Families have the numbers
 # of their curves beside each point.
 CALL = 1 << 14
 FAMILY_CALL = 1 << 11
+# So many calls are worth threads.
+MANY = 8
 # Smaller families are not worth the arrays that hold them.
 SMALLEST = 4
 
@@ -35,7 +39,7 @@ class Curves:
     def __init__(self, curves: Sequence[Curve]) -> None:
         self._curves = curves
         families = defaultdict(list)
-        for index, curve in enumerate(curves):
+        for index, curve in enumerate(curves if len(curves) >= SMALLEST else ()):
             if curve.family is not None:
                 families[curve.together, curve.family].append(index)
         self._evaluate: list[Evaluate] = []
@@ -75,8 +79,15 @@ class Curves:
             return points
         edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1 if curve[0] < curve[-1] else curve[:0]
         for start, stop in pairwise([0, *edges.tolist(), t.size]):
-            position = self._curves[curve[start]].position
-            for low in range(start, stop, CALL):
-                high = min(low + CALL, stop)
-                points[:, low:high] = position(t[low:high])
+            own = self._curves[curve[start]]
+            fill = partial(_fill, own, t[start:stop], points[:, start:stop])
+            parts = range(0, stop - start, CALL)
+            apart = len(parts) >= MANY and own.reentrant
+            for _ in (threads.in_order if apart else map)(fill, parts):
+                pass
         return points
+
+
+def _fill(curve: Curve, t: Floats, points: Floats, low: int) -> None:
+    high = low + CALL
+    points[:, low:high] = curve.position(t[low:high])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from voxdisplay.curves.interval import Interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Operation:
     """One operation on float64 arrays.
 

@@ -7,7 +7,6 @@ through, and are the business of whoever draws the curve.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, overload
 
 import numpy as np
@@ -127,8 +126,13 @@ class Parametric(Curve):
             formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
             for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
         ]
-        self._position = partial(expression.rows, formulas)
+        self._position = expression.rows(formulas)
         self._derivative = _stacked(slopes)
+
+    @property
+    def reentrant(self) -> bool:
+        """Whether it is given by expressions, see `Curve.reentrant`: callables may not bear it."""
+        return bool(self._formulas)
 
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""

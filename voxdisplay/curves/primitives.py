@@ -38,6 +38,8 @@ class Polyline(Curve):
 
     """
 
+    degree = 1
+    reentrant = True
     _least = 2
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
@@ -108,6 +110,7 @@ class _Turning(Curve):
     """P(t) = center + cos(t) a + sin(t) b + t rise: all that turns evenly."""
 
     family = "turning"
+    reentrant = True
 
     def __init__(
         self,
@@ -291,6 +294,7 @@ class Lissajous(Curve):
     """
 
     t_range = (0.0, math.tau)
+    reentrant = True
 
     def __init__(
         self,
@@ -340,6 +344,7 @@ class TorusKnot(Curve):
     """
 
     t_range = (0.0, math.tau)
+    reentrant = True
 
     def __init__(
         self,

@@ -37,6 +37,7 @@ class Bezier(Curve):
     """
 
     t_range = (0.0, 1.0)
+    reentrant = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
@@ -44,6 +45,11 @@ class Bezier(Curve):
         _check_degree("points", len(self._points) - 1)
         self.family = len(self._points)
         self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
+
+    @property
+    def degree(self) -> int:
+        """How often t is multiplied by itself, at most."""
+        return len(self._points) - 1
 
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
@@ -100,6 +106,8 @@ class BSpline(Curve):
         True without knots: the curve is periodic, as smooth where it closes as anywhere.
 
     """
+
+    reentrant = True
 
     def __init__(
         self,
@@ -225,6 +233,8 @@ class CatmullRom(Curve):
         True: the curve goes on to the first point, smoothly.
 
     """
+
+    reentrant = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed

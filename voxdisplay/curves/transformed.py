@@ -38,6 +38,16 @@ class Transformed(Curve):
         if curve.family is not None:
             self.family = (type(curve).together, curve.family)
 
+    @property
+    def degree(self) -> int | None:
+        """That of the curve inside, see `Curve.degree`."""
+        return self.curve.degree
+
+    @property
+    def reentrant(self) -> bool:
+        """Whether the curve inside is, see `Curve.reentrant`."""
+        return self.curve.reentrant
+
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
         return self.scale * self.curve.position(t) + self.offset[:, None]

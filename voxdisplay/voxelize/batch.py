@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,11 @@ class Samples:
     @property
     def bounds(self) -> Ints:
         """Index of the first sample of each piece, and K: (pieces + 1,)."""
-        return np.searchsorted(self.piece, np.arange(self.curve.size + 1))
+        return self.piece.searchsorted(np.arange(self.curve.size + 1))
 
     def curve_starts(self, curves: int) -> Ints:
         """Index of the first sample of each of so many curves: (curves,)."""
-        return self.bounds[np.searchsorted(self.curve, np.arange(curves))]
+        return self.bounds[self.curve.searchsorted(np.arange(curves))]
 
 
 class Batch:
@@ -86,7 +87,8 @@ class Batch:
     def __init__(self, curves: Iterable[Curve], number: int | None = None) -> None:
         self.curves = list(curves)
         self._number = number
-        ranges = np.array([curve.t_range for curve in self.curves], dtype=float).reshape(-1, 2)
+        ends = chain.from_iterable([curve.t_range for curve in self.curves])
+        ranges = np.fromiter(ends, dtype=float).reshape(-1, 2)
         self.first, self.last = ranges.T
         good = np.isfinite(ranges).all(axis=1) & (self.first < self.last)
         if not good.all():
@@ -99,10 +101,16 @@ class Batch:
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
+    @property
+    def reentrant(self) -> bool:
+        """Whether `evaluate` may be called from several threads at once."""
+        return all(curve.reentrant for curve in self.curves)
+
     def name(self, index: int) -> str:
         """Give the beginning of a message about a curve: nothing if it is the only one."""
         return "" if self._number is None else f"curve {self._number + index}: "
 
+    @np.errstate(all="ignore")
     def evaluate(self, curve: Ints, t: Floats) -> Floats:
         """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).
 
@@ -112,10 +120,9 @@ class Batch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        with np.errstate(all="ignore"):
-            points = self._positions(curve, t)
-            # And so not where P is not a number: it would be least and greatest.
-            near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
+        points = self._positions(curve, t)
+        # And so not where P is not a number: it would be least and greatest.
+        near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
         if not near:
             at = int(np.argmin((np.abs(points) < FARTHEST).all(axis=0)))
             raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])
@@ -141,9 +148,9 @@ class Batch:
             Into how many parts each step is cut; 1 leaves it as it is.
 
         """
-        cut = np.flatnonzero(parts > 1)
+        cut = (parts > 1).nonzero()[0]
         count = parts[cut] - 1
-        left = np.repeat(cut, count)
+        left = cut.repeat(count)
         nth = spread(np.ones_like(count), count)
         t_left = samples.t[left]
         t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])

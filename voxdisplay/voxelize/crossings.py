@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay import threads
 from voxdisplay.compiled import twin
 from voxdisplay.voxelize.batch import Batch, Floats, Ints, Samples
 from voxdisplay.voxelize.events import Events, Voxels
@@ -22,11 +23,15 @@ from voxdisplay.voxelize.roots import TOLERANCE, cross
 # Knot intervals handled at once: enough to forget what a call costs, few enough for what is
 # computed per crossing to stay in cache.
 BLOCK = 1 << 14
+# So many blocks are worth threads.
+MANY = 8
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
 # the last bit, or lines along edges and diagonals waver.
 NUDGE = 1e-9
 # A corner must be better by this much, in square voxels, to be preferred to the nearest one.
 MARGIN = 1e-8
+
+Ends = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +73,15 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     Their events are connected only where one axis goes on to dominate.
     """
     slopes = slopes_at(knots)
-    starts = knots.curve_starts(len(batch.curves))
-    found = [
-        _crossings_of(batch, knots, slopes, aim(knots, slopes, low, high))
-        for low, high in blocks(starts, knots.t.size, BLOCK)
-    ]
+
+    def crossings_of(block: tuple[int, int]) -> Crossings:
+        return _crossings_of(batch, knots, slopes, aim(knots, slopes, *block))
+
+    parts = [(0, knots.t.size)]
+    if knots.t.size > BLOCK:
+        parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
+    apart = len(parts) >= MANY and batch.reentrant
+    found = list((threads.in_order if apart else map)(crossings_of, parts))
     crossings = found[0]
     if len(found) > 1:
         events = Events(
@@ -93,29 +102,31 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
 
 
 @twin
+@np.errstate(all="ignore")
 def slopes_at(knots: Samples) -> Floats:
     """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
     joined = knots.joined
     h = np.where(joined, knots.t[1:] - knots.t[:-1], 1.0)
     slopes = np.zeros_like(knots.points)
-    with np.errstate(all="ignore"):
-        velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
-        slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
-        inner = np.zeros(knots.t.size, dtype=bool)
-        inner[1:-1] = joined[1:] & joined[:-1]
-        bounds = knots.bounds
-        first, last = bounds[:-1], bounds[1:] - 1
-        slopes[:, first[first == last]] = 0.0
-        first, last = first[first < last], last[first < last]
-        for end, other, step in ((first, first + 1, first), (last, last - 1, last - 1)):
-            # On a parabola the slopes at both ends of a step average to its velocity.
-            slopes[:, end] = np.where(
-                inner[other], 2 * velocity[:, step] - slopes[:, other], velocity[:, step]
-            )
+    velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
+    slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
+    inner = np.zeros(knots.t.size, dtype=bool)
+    inner[1:-1] = joined[1:] & joined[:-1]
+    bounds = knots.bounds
+    first, last = bounds[:-1], bounds[1:] - 1
+    alone = first == last
+    if alone.any():
+        slopes[:, first[alone]] = 0.0
+        first, last = first[~alone], last[~alone]
+    end, other = np.concatenate((first, last)), np.concatenate((first + 1, last - 1))
+    step = velocity.take(np.concatenate((first, last - 1)), axis=1)
+    # On a parabola the slopes at both ends of a step average to its velocity.
+    slopes[:, end] = np.where(inner[other], 2 * step - slopes.take(other, axis=1), step)
     return slopes
 
 
 @twin
+@np.errstate(all="ignore")
 def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
     stop = min(high + 1, knots.t.size)
@@ -128,18 +139,17 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
         (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
     ).astype(np.int8)
     passed = _of_axis(cells[:, 1:] - cells[:, :-1], axis)
-    step = np.flatnonzero(
-        (passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])
-    )
+    step = ((passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])).nonzero()[
+        0
+    ]
     axis, passed = axis[step], passed[step]
     left = low + step
     at = axis * np.int64(knots.t.size) + left  # of flat rows
     h = knots.t[left + 1] - knots.t[left]
     begin = knots.points.take(at)
     length = knots.points.take(at + 1) - begin
-    with np.errstate(all="ignore"):
-        m_left = length / (slopes.take(at) * h)
-        m_right = length / (slopes.take(at + 1) * h)
+    m_left = length / (slopes.take(at) * h)
+    m_right = length / (slopes.take(at + 1) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
     m_left[~((m_left > 0) & (m_left < 3))] = 1.0
     m_right[~((m_right > 0) & (m_right < 3))] = 1.0
@@ -166,7 +176,7 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
     points = batch.evaluate(curve, t)
     found = np.ones(t.size, dtype=bool)
     miss = _of_axis(points, axis) - aims.level
-    off = np.flatnonzero(np.abs(miss) > TOLERANCE)
+    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
     if off.size:
         level = aims.level[off]
         bracket, ends = _brackets(knots, aims, miss, off)
@@ -177,7 +187,7 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
         tau[off] = (t[off] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
 
     nearest, better, gain, foot = corners(knots, slopes, aims, points)
-    check = np.flatnonzero(np.isfinite(foot))
+    check = np.isfinite(foot).nonzero()[0]
     if check.size:  # at the foot of the perpendicular the curve must be near enough
         left = aims.knot[check]
         t_foot = np.clip(
@@ -196,20 +206,17 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
     return Crossings(events.take(found), better[:, found], gain[found])
 
 
-def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Floats, Floats]:
+def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
     """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
     left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
     begin = _of_axis(knots.points[:, left], axis)
     length = _of_axis(knots.points[:, left + 1], axis) - begin
     h = knots.t[left + 1] - knots.t[left]
-    bracket = np.stack((knots.t[left], knots.t[left] + h))
-    ends = np.stack((begin - level, begin + length - level))
-    after = (miss[off] < 0) == (ends[0] < 0)  # the crossing comes after the guess
-    bracket[0] = np.where(after, t, bracket[0])
-    ends[0] = np.where(after, miss[off], ends[0])
-    bracket[1] = np.where(after, bracket[1], t)
-    ends[1] = np.where(after, ends[1], miss[off])
-    return bracket, ends
+    low, high = knots.t[left], knots.t[left] + h
+    at_low, at_high = begin - level, begin + length - level
+    after = (miss[off] < 0) == (at_low < 0)  # the crossing comes after the guess
+    bracket = np.where(after, t, low), np.where(after, high, t)
+    return bracket, (np.where(after, miss[off], at_low), np.where(after, at_high, miss[off]))
 
 
 @twin
@@ -244,8 +251,9 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
     """
     left, axis, tau = aims.knot, aims.axis, aims.tau
     nearest = np.floor(points + NUDGE)
+    plane = aims.level - 0.5
     for row in range(3):
-        np.copyto(nearest[row], aims.level - 0.5, where=axis == row)
+        np.copyto(nearest[row], plane, where=axis == row)
     h = knots.t[left + 1] - knots.t[left]
     tangent = slopes.take(left, axis=1) * h  # per step, not per t
     after = slopes.take(left + 1, axis=1) * h
@@ -272,7 +280,7 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
 
     nearest = nearest.astype(np.int32)
     better, gain, foot = nearest.copy(), np.full(axis.size, np.inf), np.full(axis.size, np.inf)
-    moved = np.flatnonzero(best < 0)
+    moved = (best < 0).nonzero()[0]
     gain[moved] = -best[moved]
     axis, both, other = axis[moved], both[moved], other[moved]
     apart, along = apart.take(moved, axis=1), along.take(moved, axis=1)
@@ -282,7 +290,7 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
         step = np.where(apart[across, each] > 0, -1, 1) * moves
         better[across, moved] += step
         apart[across, each] += step
-    far = np.flatnonzero((apart * apart).sum(axis=0) > 0.5)
+    far = ((apart * apart).sum(axis=0) > 0.5).nonzero()[0]
     foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
     return Corners(nearest, better, gain, foot)
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
-from voxdisplay import compiled
+from voxdisplay import compiled, threads
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import Batch, Ints, Samples
@@ -26,7 +27,7 @@ from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
 
 # Curves handled at once: enough to forget what a batch costs, but not many if they are long.
-CURVES = 2048
+CURVES = 4096
 VOXELS = 2_000_000
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
 TOUCH = 1e-3
@@ -39,14 +40,22 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
     curves = list(curves)
     sequences: list[Sequence] = []
-    size = 16
-    while rest := curves[len(sequences) : len(sequences) + size]:
-        batch = Batch(rest, len(sequences) if len(curves) > 1 else None)
-        ahead = (len(curves) - len(sequences)) / len(rest)
-        fresh = list(_digitise(batch, ahead, certified=certified))
-        sequences += fresh
-        voxels = sum([len(sequence.voxels) for sequence in fresh])
-        size = min(CURVES, VOXELS * len(fresh) // voxels + 1)
+
+    def one_batch(low: int, size: int) -> list[Sequence]:
+        batch = Batch(curves[low : low + size], low if len(curves) > 1 else None)
+        ahead = (len(curves) - low) / len(batch.curves)
+        return list(_digitise(batch, ahead, certified=certified))
+
+    size, at_once = 16, 1
+    while (begin := len(sequences)) < len(curves):
+        end = min(begin + size * at_once, len(curves))
+        apart = at_once > 1 and all(curve.reentrant for curve in curves[begin:end])
+        do = threads.in_order if apart else map
+        for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
+            sequences += fresh
+        voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
+        at_once = threads.processors()
+        size = min(CURVES, VOXELS // at_once * (end - begin) // voxels + 1)
     return sequences
 
 

@@ -78,4 +78,5 @@ def near(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
 @twin
 def torn(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
     """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
-    return np.flatnonzero((piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:]))
+    apart = (piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:])
+    return np.asarray(apart.nonzero()[0])

@@ -31,6 +31,7 @@ from voxdisplay.voxelize.roots import cross
 # Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
 # Below 1 a step passes at most one plane of an axis; each further try is a finer look.
 LOOKS = (0.7, 0.35, 0.17, 0.08)
+QUARTERS = np.linspace(0.0, 1.0, 5)
 
 
 def trace(batch: Batch, knots: Samples) -> Events:
@@ -71,12 +72,13 @@ def trace_everything(batch: Batch, samples: Samples) -> Events:
 def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     """Put the voxels of each piece's first and last point around its crossings."""
     inner, bounds = crossings.events, knots.bounds
-    ends = np.stack((bounds[:-1], bounds[1:] - 1), axis=1).ravel()
+    ends = bounds.repeat(2)[1:-1]
+    ends[1::2] -= 1
     piece = knots.piece[ends].astype(np.int32)
-    around = np.searchsorted(inner.piece, np.arange(bounds.size))
-    at = np.stack((around[:-1], around[1:]), axis=1).ravel()
+    around = inner.piece.searchsorted(np.arange(bounds.size))
+    at = around.repeat(2)[1:-1]
 
-    voxels = np.floor(knots.points[:, ends]).astype(np.int32)
+    voxels = np.floor(knots.points.take(ends, axis=1)).astype(np.int32)
     heading, gain = np.full(ends.size, OTHER), np.full(ends.size, np.inf)
     *events, better, gain = insert(
         at,
@@ -132,29 +134,30 @@ def _samples_between(
     batch: Batch, events: Events, gaps: Ints, curve: Ints, longest: float
 ) -> Samples:
     """Sample the curves from event k to k + 1 for each k in ``gaps``; a "piece" is one gap."""
-    ends = events.t[gaps], events.t[gaps + 1]
-    t = np.stack([(1 - s) * ends[0] + s * ends[1] for s in (0, 0.25, 0.5, 0.75, 1)], axis=1)
-    gap = np.repeat(np.arange(gaps.size), t.shape[1])
+    begin, end = events.t[gaps, None], events.t[gaps + 1, None]
+    t = ((1 - QUARTERS) * begin + QUARTERS * end).ravel()
+    gap = np.arange(gaps.size).repeat(QUARTERS.size)
     of_gap = curve[events.piece[gaps]]
-    points = batch.evaluate(of_gap[gap], t.ravel())
-    return refine(batch, Samples(gap, t.ravel(), points, of_gap), longest)
+    points = batch.evaluate(of_gap[gap], t)
+    return refine(batch, Samples(gap, t, points, of_gap), longest)
 
 
 def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
     """Find the crossings of mid-planes of all axes, in order: piece, t and nearest voxel."""
     cells = np.floor(samples.points - 0.5)
     passed = np.abs(cells[:, 1:] - cells[:, :-1]) == 1
-    step, axis = np.nonzero((passed & samples.joined).T)
-    level = np.maximum(cells[axis, step], cells[axis, step + 1]) + 0.5
+    step, axis = (passed & samples.joined).T.nonzero()
+    at = axis * samples.t.size + step  # of flat rows
+    level = np.maximum(cells.take(at), cells.take(at + 1)) + 0.5
     piece = samples.piece[step]
-    bracket = np.stack((samples.t[step], samples.t[step + 1]))
-    ends = np.stack((samples.points[axis, step], samples.points[axis, step + 1])) - level
+    bracket = samples.t[step], samples.t[step + 1]
+    ends = samples.points.take(at) - level, samples.points.take(at + 1) - level
     t, points, found = cross(batch, samples.curve[piece], axis, level, bracket, ends)
     voxels = np.floor(points + NUDGE)
     voxels[axis, np.arange(axis.size)] = level - 0.5
     order = np.lexsort((t, piece))
     order = order[found[order]]
-    return piece[order], t[order], voxels[:, order].astype(np.int32)
+    return piece[order], t[order], voxels.take(order, axis=1).astype(np.int32)
 
 
 def _fill(events: Events, gaps: Ints, gap: Ints, t: Floats, voxels: Voxels) -> Events:

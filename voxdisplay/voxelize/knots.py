@@ -7,6 +7,8 @@ know what a voxel sequence is.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from voxdisplay.compiled import twin
@@ -27,10 +29,22 @@ PARTS = 16
 # from a step between adjacent voxels.
 JUMP = 1.0
 
-# The first look at a curve: 65 parameters, evenly spread but for a jitter (multiples of the golden
-# ratio, modulo 1), so that no oscillation can hide between them by having their period.
-_LOOK = np.linspace(0.0, 1.0, 65)
-_LOOK[1:-1] += (np.arange(1, 64) * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6 / 64
+# The first look at a curve: so many steps. A polynomial turns so rarely that fewer show it.
+LOOK = 64
+LOOK_PER_COEFFICIENT = 4
+
+
+@cache
+def _look(degree: int | None) -> Floats:
+    """Give the parameters of the first look, as shares of the range.
+
+    They are spread evenly but for a jitter (multiples of the golden ratio, modulo 1), so that no
+    oscillation can hide between them by having their period.
+    """
+    steps = LOOK if degree is None else min(LOOK_PER_COEFFICIENT * (degree + 1), LOOK)
+    look = np.linspace(0.0, 1.0, steps + 1)
+    look[1:-1] += (np.arange(1, steps) * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6 / steps
+    return look
 
 
 def knots(batch: Batch) -> Samples:
@@ -88,23 +102,31 @@ def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
 
 def first_look(batch: Batch) -> Samples:
     """Sample curves, one piece for each, before anything is known of them."""
-    t = batch.first[:, None] + (batch.last - batch.first)[:, None] * _LOOK
-    t[:, -1] = batch.last
-    index = np.arange(len(batch.curves))
+    looks = [_look(curve.degree) for curve in batch.curves]
+    index = np.arange(len(looks))
+    piece = index.repeat([look.size for look in looks])
+    t = batch.first[piece] + (batch.last - batch.first)[piece] * np.concatenate(looks)
+    t[np.append(piece[1:] != piece[:-1], True)] = batch.last
     breaks = [curve.breaks for curve in batch.curves]
-    if not any(each.size for each in breaks if each is not Curve.breaks):
-        piece = np.repeat(index, _LOOK.size)
-        return Samples(piece, t.ravel(), batch.evaluate(piece, t.ravel()), index)
-    looks = []
-    for look, curve in zip(t, batch.curves, strict=True):
-        inside = (curve.breaks > look[0]) & (curve.breaks < look[-1])
-        looks.append(np.union1d(look, curve.breaks[inside]))
-    piece = np.repeat(index, [look.size for look in looks])
-    flat = np.concatenate(looks)
-    return Samples(piece, flat, batch.evaluate(piece, flat), index)
+    if any(each.size for each in breaks if each is not Curve.breaks):
+        piece, t = _with_breaks(batch, piece, t, breaks)
+    return Samples(piece, t, batch.evaluate(piece, t), index)
+
+
+def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> tuple[Ints, Floats]:
+    """Put the parameters where curves may turn sharply between others."""
+    of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
+    turn = np.concatenate(breaks)
+    inside = (turn > batch.first[of]) & (turn < batch.last[of])
+    piece, t = np.append(piece, of[inside]), np.append(t, turn[inside])
+    order = np.lexsort((t, piece))
+    piece, t = piece[order], t[order]
+    fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
+    return piece[fresh], t[fresh]
 
 
 @twin
+@np.errstate(all="ignore")
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
@@ -112,20 +134,21 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     step = samples.points[:, 1:] - samples.points[:, :-1]
     chord = np.abs(step).max(axis=0)
     chord[~joined] = 0.0
-    with np.errstate(all="ignore"):
-        velocity = step / h
-        turn = np.abs(velocity[:, 1:] - velocity[:, :-1]).max(axis=0) / (h[1:] + h[:-1])
-        turn[~(joined[1:] & joined[:-1])] = 0.0
-        second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
-        second[1:] = turn
-        second[:-1] = np.maximum(second[:-1], turn)
-        bend = h * h * second / 4
-        wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+    velocity = step / h
+    turn = np.abs(velocity[:, 1:] - velocity[:, :-1]).max(axis=0) / (h[1:] + h[:-1])
+    turn[~(joined[1:] & joined[:-1])] = 0.0
+    second = np.zeros(h.size)  # |P''| / 2 over a step: the larger of its two ends
+    second[1:] = turn
+    second[:-1] = np.maximum(second[:-1], turn)
+    bend = h * h * second / 4
+    wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+    parts = np.ones(h.size, dtype=np.int64)
+    cut = (joined & (wanted > 1)).nonzero()[0]  # not where the bend is not a number
+    if cut.size:
         # Parts must stay distinct parameters.
-        possible = np.floor(h / resolution[samples.curve[samples.piece[:-1]]])
-        parts = np.minimum(np.minimum(wanted, possible), PARTS)
-    parts[~(joined & (parts > 1))] = 1.0  # and where the bend is not a number
-    return parts.astype(np.int64), chord
+        possible = np.floor(h[cut] / resolution[samples.curve[samples.piece[cut]]])
+        parts[cut] = np.maximum(np.minimum(np.minimum(wanted[cut], possible), PARTS), 1)
+    return parts, chord
 
 
 def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:
@@ -138,7 +161,7 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
-    excess = np.flatnonzero((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    excess = ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles).nonzero()[0]
     if not excess.size:
         return
     index = int(excess[0])

@@ -8,7 +8,7 @@ is, as points: what turns back within two voxels, as a hairpin does, may not los
 from __future__ import annotations
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from voxdisplay.compiled import twin
@@ -29,8 +29,7 @@ REACH = 2.0
 def without_repeats(events: Events) -> Events:
     """Drop events whose voxel is that of the event before them in the piece."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    keep = np.concatenate(([True], ~same))
-    return events.take(keep)
+    return events.take(np.concatenate(([True], ~same))) if same.any() else events
 
 
 @twin
@@ -69,7 +68,7 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
         change[stop] -= 1
         thin = without_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
     # A piece ends where it ends, even if its last voxel was reached before.
-    last, thin_last = (np.flatnonzero(np.append(~each.joined, True)) for each in (full, thin))
+    last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
     thin.t[thin_last] = full.t[last]
     return thin
 
@@ -79,12 +78,13 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
 
     Events that run on have no chord among them: they are as far apart as their indices are.
     """
-    heading, voxels = events.heading[1:], events.voxels
-    on = np.zeros(events.t.size, dtype=bool)
-    on[1:] = events.joined & (heading == events.heading[:-1]) & (heading != OTHER)
-    for axis in range(3):
-        step = voxels[axis, 1:] - voxels[axis, :-1]
-        on[1:] &= (heading >> 1 != axis) | (step == 1 - 2 * (heading & 1))
+    heading, size = events.heading, events.t.size
+    on = np.zeros(size, dtype=bool)
+    on[1:] = events.joined & (heading[1:] == heading[:-1]) & (heading[1:] != OTHER)
+    along = on.nonzero()[0]
+    at = (heading[along] >> 1) * np.int64(size) + along  # of flat rows
+    step = events.voxels.take(at) - events.voxels.take(at - 1)
+    on[along] = step == 1 - 2 * (heading[along] & 1)
     return on
 
 
@@ -94,15 +94,15 @@ def _short_cuts(
     """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
-    turn = np.flatnonzero(~runs_on(events))
+    turn = (~runs_on(events)).nonzero()[0]
     reach = np.bincount(np.maximum(turn - WINDOW, 0), minlength=size + 1)
     reach -= np.bincount(np.minimum(turn + WINDOW, size), minlength=size + 1)
-    look = np.flatnonzero(np.cumsum(reach[:-1]) > 0)
+    look = (np.cumsum(reach[:-1]) > 0).nonzero()[0]
     if look.size < 3:
         return look[:0], look[:0]
     stretch = look - np.arange(look.size) + events.piece[look]
     leap = furthest(events.voxels.take(look, axis=1), stretch)
-    short = np.flatnonzero(leap > 1)
+    short = (leap > 1).nonzero()[0]
     if not short.size:
         return short, short
     starts, stops = look[short], look[short] + leap[short]
@@ -143,15 +143,14 @@ def _leave_behind(
 ) -> NDArray[np.bool_]:
     """Tell which short cuts leave a point of the curve out of ``REACH``."""
     # Complex numbers are ordered by their real parts, then by their imaginary ones.
-    order, piece = way.piece + 1j * way.t, events.piece[starts]
-    low = np.searchsorted(order, piece + 1j * events.t[starts])
-    count = np.searchsorted(order, piece + 1j * events.t[stops]) - low
-    of = np.repeat(np.arange(starts.size), count)
-    points = way.points[:, spread(low, count)]
-    far = np.ones(of.size, dtype=bool)
-    for end in (starts[of], stops[of]):
-        apart = points - (events.voxels[:, end] + 0.5)
-        far &= (apart * apart).sum(axis=0) > REACH * REACH
+    order = way.piece + 1j * way.t
+    ends = np.stack((starts, stops))
+    low, high = np.searchsorted(order, events.piece[starts] + 1j * events.t[ends])
+    count = high - low
+    of = np.arange(starts.size).repeat(count)
+    points = way.points.take(spread(low, count), axis=1)
+    apart = points[:, None] - (events.voxels.take(ends[:, of], axis=1) + 0.5)
+    far = ((apart * apart).sum(axis=0) > REACH * REACH).all(axis=0)
     behind = np.zeros(starts.size, dtype=bool)
     behind[of[far]] = True
     return behind
@@ -160,13 +159,14 @@ def _leave_behind(
 def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
     """Give J(i) - i for each of n voxels, (3, n), which are looked at within stretches (n,)."""
     leap = np.ones(stretch.size, dtype=np.int8)
-    rows = np.concatenate((voxels, 2 * stretch[None].astype(np.int32)))
-    touch = _touching(rows)
+    touch = _touching(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
     w, start = touch[1:].nonzero()
     if start.size:
         w += 2
-        ahead = np.logical_and.accumulate(touch).sum(axis=0)
-        behind = np.logical_and.accumulate(_touching(rows[:, ::-1])).sum(axis=0)[::-1]
+        back = np.zeros_like(touch)  # [w - 1, i] for voxels i - w and i
+        for row in range(min(WINDOW, stretch.size - 1)):
+            back[row, row + 1 :] = touch[row, : -row - 1]
+        ahead, behind = (np.logical_and.accumulate(each).sum(axis=0) for each in (touch, back))
         short = ahead[start] + behind[start + w] >= w - 1
         leap[start[short]] = w[short]  # of several for one voxel, the last: the furthest
     return leap
@@ -184,7 +184,9 @@ def _touching(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
     for low in range(0, size, BLOCK):
         here = rows[:, None, low : low + BLOCK]
         after = padded[:, low + 1 : low + here.shape[2] + WINDOW]
-        apart = np.abs(sliding_window_view(after, here.shape[2], axis=1) - here)
+        row, column = after.strides
+        windows = as_strided(after, (4, WINDOW, here.shape[2]), (row, column, column))
+        apart = np.abs(windows - here)
         # Only 0 and 1 give 0 or 1.
         touch[:, low : low + BLOCK] = np.bitwise_or.reduce(apart) <= 1
     return touch

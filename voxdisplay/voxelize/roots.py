@@ -13,8 +13,14 @@ from voxdisplay.voxelize.batch import Batch, Bools, Floats, Ints
 TOLERANCE = 2e-3
 
 
+@np.errstate(all="ignore")
 def cross(
-    batch: Batch, curve: Ints, axis: Ints, level: Floats, bracket: Floats, ends: Floats
+    batch: Batch,
+    curve: Ints,
+    axis: Ints,
+    level: Floats,
+    bracket: tuple[Floats, Floats],
+    ends: tuple[Floats, Floats],
 ) -> tuple[Floats, Floats, Bools]:
     """Find where coordinates take given values, by bracketed secants (the Illinois rule).
 
@@ -26,9 +32,9 @@ def cross(
         Which curve, ascending, and which of its coordinates.
     level : (n,) float64 array
         The value to be taken, in voxels.
-    bracket : (2, n) float64 array
+    bracket : (n,), (n,) float64 arrays
         Parameters with the crossing between them.
-    ends : (2, n) float64 array
+    ends : (n,), (n,) float64 arrays
         Coordinate minus level at the bracket's ends: of opposite sign, or 0.
 
     Returns
@@ -46,15 +52,17 @@ def cross(
     (low, high), (at_low, at_high) = bracket, ends
     side = np.zeros(curve.size, dtype=np.int8)
     for turn in range(60):
-        with np.errstate(all="ignore"):
-            ratio = at_low / (at_low - at_high)
+        ratio = at_low / (at_low - at_high)
         ratio = np.where(np.isfinite(ratio) & (turn % 4 != 3), ratio, 0.5)
         guess = np.minimum(np.maximum(low + ratio * (high - low), low), high)
         there = batch.evaluate(curve[left], guess)
         value = there[axis[left], np.arange(left.size)] - level[left]
         done = np.abs(value) <= TOLERANCE
+        there = there.take(done.nonzero()[0], axis=1)
         hit = left[done]
-        t[hit], points[:, hit], found[hit] = guess[done], there[:, done], True
+        t[hit], points[:, hit], found[hit] = guess[done], there, True
+        if hit.size == left.size:
+            break
         lost = high - low <= batch.resolution[curve[left]] / 4
         on = ~(done | lost)
         if not on.any():
