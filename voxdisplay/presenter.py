@@ -71,8 +71,7 @@ class Presenter:
                     return link.present_on(link.on_display, payloads, whole)
                 return link.present(whole())
         ticket = link.begin()
-        bytes_per_s = self._connection.bytes_per_s or UNKNOWN_BYTES_PER_S
-        coded = frame.coded(link.payload_bytes, self._worth_using, bytes_per_s)
+        coded = frame.coded(link.payload_bytes, self._worth_using, self._bytes_per_s)
         self._coder = _Coder(ticket, coded)
         return ticket
 
@@ -85,8 +84,12 @@ class Presenter:
         return frame.payloads(self._link.payload_bytes, self._worth_using)
 
     @property
+    def _bytes_per_s(self) -> float:
+        return self._connection.bytes_per_s or UNKNOWN_BYTES_PER_S
+
+    @property
     def _worth_using(self) -> tuple[str, ...]:
-        return worth_using(self._connection.info.features, self._connection.bytes_per_s)
+        return worth_using(self._connection.info.features, self._bytes_per_s)
 
     # -- on the way
 

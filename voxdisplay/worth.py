@@ -15,17 +15,17 @@ SLOW_BYTES_PER_S: Final = 25_000
 UNKNOWN_BYTES_PER_S: Final = 200_000
 
 
-def worth_using(features: Collection[str], bytes_per_s: float | None) -> tuple[str, ...]:
+def worth_using(features: Collection[str], bytes_per_s: float) -> tuple[str, ...]:
     """Leave out ARC on a line that is faster than its coder.
 
     Parameters
     ----------
     features : collection of str
         As in `DeviceInfo.features`.
-    bytes_per_s : float or None
-        What the line carries. None if nobody knows: then it may well be fast.
+    bytes_per_s : float
+        What the line carries.
 
     """
-    if bytes_per_s is not None and bytes_per_s < SLOW_BYTES_PER_S:
+    if bytes_per_s < SLOW_BYTES_PER_S:
         return tuple(features)
     return tuple(name for name in features if name != "arc")
