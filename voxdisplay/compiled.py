@@ -80,7 +80,8 @@ def jit(function: Kernel) -> Kernel:
     """
     from numba import njit  # noqa: PLC0415 - an extra, and slow
 
-    # No fastmath, and a division by 0 is infinite: all as in numpy.
+    # No fastmath, and a division by 0 is infinite: all as in numpy. And without Python's lock, for
+    # `voxdisplay.threads`.
     try:
         kernel: Kernel = njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # there is no place to keep it

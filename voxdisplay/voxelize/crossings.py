@@ -144,7 +144,7 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     ]
     axis, passed = axis[step], passed[step]
     left = low + step
-    at = axis * np.int64(knots.t.size) + left  # of flat rows
+    at = axis.astype(np.int64) * knots.t.size + left  # of flat rows
     h = knots.t[left + 1] - knots.t[left]
     begin = knots.points.take(at)
     length = knots.points.take(at + 1) - begin

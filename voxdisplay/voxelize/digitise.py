@@ -26,7 +26,8 @@ from voxdisplay.voxelize.reduce import reduce
 from voxdisplay.voxelize.seam import close_loop
 from voxdisplay.voxelize.sequence import Sequence
 
-# Curves handled at once: enough to forget what a batch costs, but not many if they are long.
+# Curves handled at once: enough to forget what a batch costs, but not many if they are long. So
+# many voxels may be in hand on all processors together.
 CURVES = 4096
 VOXELS = 2_000_000
 # Ends this near to each other, in voxels, are one point, if the curve does not say.

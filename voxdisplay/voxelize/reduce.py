@@ -82,7 +82,7 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     on = np.zeros(size, dtype=bool)
     on[1:] = events.joined & (heading[1:] == heading[:-1]) & (heading[1:] != OTHER)
     along = on.nonzero()[0]
-    at = (heading[along] >> 1) * np.int64(size) + along  # of flat rows
+    at = (heading[along] >> 1).astype(np.int64) * size + along  # of flat rows
     step = events.voxels.take(at) - events.voxels.take(at - 1)
     on[along] = step == 1 - 2 * (heading[along] & 1)
     return on
