@@ -44,6 +44,8 @@ def restarts_on_long_noise(patch):
     "7.8/bricks-outside",
     "7.8/colors-outside",
     "11/order-of-packet",
+    "4/answers-length",
+    "9.2/does-not-lapse",
     "11/first-op-first",
     "11/order-of-op",
     "11/flags-of-commit",
