@@ -32,6 +32,7 @@ class Silence:
         self._heard_s = self._progress_s = self._asked_s = now
         self._backoff = 1
         self._doubt = False
+        self._only_greets = False  # in doubt, it has answered HELLO
         self._asked: dict[int, float] = {}  # tag -> when
 
     def begin(self, now: float, refresh: int) -> None:
@@ -40,6 +41,7 @@ class Silence:
         # At most a round trip: the device may have had to start first.
         greeted_s = min(now - self._heard_s, self._patience_s / 4)
         self._first_timeout_s = max(FIRST_TIMEOUT_S, 2 * greeted_s)
+        self._only_greets = self._doubt
         self.rest(now)
 
     def forget(self, *, doubt: bool = False) -> None:
@@ -59,7 +61,7 @@ class Silence:
     def heard(self, now: float) -> None:
         """Note that the device has said something."""
         self._heard_s = now
-        self._doubt = False
+        self._doubt = self._only_greets = False
 
     def progress(self, now: float) -> None:
         """Note that something has arrived."""
@@ -118,6 +120,12 @@ class Silence:
 
     def error(self, now: float) -> TransportTimeout:
         """Give what is raised for silence."""
+        if self._only_greets:
+            return TransportTimeout(
+                f"the device answers HELLO, and has said nothing else for "
+                f"{now - self._heard_s:.1f} s",
+                hint="its firmware may be stuck, or the line loses most of what it says",
+            )
         return TransportTimeout(
             f"the device has been silent for {now - self._heard_s:.1f} s",
             hint="is it still plugged in and switched on?",
