@@ -48,6 +48,11 @@ def use(choice: bool | None) -> bool | None:
     return before
 
 
+def in_use() -> bool:
+    """Tell whether kernels are in use."""
+    return bool(_Choice.use)
+
+
 def _numba_works() -> bool:
     try:
         import_module("numba")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import voxdisplay as vd
-from voxdisplay import threads
+from voxdisplay import compiled, threads
 from voxdisplay.curves import Bezier, Circle, Curve, Segment, Transformed
 from voxdisplay.curves.family import CALL, MANY, Curves
 from voxdisplay.errors import CurveError
@@ -21,6 +21,7 @@ DIGITISE = import_module("voxdisplay.voxelize.digitise")
 @pytest.fixture(autouse=True)
 def three_processors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "processors", lambda: 3)
+    monkeypatch.setattr(compiled, "in_use", lambda: True)  # what batches are done apart for
 
 
 def beziers(count: int) -> list[Curve]:
@@ -89,6 +90,25 @@ def test_batches_are_the_same_on_any_number_of_processors(monkeypatch: pytest.Mo
     for one, other in zip(many, voxelize_many(curves), strict=True):
         assert one.voxels.tobytes() == other.voxels.tobytes()
         assert one.t.tobytes() == other.t.tobytes()
+
+
+@pytest.mark.parametrize("worth", [True, False])
+def test_batches_are_done_apart_where_it_is_worth_it(
+    worth: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(DIGITISE, "CURVES", 4)
+    monkeypatch.setattr(compiled, "in_use", lambda: worth)
+    asked: set[int] = set()
+
+    class Own(Segment):
+        reentrant = True
+
+        def position(self, t: np.ndarray) -> np.ndarray:
+            asked.add(threading.get_ident())
+            return super().position(t)
+
+    voxelize_many([Own((0, 0, 0), (9, 4, 7))] * 40)
+    assert (asked != {threading.get_ident()}) == worth
 
 
 @pytest.mark.parametrize("curve", ["formula", "circle", "bezier"])

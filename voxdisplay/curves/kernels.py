@@ -1,6 +1,7 @@
 """The compiled twins of functions of this package: see `voxdisplay.compiled`.
 
 What is computed, and in what order, is what numpy does in their place, so that all bits agree.
+Several threads may be in them at once.
 """
 
 from __future__ import annotations

@@ -50,7 +50,8 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     size, at_once = 16, 1
     while (begin := len(sequences)) < len(curves):
         end = min(begin + size * at_once, len(curves))
-        apart = at_once > 1 and all(curve.reentrant for curve in curves[begin:end])
+        # Many short array operations in numpy would only wait for each other.
+        apart = compiled.in_use() and all(curve.reentrant for curve in curves[begin:end])
         do = threads.in_order if apart else map
         for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
             sequences += fresh

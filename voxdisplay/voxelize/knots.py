@@ -155,9 +155,8 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     """Stop before the work gets out of hand: ``parts`` is what comes next."""
     if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
         return
-    curve = samples.piece[:-1]
-    length = np.bincount(curve, chord, len(batch.curves))
-    count = np.bincount(curve, parts, len(batch.curves))
+    starts = samples.bounds[:-1]
+    length, count = np.add.reduceat(chord, starts), np.add.reduceat(parts, starts)
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
@@ -165,7 +164,7 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     if not excess.size:
         return
     index = int(excess[0])
-    worst = int(np.argmax(np.where(curve == index, chord, -1.0)))
+    worst = int(np.argmax(np.where(samples.piece[:-1] == index, chord, -1.0)))
     if chord[worst] > max(0.1 * length[index], 1e3):
         raise _runs_off(batch, index, samples, worst)
     if length[index] > MOST_VOXELS:

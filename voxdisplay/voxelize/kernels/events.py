@@ -1,4 +1,7 @@
-"""From the voxels of crossings to sequences: the twins of `grid_plane`, `reduce` and others."""
+"""From the voxels of crossings to sequences: the twins of `grid_plane`, `reduce` and others.
+
+Several threads may be in them at once.
+"""
 
 from __future__ import annotations
 

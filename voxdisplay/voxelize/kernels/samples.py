@@ -1,4 +1,7 @@
-"""From samples to the voxels of crossings: the twins of `knots` and `crossings`."""
+"""From samples to the voxels of crossings: the twins of `knots` and `crossings`.
+
+Several threads may be in them at once.
+"""
 
 from __future__ import annotations
 
