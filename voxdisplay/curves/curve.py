@@ -46,8 +46,8 @@ class Curve(ABC):
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
-        # What it inherits from behind its position would speak of another formula, and prove another
-        # curve.
+        # What it inherits from behind its position would speak of another formula, and prove
+        # another curve.
         owners = {name: owner for owner in reversed(cls.__mro__) for name in vars(owner)}
         order = cls.__mro__.index
         for name in ("degree", "reentrant", "together", "enclosure"):
