@@ -105,6 +105,8 @@ class Presenter:
 
     def code(self) -> None:
         """Code a part of a frame; begin the newest if there is none and the line needs it."""
+        if not self._coder:  # an interrupt: what was lost by it nobody gives again
+            self._link.withdraw()
         if self._newest and not self._coder and self._may_begin:
             frame, self._newest = self._newest, None
             self._unwaited[self.present(frame)] = frame
@@ -112,8 +114,7 @@ class Presenter:
             try:
                 payloads = next(coder.payloads, None)
                 self._link.supply(coder.ticket, payloads or [], last=payloads is None)
-            except BaseException:  # an interrupt: what was lost by it nobody gives again
-                self._link.withdraw(coder.ticket)
+            except BaseException:
                 self._coder = None
                 raise
             if payloads is None:

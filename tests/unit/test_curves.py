@@ -430,3 +430,28 @@ def test_a_subclass_with_another_position_has_no_degree() -> None:
 
     assert Waves(ZIGZAG).degree is None
     assert Shifted(ZIGZAG).degree == 5
+
+
+def test_another_position_counts_wherever_it_is_inherited_from() -> None:
+    class Wave:
+        def position(self, t: np.ndarray) -> np.ndarray:
+            return super().position(t) + 9 * np.sin(20 * t)
+
+    class Waves(Wave, Bezier):
+        pass
+
+    class Same(Waves):
+        pass
+
+    class Named(Bezier):
+        name = "named"
+
+    for kind in (Waves, Same):
+        curve = kind(ZIGZAG)
+        assert (curve.degree, curve.reentrant) == (None, False)
+        assert curve.enclosure(np.zeros(1), np.ones(1)) is None
+        t = np.linspace(0, 1, 5)
+        at_once = kind.together([curve] * 4)(np.arange(5) % 4, t)
+        assert np.array_equal(at_once, curve.position(t))
+    assert Named(ZIGZAG).degree == len(ZIGZAG) - 1
+    assert Named(ZIGZAG).reentrant

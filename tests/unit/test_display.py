@@ -264,6 +264,30 @@ def test_a_frame_whose_coding_is_interrupted_is_never_shown(wait):
     assert_shows(pipe, last)
 
 
+@pytest.mark.parametrize("wait", [True, False])
+def test_an_interrupt_before_anything_is_coded_leaves_no_frame_that_never_ends(wait):
+    display, pipe = opened()
+    link = display._connection.link
+    begin = link.begin
+
+    def interrupted():
+        begin()
+        raise KeyboardInterrupt
+
+    link.begin = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        display.present(random_frame(display, 1), wait=wait)
+    link.begin = begin
+    turns = iter(range(99))
+    pipe.before_read = lambda: next(turns)
+    display.flush()
+    assert link.idle
+    pipe.before_read = lambda: None
+    frame = random_frame(display, 2)
+    display.present(frame)
+    assert_shows(pipe, frame)
+
+
 def test_an_interrupted_read_does_not_disturb_the_next():
     display, _ = opened()
     frame = random_frame(display, 1, 0.9)

@@ -46,10 +46,12 @@ class Curve(ABC):
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
-        own = vars(cls)
-        # What it inherits would speak of another formula, and prove another curve.
+        # What it inherits from behind its position would speak of another formula, and prove
+        # another curve.
+        owners = {name: owner for owner in reversed(cls.__mro__) for name in vars(owner)}
+        order = cls.__mro__.index
         for name in ("degree", "reentrant", "together", "enclosure"):
-            if "position" in own and name not in own:
+            if order(owners["position"]) < order(owners[name]):
                 setattr(cls, name, vars(Curve)[name])
 
     @property

@@ -123,12 +123,12 @@ class Frames:
                 frame.supply(payloads if payloads or frame.payloads or not last else [b""])
                 frame.open = not last
 
-    def withdraw(self, ticket: int) -> None:
-        """Give up a frame from `begin` whose last payloads will not come.
+    def withdraw(self) -> None:
+        """Give up what came from `begin`, if its last payloads are still to come.
 
         What has been sent of it is followed by the next frame, and dropped (section 6, point 6).
         """
-        self._queue = deque(frame for frame in self._queue if frame.ticket != ticket)
+        self._queue = deque(frame for frame in self._queue if not frame.open)
 
     def present_on(
         self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]

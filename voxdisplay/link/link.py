@@ -124,9 +124,9 @@ class Link:
         """Add payloads to a frame that was begun. See `Frames.supply`."""
         self._frames.supply(ticket, payloads, last=last)
 
-    def withdraw(self, ticket: int) -> None:
-        """Give up a frame that is still being coded. See `Frames.withdraw`."""
-        self._frames.withdraw(ticket)
+    def withdraw(self) -> None:
+        """Give up a frame that is still being coded, if there is one. See `Frames.withdraw`."""
+        self._frames.withdraw()
 
     def present_on(
         self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
