@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from typing import TypeVar
 
 import numpy as np
@@ -30,16 +31,21 @@ def in_order(function: Callable[[Part], Result], parts: Sequence[Part]) -> Itera
     """Give what a function gives for parts, in their order; the first error in it is raised.
 
     Within a part nothing is divided any further. A part must be worth some hundred microseconds,
-    and the function must bear being called from several threads at once.
+    and the function must bear being called from several threads at once; and twice for a part.
     """
     workers = min(processors(), len(parts))
     if workers < 2 or getattr(_this, "works", False):
         yield from map(function, parts)
         return
-    from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - most work is small
+    with ExitStack() as stack:
+        try:
+            from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - most work is small
 
-    with ThreadPoolExecutor(workers, initializer=_begin) as pool:
-        yield from pool.map(function, parts)
+            pool = stack.enter_context(ThreadPoolExecutor(workers, initializer=_begin))
+            results = pool.map(function, parts)
+        except RuntimeError:  # no thread may begin: there are too many, or the program is ending
+            results = map(function, parts)
+        yield from results
 
 
 def _begin() -> None:

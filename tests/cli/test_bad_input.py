@@ -105,3 +105,15 @@ def test_files_that_cannot_be_read(run, tmp_path):
 )
 def test_usage(run, arguments, words):
     refused(run(*arguments), *words)
+
+
+def test_a_display_that_is_too_large_for_this_machine(monkeypatch, capsys):
+    def too_large(*_shape, **_kind):
+        raise MemoryError("Unable to allocate 24.0 GiB")
+
+    monkeypatch.setattr("voxdisplay.Frame", too_large)
+    assert main(["plan", PAPER, "--size", "2048,2048,2048"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("voxdisplay: there is not enough memory: Unable to allocate 24.0 GiB")
+    assert main(["--debug", "plan", PAPER]) == 2
+    assert "Traceback" in capsys.readouterr().err

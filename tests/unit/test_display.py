@@ -288,6 +288,27 @@ def test_an_interrupt_before_anything_is_coded_leaves_no_frame_that_never_ends(w
     assert_shows(pipe, frame)
 
 
+@pytest.mark.parametrize("moment", [0, 1, 5, -1])
+def test_an_interrupt_while_a_packet_is_made_leaves_no_payload_out(monkeypatch, moment):
+    display, pipe = opened()
+    first, last = random_frame(display, 1, 0.9), random_frame(display, 2)
+    left = iter(range(moment % len(payloads_of(display, first)), -1, -1))
+    encode = packets.encode
+
+    def interrupted(packet):
+        if isinstance(packet, packets.Data) and next(left, None) == 0:
+            raise KeyboardInterrupt
+        return encode(packet)
+
+    monkeypatch.setattr(packets, "encode", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        display.present(first)
+    display.flush()
+    assert_shows(pipe, first)
+    assert display.present(last).digest == last.digest()
+    assert_shows(pipe, last)
+
+
 def test_an_interrupted_read_does_not_disturb_the_next():
     display, _ = opened()
     frame = random_frame(display, 1, 0.9)

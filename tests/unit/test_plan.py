@@ -185,6 +185,8 @@ def test_the_command_takes_features(capsys):
     scene = ["plan", "examples/paper-curve.json", "--features"]
     assert main([*scene, "box, LINE", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["features"] == ["line", "box"]
+    assert main([*scene, " none ", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["features"] == []
     assert main([*scene, "line,bix"]) == 2
     assert "'bix' is no feature: there are line, box" in capsys.readouterr().err
     offered = [item.value for item in FeaturesType().shell_complete(None, None, "line,o")]

@@ -1,5 +1,7 @@
 """Work on several processors: in order, at once where it may be, and with the same voxels."""
 
+import subprocess
+import sys
 import threading
 from importlib import import_module
 
@@ -58,6 +60,37 @@ def test_one_part_or_one_processor_needs_no_thread(monkeypatch: pytest.MonkeyPat
     assert list(threads.in_order(lambda _: threading.get_ident(), [0])) == [here]
     alone(monkeypatch)
     assert list(threads.in_order(lambda _: threading.get_ident(), range(4))) == [here] * 4
+
+
+@pytest.mark.parametrize("begun", [0, 1])
+def test_where_no_thread_may_begin_all_is_done_in_this_one(
+    monkeypatch: pytest.MonkeyPatch, begun: int
+) -> None:
+    monkeypatch.setattr(threads, "processors", lambda: 3)
+    start, left = threading.Thread.start, iter(range(begun))
+
+    def refused(thread: threading.Thread) -> None:
+        if next(left, None) is None:
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", refused)
+    assert list(threads.in_order(lambda part: part * part, [3, 5, 7])) == [9, 25, 49]
+
+
+def test_what_is_done_when_the_program_ends_is_done_without_threads() -> None:
+    program = (
+        "import atexit; from voxdisplay import threads; threads.processors = lambda: 3; "
+        "atexit.register(lambda: print(*threads.in_order(abs, [-3, 5, -7])))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("3 5 7\n", "")
 
 
 def test_the_first_error_in_order_is_raised() -> None:

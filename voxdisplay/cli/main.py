@@ -100,10 +100,19 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
         if debug:
             traceback.print_exc()
-        say(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
-        say("  please report it with what voxdisplay --debug ... prints")
-        return EXIT_INTERNAL
+        return _unforeseen(error)
     return ended if isinstance(ended, int) else 0
+
+
+def _unforeseen(error: Exception) -> int:
+    """Say what nobody has foreseen; give the exit code."""
+    if isinstance(error, MemoryError):
+        say(f"voxdisplay: there is not enough memory: {error}")
+        say("  take a smaller size, or draw less")
+        return EXIT_USAGE
+    say(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
+    say("  please report it with what voxdisplay --debug ... prints")
+    return EXIT_INTERNAL
 
 
 if __name__ == "__main__":

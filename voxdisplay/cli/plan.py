@@ -39,7 +39,7 @@ class FeaturesType(click.ParamType[tuple[str, ...]]):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, ...]:
         """Read them, or fail with a message."""
-        text = str(value).lower()
+        text = str(value).lower().strip()
         if text in ("all", "none"):
             return EVERY_FEATURE if text == "all" else ()
         names = [name.strip() for name in text.split(",")]

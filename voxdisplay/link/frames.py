@@ -200,17 +200,19 @@ class Frames:
             frame.payloads, frame.clear, frame.base = frame.whole() or [b""], True, None
             frame.rewind()
 
-    def enter(self, frame: QueuedFrame, seq: int) -> packets.Data:
-        """Give a frame's next packet."""
+    def next_packet(self, frame: QueuedFrame, seq: int) -> packets.Data:
+        """Give a frame's next packet; once that is in the window, `entered` is to be told."""
         if not frame.begun:
             frame.frame_id = self._next_id
             self._next_id = (frame.frame_id + 1) % _MODULUS
-        payload = frame.next_payload
+        last = not frame.open and frame.entered + 1 == len(frame.payloads)
+        flags = spec.DATA_FLAG_CLEAR * frame.clear | spec.DATA_FLAG_COMMIT * last
+        return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=frame.next_payload)
+
+    def entered(self, frame: QueuedFrame) -> None:
+        """Note that a frame's next packet is in the window: it will arrive."""
+        frame.unsent_bytes -= len(frame.next_payload)
         frame.entered += 1
-        frame.unsent_bytes -= len(payload)
-        flags = spec.DATA_FLAG_CLEAR * frame.clear
-        flags |= spec.DATA_FLAG_COMMIT * frame.all_entered
-        return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=payload)
 
     def shown(self, frame_id: int | None) -> int | None:
         """Take out the frame of a number that is shown, and all before it; give its ticket.

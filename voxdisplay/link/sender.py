@@ -123,8 +123,11 @@ class Sender:
                 if not self._window.has_room or self._too_much(size) or self._starves(size):
                     return
                 self._counters.packets += 1
-                data = self._frames.enter(frame, self._window.next_seq)
-                yield self._send(self._window.add(packets.encode(data)), now)
+                # In this order: an interrupt leaves no payload out.
+                data = self._frames.next_packet(frame, self._window.next_seq)
+                seq = self._window.add(packets.encode(data))
+                self._frames.entered(frame)
+                yield self._send(seq, now)
             if frame.open:  # those behind it wait for its last
                 return
 
