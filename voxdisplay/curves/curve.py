@@ -35,7 +35,8 @@ class Curve(ABC):
         Parameters inside the range, ascending, where the direction may turn sharply (the vertices
         of a polyline). A hint for sampling; never needed for correctness.
     family : hashable
-        What curves have in common that `together` takes. None: nothing, evaluate it by itself.
+        What curves of one class have in common that `together` takes, which have one ``degree``,
+        too, and are ``reentrant`` or not. None: nothing, evaluate it by itself.
 
     """
 

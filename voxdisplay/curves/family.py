@@ -8,14 +8,17 @@ its own ``position`` gives, to the last bit. Knows no formulas: those are the cu
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
 from voxdisplay import threads
 from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
+
+Common = TypeVar("Common")
 
 # Points per call: what is computed for so many stays in a core's cache. Families have the numbers
 # of their curves beside each point.
@@ -38,20 +41,27 @@ class Curves:
 
     def __init__(self, curves: Sequence[Curve]) -> None:
         self._curves = curves
-        families = defaultdict(list)
-        for index, curve in enumerate(curves if len(curves) >= SMALLEST else ()):
-            if curve.family is not None:
-                families[curve.together, curve.family].append(index)
+        # Those that are alike, by the first of them: one formula, one degree.
+        self._kinds = _kinds(curves)
         self._evaluate: list[Evaluate] = []
         self._family = np.full(len(curves), -1)  # which of these; -1: none
         self._member = np.zeros(len(curves), dtype=np.int64)  # which of its curves
-        for (together, _), members in families.items():
-            if len(members) >= SMALLEST:
+        for first, members in self._kinds:
+            if first.family is not None and len(members) >= SMALLEST:
                 self._family[members] = len(self._evaluate)
                 self._member[members] = np.arange(len(members))
-                self._evaluate.append(together([curves[index] for index in members]))
+                self._evaluate.append(first.together([curves[index] for index in members]))
 
         self._alike = len(self._evaluate) == 1 and bool((self._family == 0).all())
+
+    def of_each(self, get: Callable[[Curve], Common]) -> list[Common]:
+        """Give something of each curve that those of a family have in common."""
+        if len(self._kinds) == 1:
+            return [get(self._kinds[0][0])] * len(self._curves)
+        found = {}
+        for first, members in self._kinds:
+            found.update(dict.fromkeys(members, get(first)))
+        return [found[index] for index in range(len(self._curves))]
 
     def positions(self, curve: Ints, t: Floats) -> Floats:
         """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,)."""
@@ -74,6 +84,10 @@ class Curves:
         return points
 
     def _one_by_one(self, curve: Ints, t: Floats) -> Floats:
+        if 0 < t.size <= CALL and curve[0] == curve[-1]:
+            alone = self._curves[int(curve[0])]
+            if alone.reentrant:  # one of ours: what it gives is as it should be, and nobody else's
+                return alone.position(t)
         points = np.empty((3, t.size))
         if not t.size:
             return points
@@ -86,6 +100,19 @@ class Curves:
             for _ in (threads.in_order if apart else map)(fill, parts):
                 pass
         return points
+
+
+def _kinds(curves: Sequence[Curve]) -> list[tuple[Curve, Sequence[int]]]:
+    """Give the curves that are one family, by the first of them, and those that are of none."""
+    classes, families = list(map(type, curves)), [curve.family for curve in curves]
+    everyone = range(len(curves))
+    if len(set(classes)) == 1 and len(set(families)) == 1 and families[0] is not None:
+        return [(curves[0], everyone)]
+    kinds = defaultdict(list)
+    for index in everyone:
+        family = families[index]
+        kinds[classes[index], index if family is None else (family,)].append(index)
+    return [(curves[members[0]], members) for members in kinds.values()]
 
 
 def _fill(curve: Curve, t: Floats, points: Floats, low: int) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,14 +98,19 @@ class Batch:
                 f"{self.name(index)}the range of t must be finite and ascending, "
                 f"not {self.first[index]} to {self.last[index]}"
             )
-        self._positions = Curves(self.curves).positions
+        self._together = Curves(self.curves)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
     @property
     def reentrant(self) -> bool:
         """Whether `evaluate` may be called from several threads at once."""
-        return all(curve.reentrant for curve in self.curves)
+        return all(self._together.of_each(attrgetter("reentrant")))
+
+    @property
+    def degrees(self) -> list[int | None]:
+        """Those of the curves, see `Curve.degree`."""
+        return self._together.of_each(attrgetter("degree"))
 
     def name(self, index: int) -> str:
         """Give the beginning of a message about a curve: nothing if it is the only one."""
@@ -120,7 +126,7 @@ class Batch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        points = self._positions(curve, t)
+        points = self._together.positions(curve, t)
         # And so not where P is not a number: it would be least and greatest.
         near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
         if not near:

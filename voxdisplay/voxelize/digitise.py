@@ -80,11 +80,14 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequen
     bounds = np.append(starts, len(voxels))[of].tolist()
     single = (np.diff(of) == 1).tolist()
     seconds = (perf_counter() - begin) / len(voxels)
-    for index, (curve, low, high) in enumerate(zip(batch.curves, bounds, bounds[1:], strict=False)):
-        if single[index] and not closed[index] and not boxes:  # as most are
-            spent = seconds * (high - low)
-            yield Sequence(voxels[low:high], False, ONE_PIECE, t[low:high], curve, spent)
-            continue
+    spans = zip(batch.curves, bounds, bounds[1:], strict=False)
+    if not boxes and all(single) and not any(closed):  # as most are
+        yield from [
+            Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
+            for curve, a, b in spans
+        ]
+        return
+    for index, (curve, low, high) in enumerate(spans):
         begin = perf_counter()
         own_voxels, own_t = voxels[low:high], t[low:high]
         closes = closed[index] and single[index]
@@ -155,12 +158,12 @@ def _closed(batch: Batch, samples: Samples) -> list[bool]:
     for index in np.flatnonzero(apart <= TOUCH).tolist():
         own = samples.points[:, first[index] : last[index] + 1]
         closed[index] = bool(np.abs(own - own[:, :1]).max() > TOUCH)  # a mere point is not
-    for index, curve in enumerate(batch.curves):
-        if curve.closed is None:
+    for index, says in enumerate([curve.closed for curve in batch.curves]):
+        if says is None:
             continue
         ends = samples.points[:, [first[index], last[index]]]
-        closed[index] = curve.closed
-        if curve.closed and (np.abs(np.diff(np.floor(ends))) > 1).any():
+        closed[index] = says
+        if says and (np.abs(np.diff(np.floor(ends))) > 1).any():
             raise CurveError(
                 f"{batch.name(index)}the curve is said to be closed, but its ends are "
                 f"{apart[index]:.6g} voxels apart",

@@ -102,10 +102,16 @@ def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
 
 def first_look(batch: Batch) -> Samples:
     """Sample curves, one piece for each, before anything is known of them."""
-    looks = [_look(curve.degree) for curve in batch.curves]
-    index = np.arange(len(looks))
-    piece = index.repeat([look.size for look in looks])
-    t = batch.first[piece] + (batch.last - batch.first)[piece] * np.concatenate(looks)
+    degrees = batch.degrees
+    index = np.arange(len(degrees))
+    if degrees.count(degrees[0]) == len(degrees):  # as most often, and it takes half the time
+        look = np.tile(_look(degrees[0]), len(degrees))
+        piece = index.repeat(look.size // len(degrees))
+    else:
+        looks = list(map(_look, degrees))
+        look = np.concatenate(looks)
+        piece = index.repeat([each.size for each in looks])
+    t = batch.first[piece] + (batch.last - batch.first)[piece] * look
     t[np.append(piece[1:] != piece[:-1], True)] = batch.last
     breaks = [curve.breaks for curve in batch.curves]
     if any(each.size for each in breaks if each is not Curve.breaks):

@@ -55,7 +55,7 @@ class Report:
     certified: bool
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(eq=False, init=False)
 class Sequence:
     """An ordered, 26-connected list of voxels along a curve.
 
@@ -96,15 +96,13 @@ class Sequence:
         seconds: float = 0.0,
         proof: Certificate | str | None = None,
     ) -> None:
-        # What a frozen dataclass has takes twice as long, and there are a hundred thousand curves.
-        own = self.__dict__
-        own["voxels"] = voxels
-        own["closed"] = closed
-        own["starts"] = starts
-        own["t"] = t
-        own["curve"] = curve
-        own["seconds"] = seconds
-        own["proof"] = proof
+        self.voxels = voxels
+        self.closed = closed
+        self.starts = starts
+        self.t = t
+        self.curve = curve
+        self.seconds = seconds
+        self.proof = proof
 
     def __len__(self) -> int:
         return len(self.voxels)
