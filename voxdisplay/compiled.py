@@ -9,7 +9,10 @@ is not known here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
@@ -71,10 +74,32 @@ def twin(function: Callable[Given, Result]) -> Callable[Given, Result]:
         nonlocal other
         if not _Choice.use:
             return function(*args, **named)
-        other = other or getattr(import_module(f"{package}.kernels"), function.__name__)
+        if other is None:  # it is compiled now, or what is kept of it loaded
+            with interrupts_wait():
+                other = getattr(import_module(f"{package}.kernels"), function.__name__)
+                return other(*args, **named)
         return other(*args, **named)
 
     return either
+
+
+@contextmanager
+def interrupts_wait() -> Iterator[None]:
+    """Keep an interrupt until the end of what is done: the compiler loses it half-way.
+
+    Where none can come there is nothing to do: Python gives them to its main thread only.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if came:
+        signal.raise_signal(signal.SIGINT)
 
 
 def jit(function: Kernel) -> Kernel:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import chain
@@ -119,3 +121,37 @@ print("numba" in sys.modules, len(sequence))
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout.split() == [str(loaded), "109"]
+
+
+def test_an_interrupt_waits_for_the_compiler():
+    done, before = [], signal.getsignal(signal.SIGINT)
+
+    @compiled.interrupts_wait()
+    def work():
+        signal.raise_signal(signal.SIGINT)
+        done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_without_an_interrupt_nothing_is_changed():
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(ValueError, match="its own"), compiled.interrupts_wait():
+        raise ValueError("its own")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_in_another_thread_no_interrupt_can_come():
+    done = []
+
+    def work():
+        with compiled.interrupts_wait():
+            done.append(1)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done
