@@ -56,9 +56,9 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
         try:
             readers = [stop]
             if len(out) < _CLOGGED:
-                out += wire.transmit()
                 if wire.takes():
                     readers.append(line)
+                out += wire.transmit()  # last: a tick may have come with each call before
             writers = [line] if out else []
             readable, writable, _ = select.select(readers, writers, [], _pause(wire, out))
             if stop in readable:

@@ -88,11 +88,15 @@ class Wire:
     def until_tick(self) -> float | None:
         """Return in how many seconds to look again; None if nothing is in sight.
 
-        Then comes a tick that swaps, or bytes arrive that the line has held back.
+        Then comes a tick that swaps, or bytes arrive that the line has held back. What the device
+        says just now, as its tick comes while it is asked, is there at once.
         """
         now = self._clock()
+        left = self._up.due <= now  # by who carries it, who need not be told again
         self._run(now)
-        up = self._up.due if self._up.due > now else math.inf  # what has come need not be awaited
+        if self._up.due <= now and not left:
+            return 0.0
+        up = self._up.due if self._up.due > now else math.inf
         at = min(self._tick_at(), self._down.due, up)
         return min(at - now, _LONG) if at < math.inf else None
 

@@ -26,7 +26,7 @@ BIT_ERROR_RATES = (0.0, 1e-7, 1e-6, 1e-5, 1e-4)
 BITS_PER_BYTE = 10  # of a serial line: a start and a stop bit
 # Frames that are counted, after as many in which the link has come to know the line: rare errors
 # take longer to tell.
-FRAMES = {0.0: 16, 1e-7: 160, 1e-6: 144, 1e-5: 16, 1e-4: 8}
+FRAMES = {0.0: 16, 1e-7: 160, 1e-6: 144, 1e-5: 16, 1e-4: 24}
 SEED = 4
 
 

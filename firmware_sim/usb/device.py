@@ -172,8 +172,10 @@ class UsbDevice:
                 self.unplug()
 
     def until_due(self) -> float | None:
-        """Return the seconds until `advance` could move something without the host."""
-        return self.function.until_due()
+        """Return the seconds until something moves without the host; 0 if it just has."""
+        before = self.packets
+        self.advance()  # a tick may have come while the last packets were moved
+        return 0.0 if self.packets != before else self.function.until_due()
 
     def unplug(self) -> None:
         """Go away; what was under way fails."""

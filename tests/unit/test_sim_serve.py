@@ -72,6 +72,18 @@ def test_ticks_do_not_drift() -> None:
     assert shown == list(range(90))
 
 
+def test_a_tick_that_comes_while_it_is_asked_for_is_not_slept_through() -> None:
+    clock = Clock()
+    wire = Wire(Device(Config((3, 5, 7), refresh=1_000_000)), clock=clock)
+    wire.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
+    assert answers(wire.transmit())[-1].flags & PENDING
+    clock.now += 0.002
+    assert wire.until_tick() == 0
+    assert wire.until_tick() is None, "who does not carry it need not be told again"
+    (ack,) = answers(wire.transmit())
+    assert not ack.flags & PENDING
+
+
 def test_several_ticks_pass_at_once() -> None:
     clock = Clock()
     wire = Wire(Device(Config((3, 5, 7), refresh=10_000)), clock=clock)
