@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import chain, zip_longest
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -130,3 +131,30 @@ def test_a_class_with_its_own_position_leaves_the_family() -> None:
     curves += [Segment((0, 0, 0), (9, 4, i)) for i in range(SMALLEST)]
     for curve, sequence in zip(curves, voxelize_many(curves), strict=True):
         assert np.array_equal(sequence.voxels[0], np.floor(curve.position(np.zeros(1))[:, 0]))
+
+
+def test_what_a_family_has_in_common_is_asked_of_one_and_given_to_each():
+    class Bent(Curve):
+        t_range = (0.0, 1.0)
+
+        def __init__(self, degree):
+            self.power = degree
+
+        @property
+        def degree(self):
+            return self.power
+
+        def position(self, t):
+            return np.stack((t, t * t, t**self.power))
+
+    class Steep(Bezier):
+        degree = 40
+
+    points = np.arange(12.0).reshape(4, 3)
+    plain = [Bezier(points), Bezier(points[:3]), Steep(points), Bezier(points)]
+    curves = [*plain, Bent(3), Bent(5), Parametric("t", "t", "t", t=(0, 1)), Bezier(points)]
+    curves.append(Parametric(lambda t: (t, t, t), t=(0, 1)))
+    for some in (curves, [curves[0], curves[3]], curves[4:6], curves[::-1]):
+        together = Curves(some)
+        for name in ("degree", "reentrant"):
+            assert together.of_each(attrgetter(name)) == [getattr(curve, name) for curve in some]
