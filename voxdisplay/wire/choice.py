@@ -34,10 +34,10 @@ _SLAB_VOXELS = 1 << 18
 _PARSED_VOXELS = 1 << 17
 # Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
 _SLABS_FROM = 100_000
-# Bytes a second of a line on which chains are sent before it is known whether sets were shorter,
-# and of one that carries pixels of many colours as they are faster than they are parsed.
+# Bytes a second of a line on which chains are sent before it is known whether sets were shorter.
 _CHAINS_FROM = 800_000
 _LONE = 16  # where one voxel of so many is alone, sets are tried all the same
+# Bytes a second of a line that carries pixels of many colours sooner than they are parsed.
 _PLAIN_FROM = 2_400_000
 
 
