@@ -288,6 +288,28 @@ def test_damage_is_asked_about_at_once():
     assert link.counters.retransmitted == 1
 
 
+def test_when_all_waits_for_one_packet_a_status_follows_it_at_once():
+    """Were its answer lost, no other would come: only silence would tell."""
+    link = opened(rx_buffer=1 << 14)
+    link.present([b"\x00"] * 40)
+    assert len(sent(link, 0.0)) > 2
+    told(link, ack(0, 1, received=0b1), 0.001)  # 0 was damaged
+    again, *_ = sent(link, 0.001)
+    assert again.seq == 0
+    while (last := link.counters.packets - 1) < 31:
+        told(link, ack(0, last, received=(1 << last) - 1), 0.002)
+        sent(link, 0.002)
+    told(link, ack(0, 31, received=(1 << 31) - 1), 0.003)  # 0 was damaged again
+    again, status = sent(link, 0.003)
+    assert (again.seq, type(status)) == (0, packets.Status)
+    assert sent(link, 0.003) == [], "one question is enough"
+    told(link, ack(0, status.seq, received=(1 << 31) - 1, flags=spec.ACK_FLAG_ASKED), 0.004)
+    again, status = sent(link, 0.004)
+    assert (again.seq, type(status)) == (0, packets.Status)
+    told(link, ack(32, 0), 0.005)
+    assert all(isinstance(packet, packets.Data) for packet in sent(link, 0.005))
+
+
 def test_a_link_without_credit_asks_for_some():
     """READ gets no ACK, and so gives no credit back."""
     link = opened(rx_buffer=169)

@@ -130,6 +130,31 @@ def test_what_is_sent_again_is_lost_only_when_that_is_known():
     assert lost(window) == [0, 1, 2]
 
 
+def test_what_is_dropped_again_is_lost_again():
+    """``last`` goes back to a number only when that has been taken once more."""
+    window = Window(1000)
+    sent(window, 3)
+    window.acknowledge(ack(0, 2))  # 0 was damaged; 1 and 2 are of the next frame
+    for seq in (0, 1, 2):
+        window.send(seq, 9.0)
+    window.acknowledge(ack(0, 1, credit=1000))  # 0 was damaged once more
+    assert lost(window) == [0, 1]
+    assert window.fits(1000 - SIZE - 64)
+    assert not window.fits(1000 - SIZE - 63), "credit behind the second transmission of 1"
+    window.acknowledge(ack(0, 2))
+    assert lost(window) == [0, 1, 2]
+
+
+def test_a_number_that_comes_round_again_names_its_new_packet():
+    window = Window(10**6)
+    for k in range(256):
+        sent(window, 1)
+        window.acknowledge(ack((k + 1) % 256, k))
+    sent(window, 2)  # 0 and 1 again
+    window.acknowledge(ack(0, 0))
+    assert lost(window) == [0]
+
+
 def test_what_is_sent_again_and_received_gives_its_credit():
     window = Window(1000)
     sent(window, 1)

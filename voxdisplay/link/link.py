@@ -199,9 +199,10 @@ class Link:
     # -- silence
 
     @property
-    def _on_its_way(self) -> bool:
-        """Whether an answer comes by itself, that brings credit or makes some needless."""
-        return bool(self._silence.asking or self._sender.on_the_way)
+    def _blocked(self) -> bool:
+        """Whether nothing more can be sent, and an answer that unblocks it might get lost."""
+        starves = self._sender.starved and not self._sender.on_the_way
+        return (starves or self._sender.hangs) and not self._silence.asking
 
     @property
     def _waiting(self) -> bool:
@@ -219,7 +220,7 @@ class Link:
         if not (self._waiting or self._curious):
             return b""
         due = silence.ask_due_s <= now
-        at_once = self._ask_at_once or (self._sender.starved and not self._on_its_way)
+        at_once = self._ask_at_once or self._blocked
         self._ask_at_once = False
         if silence.may_ask and (due or at_once):
             tag, wire = self._sender.status()

@@ -12,7 +12,7 @@ from voxdisplay.errors import TransportTimeout
 from voxdisplay.link.counters import LinkCounters
 from voxdisplay.link.frames import Frames, OnDisplay
 from voxdisplay.link.loss import Loss
-from voxdisplay.link.pace import Pace
+from voxdisplay.link.pace import LEAST_PACKETS, Pace
 from voxdisplay.link.reads import Reads
 from voxdisplay.link.window import Window
 from voxdisplay.wire import packet as packets
@@ -167,6 +167,12 @@ class Sender:
         """How many packets are neither received nor lost: their answers are to come."""
         count, _ = self._window.on_the_way
         return count + self._reads.on_the_way
+
+    @property
+    def hangs(self) -> bool:
+        """Whether all waits for one or two packets, so that without their answer no other came."""
+        count, _ = self._window.on_the_way
+        return 0 < count <= LEAST_PACKETS and not self._window.has_room
 
     def acknowledge(self, ack: packets.Ack, now: float) -> float | None:
         """Take an ACK; give how long ago the newest that it reports as received was sent.

@@ -51,7 +51,8 @@ class Window:
         # How many are not, and their bytes: asked for with each packet, so not counted anew.
         self.on_the_way = (0, 0)
         self.taken = 0  # the newest ordinal that the device has taken
-        self._data_marks: dict[int, _Mark] = {}
+        self._data_taken = 0  # and of DATA
+        self._data_marks: dict[int, list[_Mark]] = {}  # of each transmission
         self._tag_marks: dict[int, _Mark] = {}
 
     @property
@@ -87,7 +88,10 @@ class Window:
         self.on_the_way = count + 1, bytes_ + len(flight.wire)
         self._lost -= flight.lost
         flight.delivered = delivered
-        self._data_marks[seq] = mark = self._mark(len(flight.wire))
+        mark = self._mark(len(flight.wire))
+        if not flight.transmissions:
+            self._data_marks[seq] = []  # the number has come round again
+        self._data_marks[seq].append(mark)
         flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
         flight.transmissions += 1
         return flight.wire
@@ -131,17 +135,21 @@ class Window:
         return done
 
     def _named(self, ack: Ack) -> _Mark | None:
-        """Give what ``last`` names, if that is certain.
+        """Give what ``last`` names, or what was sent before it at the latest.
 
-        Of a packet that was taken but dropped (section 6, point 6) and has been sent again, it may
-        name either transmission: an ACK for damage repeats the ``last`` before.
+        A packet that was taken but dropped (section 6, point 6) and has been sent again has more
+        than one transmission, and an ACK for damage repeats the ``last`` before.
         """
         if ack.flags & spec.ACK_FLAG_ASKED:
             return self._tag_marks.get(ack.last)
-        flight = self.flights.get(ack.last)
-        if flight and flight.transmissions > 1:
-            return None
-        return self._data_marks.get(ack.last)
+        marks = self._data_marks.get(ack.last, [])
+        if ack.last in self.flights:
+            named = next((mark for mark in marks if mark.ordinal >= self._data_taken), None)
+        else:  # received: it is not sent again after that
+            named = marks[-1] if marks else None
+        if named:
+            self._data_taken = max(self._data_taken, named.ordinal)
+        return named
 
     def _is_received(self, seq: int, ack: Ack) -> bool:
         ahead = (seq - ack.next) % _MODULUS
