@@ -23,7 +23,7 @@ from voxdisplay.curves import (
     TorusKnot,
     Transformed,
 )
-from voxdisplay.curves.family import CALL, FAMILY_CALL, SMALLEST, Curves
+from voxdisplay.curves.family import CALL, SMALLEST, Curves
 from voxdisplay.voxelize import voxelize, voxelize_many
 
 Make = Callable[[np.random.Generator], Curve]
@@ -78,7 +78,7 @@ def test_a_family_is_where_its_curves_are(name: str) -> None:
     members = family(name, 20)
     assert members[0].family is not None
     assert len({curve.family for curve in members}) == 1
-    which = np.repeat(np.arange(20), rng.integers(0, 2 * FAMILY_CALL // 20, 20))
+    which = np.repeat(np.arange(20), rng.integers(0, 2 * CALL // 20, 20))
     low, high = np.array([curve.t_range for curve in members])[which].T
     t = low + (high - low) * rng.uniform(size=which.size)
     together = type(members[0]).together(members)(which, t)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from space_curves import Function
 
-from voxdisplay.curves import Bezier, Polyline, Segment
+from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
 from voxdisplay.voxelize.batch import Batch
 from voxdisplay.voxelize.knots import LOOK, first_look, knots
 
@@ -45,6 +45,20 @@ def test_no_turn_of_a_polynomial_is_missed(degree: int) -> None:
     fine = np.linspace(0, 1, 20_001)
     straight = np.stack([np.interp(fine, found.t, row) for row in found.points])
     assert np.abs(straight - curve.position(fine)).max() < 0.1
+
+
+def test_one_more_look_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = []
+    evaluate = Batch.evaluate
+
+    def counted(batch: Batch, curve: np.ndarray, t: np.ndarray) -> np.ndarray:
+        looks.append(t.size)
+        return evaluate(batch, curve, t)
+
+    monkeypatch.setattr(Batch, "evaluate", counted)
+    found = knots(Batch([Parametric("80*cos(t)", "80*sin(t)", "80*(1 - cos(4*t))", t=(-3, 3))]))
+    assert len(looks) == 2
+    assert sum(looks) == found.t.size
 
 
 def _control(t: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Work on several processors: in order, at once where it may be, and with the same voxels."""
 
+import gc
 import subprocess
 import sys
 import threading
@@ -160,6 +161,17 @@ def test_a_long_curve_is_the_same_on_any_number_of_processors(
     one = voxelize(Transformed(long, 3.0))
     assert one.voxels.tobytes() == many.voxels.tobytes()
     assert one.t.tobytes() == many.t.tobytes()
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_the_collector_of_garbage_is_left_as_it_was(*, on: bool) -> None:
+    was_on = gc.isenabled()
+    (gc.enable if on else gc.disable)()
+    try:
+        voxelize_many(beziers(40))
+        assert gc.isenabled() == on
+    finally:
+        (gc.enable if was_on else gc.disable)()
 
 
 def test_the_first_bad_curve_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

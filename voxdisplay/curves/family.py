@@ -20,10 +20,8 @@ from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
 
 Common = TypeVar("Common")
 
-# Points per call: what is computed for so many stays in a core's cache. Families have the numbers
-# of their curves beside each point.
+# Points per call: what is computed for so many stays in a core's cache.
 CALL = 1 << 14
-FAMILY_CALL = 1 << 11
 # So many calls are worth threads.
 MANY = 8
 # Smaller families are not worth the arrays that hold them.
@@ -69,15 +67,15 @@ class Curves:
             return self._one_by_one(curve, t)
         points = np.empty((3, t.size))
         if self._alike:
-            for low in range(0, t.size, FAMILY_CALL):
-                high = low + FAMILY_CALL
+            for low in range(0, t.size, CALL):
+                high = low + CALL
                 points[:, low:high] = self._evaluate[0](curve[low:high], t[low:high])
             return points
         family = self._family[curve]
         for number, evaluate in enumerate(self._evaluate):
             mine = np.flatnonzero(family == number)
-            for low in range(0, mine.size, FAMILY_CALL):
-                some = mine[low : low + FAMILY_CALL]
+            for low in range(0, mine.size, CALL):
+                some = mine[low : low + CALL]
                 points[:, some] = evaluate(self._member[curve[some]], t[some])
         alone = np.flatnonzero(family < 0)
         points[:, alone] = self._one_by_one(curve[alone], t[alone])

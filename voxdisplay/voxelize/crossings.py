@@ -22,7 +22,7 @@ from voxdisplay.voxelize.roots import TOLERANCE, cross
 
 # Knot intervals handled at once: enough to forget what a call costs, few enough for what is
 # computed per crossing to stay in cache.
-BLOCK = 1 << 14
+BLOCK = 1 << 15
 # So many blocks are worth threads.
 MANY = 8
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by

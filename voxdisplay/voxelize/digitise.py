@@ -5,9 +5,12 @@ This module only puts the steps in order; it must not know how they are done.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from time import perf_counter
 
 import numpy as np
@@ -30,6 +33,9 @@ from voxdisplay.voxelize.sequence import Sequence
 # many voxels may be in hand on all processors together.
 CURVES = 4096
 VOXELS = 2_000_000
+# Batches for each processor until it is seen whether the curves are still as long, and the fastest
+# has to wait for the others.
+BATCHES = 8
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
 TOUCH = 1e-3
 
@@ -45,23 +51,24 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     def one_batch(low: int, size: int) -> list[Sequence]:
         batch = Batch(curves[low : low + size], low if len(curves) > 1 else None)
         ahead = (len(curves) - low) / len(batch.curves)
-        return list(_digitise(batch, ahead, certified=certified))
+        return _digitise(batch, ahead, certified=certified)
 
-    size, at_once = 16, 1
+    size, batches = 16, 1
     while (begin := len(sequences)) < len(curves):
-        end = min(begin + size * at_once, len(curves))
+        end = min(begin + size * batches, len(curves))
         # Many short array operations in numpy would only wait for each other.
-        apart = compiled.in_use() and all(curve.reentrant for curve in curves[begin:end])
+        apart = compiled.in_use() and all(map(attrgetter("reentrant"), curves[begin:end]))
         do = threads.in_order if apart else map
         for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
             sequences += fresh
         voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
         at_once = threads.processors()
+        batches = at_once * (BATCHES if apart else 1)
         size = min(CURVES, VOXELS // at_once * (end - begin) // voxels + 1)
     return sequences
 
 
-def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequence]:
+def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
     begin = perf_counter()
     samples = settle(batch, first_look(batch))
     compiled.prepare(samples.t.size, ahead)
@@ -82,11 +89,12 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequen
     seconds = (perf_counter() - begin) / len(voxels)
     spans = zip(batch.curves, bounds, bounds[1:], strict=False)
     if not boxes and all(single) and not any(closed):  # as most are
-        yield from [
-            Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
-            for curve, a, b in spans
-        ]
-        return
+        with _nothing_to_collect():
+            return [
+                Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
+                for curve, a, b in spans
+            ]
+    sequences = []
     for index, (curve, low, high) in enumerate(spans):
         begin = perf_counter()
         own_voxels, own_t = voxels[low:high], t[low:high]
@@ -104,7 +112,24 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> Iterator[Sequen
             sequence = _proven(batch, sequence, boxes, index, thin, traced)
             spent = seconds * len(sequence) + perf_counter() - begin
             sequence = replace(sequence, seconds=spent)
-        yield sequence
+        sequences.append(sequence)
+    return sequences
+
+
+@contextmanager
+def _nothing_to_collect() -> Iterator[None]:
+    """Keep Python from looking for garbage while many objects are made, all of which stay.
+
+    With every so many it would go through all there are. If its collector is off, that stays so.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 def _proven(
@@ -158,9 +183,8 @@ def _closed(batch: Batch, samples: Samples) -> list[bool]:
     for index in np.flatnonzero(apart <= TOUCH).tolist():
         own = samples.points[:, first[index] : last[index] + 1]
         closed[index] = bool(np.abs(own - own[:, :1]).max() > TOUCH)  # a mere point is not
-    for index, says in enumerate([curve.closed for curve in batch.curves]):
-        if says is None:
-            continue
+    told = [(at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None]
+    for index, says in told:
         ends = samples.points[:, [first[index], last[index]]]
         closed[index] = says
         if says and (np.abs(np.diff(np.floor(ends))) > 1).any():

@@ -25,6 +25,9 @@ CHORD = 3.0
 BEND = 0.05
 # Into how many parts an interval is cut at once, at most.
 PARTS = 16
+# What has to be cut is cut so much finer than it looks to need: parts that just fail would take
+# one more look at everything, which takes longer than a few more knots.
+AMPLY = 1.3
 # A step wider than this between neighbouring parameters is a jump; a narrower one cannot be told
 # from a step between adjacent voxels.
 JUMP = 1.0
@@ -147,13 +150,14 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     second[1:] = turn
     second[:-1] = np.maximum(second[:-1], turn)
     bend = h * h * second / 4
-    wanted = np.ceil(np.maximum(chord / CHORD, np.sqrt(bend / BEND)))
+    wanted = np.maximum(chord / CHORD, np.sqrt(bend / BEND))
     parts = np.ones(h.size, dtype=np.int64)
     cut = (joined & (wanted > 1)).nonzero()[0]  # not where the bend is not a number
     if cut.size:
         # Parts must stay distinct parameters.
         possible = np.floor(h[cut] / resolution[samples.curve[samples.piece[cut]]])
-        parts[cut] = np.maximum(np.minimum(np.minimum(wanted[cut], possible), PARTS), 1)
+        ample = np.ceil(AMPLY * wanted[cut])
+        parts[cut] = np.maximum(np.minimum(np.minimum(ample, possible), PARTS), 1)
     return parts, chord
 
 

@@ -163,11 +163,12 @@ def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray
     w, start = touch[1:].nonzero()
     if start.size:
         w += 2
-        back = np.zeros_like(touch)  # [w - 1, i] for voxels i - w and i
-        for row in range(min(WINDOW, stretch.size - 1)):
-            back[row, row + 1 :] = touch[row, : -row - 1]
-        ahead, behind = (np.logical_and.accumulate(each).sum(axis=0) for each in (touch, back))
-        short = ahead[start] + behind[start + w] >= w - 1
+        stop, steps = start + w, np.arange(WINDOW)[:, None]
+        before = touch[steps, np.maximum(stop - 1 - steps, 0)]  # it is enough to look until start
+        ahead, behind = (
+            np.logical_and.accumulate(each).sum(axis=0) for each in (touch[:, start], before)
+        )
+        short = ahead + behind >= w - 1
         leap[start[short]] = w[short]  # of several for one voxel, the last: the furthest
     return leap
 

@@ -12,14 +12,16 @@ from voxdisplay.voxelize.batch import Bools, Floats, Ints, Samples
 from voxdisplay.voxelize.crossings import MARGIN, NUDGE, Aims, Corners
 from voxdisplay.voxelize.events import Voxels
 from voxdisplay.voxelize.kernels.packed import Bytes, packed
-from voxdisplay.voxelize.knots import BEND, CHORD, PARTS
+from voxdisplay.voxelize.knots import AMPLY, BEND, CHORD, PARTS
+
+Limits = tuple[float, float, float, float]
 
 TINY = float(np.finfo(float).tiny)
 
 
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """See `knots.needed_parts`."""
-    points, limits = packed(samples.points), (CHORD, BEND, float(PARTS))
+    points, limits = packed(samples.points), (CHORD, BEND, AMPLY, float(PARTS))
     return _needed_parts(samples.piece, samples.t, points, resolution[samples.curve], limits)
 
 
@@ -30,22 +32,20 @@ def _most(a: float, b: float) -> float:
 
 
 @jit
-def _parts(
-    h: float, chord: float, second: float, resolution: float, limits: tuple[float, float, float]
-) -> int:
-    most_chord, most_bend, most_parts = limits
+def _parts(h: float, chord: float, second: float, resolution: float, limits: Limits) -> int:
+    most_chord, most_bend, amply, most_parts = limits
     bend = h * h * second / 4
     if (chord <= 0.99 * most_chord) & (bend <= 0.99 * most_bend):
         return 1
-    wanted = np.ceil(_most(chord / most_chord, np.sqrt(bend / most_bend)))
+    wanted = _most(chord / most_chord, np.sqrt(bend / most_bend))
     if not wanted > 1:  # or not a number
         return 1
-    return max(int(min(wanted, np.floor(h / resolution), most_parts)), 1)
+    return max(int(min(np.ceil(amply * wanted), np.floor(h / resolution), most_parts)), 1)
 
 
 @jit
 def _needed_parts(
-    piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: tuple[float, float, float]
+    piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: Limits
 ) -> tuple[Ints, Floats]:
     size = t.size
     parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
