@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from voxdisplay.curves.expression import Expression, constant, parse
+from voxdisplay.curves.expression import constant, parse
 from voxdisplay.curves.operations import FUNCTIONS
+from voxdisplay.curves.program import Expression
 from voxdisplay.errors import CurveError
 
 NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"} | {

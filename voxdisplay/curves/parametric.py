@@ -12,11 +12,12 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from voxdisplay.curves import checks, expression
+from voxdisplay.curves import checks, program
 from voxdisplay.curves.curve import Curve, Evaluate, Floats
-from voxdisplay.curves.expression import Expression, constant, excerpt, parse
+from voxdisplay.curves.expression import constant, excerpt, parse
 from voxdisplay.curves.interval import Interval
 from voxdisplay.curves.params import resolve_params
+from voxdisplay.curves.program import Expression
 from voxdisplay.errors import CurveError
 
 Formula = str | float | Expression
@@ -126,7 +127,7 @@ class Parametric(Curve):
             formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
             for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
         ]
-        self._position = expression.rows(formulas)
+        self._position = program.rows(formulas)
         self._derivative = _stacked(slopes)
 
     @property
@@ -142,7 +143,7 @@ class Parametric(Curve):
     def together(curves: Sequence[Parametric]) -> Evaluate:
         """Prepare to evaluate formulas that differ in numbers only, see `Curve.together`."""
         formulas = zip(*(curve._formulas for curve in curves), strict=True)
-        rows = [expression.together(row) for row in formulas]
+        rows = [program.together(row) for row in formulas]
         return lambda which, t: np.stack([row(which, t) for row in rows])
 
     def derivative(self, t: Floats) -> Floats | None:

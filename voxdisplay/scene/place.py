@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from voxdisplay.curves.curve import Floats
-    from voxdisplay.curves.expression import Expression
+    from voxdisplay.curves.program import Expression
 
 
 @contextmanager
