@@ -1,5 +1,6 @@
 """Packets packed by hand from the document, and a device to try them on."""
 
+import socket
 import struct
 from dataclasses import dataclass
 
@@ -132,3 +133,13 @@ def filling(seq: int, size: int) -> bytes:
     wire = data(seq, 1, bytes(size - 9))  # END and what pads it
     assert len(wire) == size
     return wire
+
+
+def receive(connection: socket.socket, count: int) -> list[Answer]:
+    """Take so many packets from a device."""
+    got = b""
+    while got.count(b"\0") < count:
+        piece = connection.recv(65_536)
+        assert piece
+        got += piece
+    return answers(got)

@@ -1,18 +1,12 @@
-"""Ports: in the host's process, pseudo-terminals, TCP, and the program."""
+"""Pseudo-terminals and TCP."""
 
 import contextlib
-import json
 import os
-import runpy
-import signal
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from simwire import (
     ACK,
@@ -20,25 +14,21 @@ from simwire import (
     COMMIT,
     DOT,
     INFO,
-    PENDING,
     SHOWN,
-    Answer,
     answers,
     data,
     hello,
+    receive,
     status,
 )
 
-from firmware_sim import __main__ as program
-from firmware_sim import in_process, serve
+from firmware_sim import serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.faults import parse_faults
 from firmware_sim.serve import (
-    InProcessPort,
     linked,
     listen,
-    open_in_process,
     open_pty,
     serve_tcp,
     serve_wire,
@@ -46,209 +36,6 @@ from firmware_sim.serve import (
 from firmware_sim.wire import Wire
 
 WAIT = 20  # seconds after which a test has failed; none takes so long
-ROOT = Path(__file__).parents[2]
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-def test_ticks_do_not_drift() -> None:
-    clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=30_000)), clock=clock)
-    wire.receive(hello())
-    assert wire.until_tick() is None
-    for number in range(90):
-        clock.now = 1000 + number / 30 + 0.001 * (number % 30)
-        wire.receive(data(number, number, DOT, CLEAR | COMMIT))
-        assert wire.until_tick() == pytest.approx(1000 + (number + 1) / 30 - clock.now)
-    clock.now = 1003.1
-    assert wire.until_tick() is None
-    shown = [a.frame for a in answers(wire.transmit()) if a.kind == ACK and not a.flags & PENDING]
-    assert shown == list(range(90))
-
-
-def test_a_tick_that_comes_while_it_is_asked_for_is_not_slept_through() -> None:
-    clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=1_000_000)), clock=clock)
-    wire.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
-    assert answers(wire.transmit())[-1].flags & PENDING
-    clock.now += 0.002
-    assert wire.until_tick() == 0
-    assert wire.until_tick() is None, "who does not carry it need not be told again"
-    (ack,) = answers(wire.transmit())
-    assert not ack.flags & PENDING
-
-
-def test_several_ticks_pass_at_once() -> None:
-    clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=10_000)), clock=clock)
-    wire.receive(hello() + b"".join(data(n, n, DOT, CLEAR | COMMIT) for n in range(4)))
-    clock.now += 0.25
-    wire.advance()
-    assert wire.device.session.shown == 1
-    clock.now += 10
-    wire.advance()
-    assert wire.device.session.shown == 3
-    wire.receive(data(4, 4, DOT, CLEAR | COMMIT))
-    wire.disconnect()
-    assert wire.until_tick() is None
-
-
-# In the host's process
-
-
-def exchange(port: InProcessPort, wire: bytes) -> list[Answer]:
-    port.write(wire, 1)
-    return answers(port.read(1))
-
-
-def test_a_port_in_process() -> None:
-    port = open_in_process("sim:?size=3x5x7&format=MONO1&refresh=1000&boot=7&name=a%20cube")
-    (info,) = exchange(port, b"\0" + hello())
-    assert (info.nx, info.format, info.boot, info.refresh) == (3, 1, 7, 1_000_000)
-    assert info.payload[29:36] == b"\x06a cube"
-    *_, ack = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
-    if ack.flags == PENDING:
-        (ack,) = answers(port.read(WAIT))
-    assert ack.flags == SHOWN
-    assert port.read(0) == b""
-    assert port.read(0.001) == b""
-    assert port.bench.snapshot().frame == 0
-    port.close()
-    port.close()
-    with pytest.raises(ConnectionError):
-        port.read(0)
-    with pytest.raises(ConnectionError):
-        port.write(b"", 0)
-
-
-def test_a_swap_at_once_needs_no_waiting() -> None:
-    port = open_in_process("sim:?refresh=0&rx_buffer=0x2000&max_payload=64&silent=3&serial=9")
-    (info,) = exchange(port, hello())
-    assert (info.rx_buffer, info.max_payload, info.nx) == (8192, 64, 128)
-    (ack,) = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
-    assert ack.flags == SHOWN
-
-
-def test_who_reads_is_woken_by_who_writes() -> None:
-    port = open_in_process("sim:?size=3x5x7")
-    got = []
-    reader = threading.Thread(target=lambda: got.append(port.read(WAIT)))
-    reader.start()
-    port.write(hello(), 1)
-    reader.join(WAIT)
-    assert answers(got[0])[0].kind == INFO
-
-
-def test_who_reads_is_woken_by_close() -> None:
-    port = open_in_process("sim:?size=3x5x7")
-    waiting = threading.Event()
-    wait, seen = port._changed.wait, []
-
-    def wait_and_tell(left: float) -> bool:
-        waiting.set()
-        return wait(left)
-
-    port._changed.wait = wait_and_tell
-
-    def read() -> None:
-        try:
-            port.read(WAIT)
-        except ConnectionError:
-            seen.append(True)
-
-    reader = threading.Thread(target=read)
-    reader.start()
-    assert waiting.wait(WAIT)
-    port.close()
-    reader.join(WAIT)
-    assert seen == [True]
-
-
-def test_a_bad_line_in_process() -> None:
-    port = open_in_process("sim:?size=3x5x7&fault=flip:1e-3,drop:1e-3&seed=3&features=")
-    exchange(port, hello())
-    for _ in range(300):
-        exchange_badly(port, b"\0" + hello() + status())
-    assert port.bench.counters().damaged > 0
-
-
-def exchange_badly(port: InProcessPort, wire: bytes) -> None:
-    port.write(wire, 1)
-    port.read(0)
-
-
-@pytest.mark.parametrize(
-    ("url", "message"),
-    [
-        ("sim", "write sim:"),
-        ("sim:x", "write sim:"),
-        ("sim:?", "write sim:"),
-        ("tcp:?size=1x1x1", "write sim:"),
-        ("sim:?sise=1x1x1", "'sise' .* did you mean 'size'"),
-        ("sim:?qqqq=1", "did you mean"),
-        ("sim:?size=1x1x1&size=1x1x1", "'size' .* twice"),
-        ("sim:?size=1", "size in .* three numbers"),
-        ("sim:?size", "size in .* three numbers"),
-        ("sim:?rx_buffer=many", "rx_buffer in .* whole number"),
-        ("sim:?rx_buffer=9", "rx_buffer is 9"),
-        ("sim:?format=rgb", "take one of"),
-        ("sim:?fault=flap:1", "did you mean flip"),
-        ("sim:?baud=9", "baud in .* 50 to"),
-        ("sim:?seed=x", "seed in .* whole number"),
-        ("sim:?features=palette", "palette: take of line, box"),
-        ("sim:?lie=all", "lie all: take of grid"),
-    ],
-)
-def test_a_bad_url_is_refused_with_the_remedy(url: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        open_in_process(url)
-
-
-def test_the_entry_point() -> None:
-    assert serve.open_in_process is in_process.open_in_process
-
-
-def test_a_line_that_stands_still_and_is_full_takes_nothing() -> None:
-    port = open_in_process("sim:?size=3x5x7&fault=down.stall:1e99@1")
-    for _ in range(7):
-        port.write(bytes(10_000), 0)
-    with pytest.raises(TimeoutError, match="full"):
-        port.write(hello(), 0)
-
-
-def test_who_waits_for_a_line_goes_on_when_it_moves() -> None:
-    port = open_in_process("sim:?size=3x5x7&refresh=0&fault=down.delay:0.05@1")
-    port.write(bytes(70_000), 0)
-    port.write(hello(), WAIT)
-    assert answers(port.read(WAIT))[0].kind == INFO
-
-
-def test_who_waits_for_a_line_is_woken_by_close() -> None:
-    port = open_in_process("sim:?size=3x5x7&fault=down.stall:1e99@1")
-    port.write(bytes(70_000), 0)
-    port._changed.wait = lambda _: port.close()
-    with pytest.raises(ConnectionError, match="closed"):
-        port.write(hello(), WAIT)
-
-
-def test_an_unplugged_device_is_gone() -> None:
-    port = open_in_process("sim:?size=3x5x7&fault=unplug@20")
-    port.write(hello(), 0)
-    assert answers(port.read(0))[0].kind == INFO
-    with pytest.raises(ConnectionError, match="unplugged"):
-        port.write(hello(), 0)
-    with pytest.raises(ConnectionError, match="unplugged"):
-        port.read(0)
-    port.close()
-
-
-# Pumps
 
 
 @contextlib.contextmanager
@@ -275,15 +62,6 @@ def running(target: Callable[..., object], *args: object) -> Iterator[Callable[[
 
 def small(**settings: object) -> Wire:
     return Wire(Device(Config((3, 5, 7), **{"refresh": 1_000_000, **settings})))
-
-
-def receive(connection: socket.socket, count: int) -> list[Answer]:
-    got = b""
-    while got.count(b"\0") < count:
-        piece = connection.recv(65_536)
-        assert piece
-        got += piece
-    return answers(got)
 
 
 @pytest.fixture
@@ -463,156 +241,3 @@ def test_nobody_else_may_listen_unasked() -> None:
         listen("0.0.0.0", 0)  # noqa: S104
     with listen("0.0.0.0", 0, remote=True):  # noqa: S104
         pass
-
-
-# The program
-
-
-@contextlib.contextmanager
-def started(*arguments: str, end: int = signal.SIGTERM) -> Iterator[dict[str, str]]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "firmware_sim", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        cwd=ROOT,
-    )
-    try:
-        yield json.loads(process.stdout.readline())
-        process.send_signal(end)
-        out, err = process.communicate(timeout=WAIT)
-        assert (process.returncode, out, err) == (0, b"", b"")
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def test_the_program_on_a_pty(tmp_path: Path) -> None:
-    link, picture = tmp_path / "port", tmp_path / "front.npy"
-    with started(
-        "--link", str(link), "--size", "3x5x7", "--refresh", "1000", "--dump", str(picture)
-    ) as place:
-        assert place == {"port": str(link.readlink()), "size": "3x5x7", "format": "rgb888"}
-        assert not np.load(picture).any()
-        host = os.open(link, os.O_RDWR | os.O_NOCTTY)
-        os.write(host, b"\0" + hello() + data(0, 0, DOT, CLEAR | COMMIT))
-        got = b""
-        while not got or answers(got)[-1].flags != SHOWN:
-            got += os.read(host, 1)
-            while not got.endswith(b"\0"):
-                got += os.read(host, 1)
-        os.close(host)
-        assert np.load(picture).sum() == 3 * 255
-    assert not link.is_symlink()
-
-
-def test_the_program_on_tcp() -> None:
-    with started(
-        "--tcp", "127.0.0.1:0", "--format", "mono1", "--refresh", "0", end=signal.SIGINT
-    ) as place:
-        port = place["port"].removeprefix("tcp://127.0.0.1:")
-        with socket.create_connection(("127.0.0.1", int(port)), WAIT) as connection:
-            connection.sendall(hello() + data(0, 0, DOT, CLEAR | COMMIT))
-            info, ack = receive(connection, 2)
-            assert (info.nx, info.format, info.refresh) == (128, 1, 0)
-            assert ack.flags == SHOWN
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--size", "3x5"], "three numbers of voxels like 128x128x128"),
-        (["--size", "0x5x5"], "take sides from 1 to 65535"),
-        (["--format", "rgb"], "choose from"),
-        (["--refresh", "fast"], "number of hertz"),
-        (["--baud", "fast"], "whole number"),
-        (["--baud", "49"], "take a number from 50"),
-        (["--rx-buffer", "9"], "take a number from 1101"),
-        (["--fault", "flop=1"], "did you mean flip"),
-        (["--features", "palette"], "palette: take of line, box"),
-        (["--lie", "all"], "lie all: take of grid"),
-        (["--seed", "x"], "whole number"),
-        (["--tcp", "5000"], "HOST:PORT like 127.0.0.1:5000"),
-        (["--tcp", "localhost:99999"], "HOST:PORT like 127.0.0.1:5000"),
-        (["--tcp", "0.0.0.0:0"], "--allow-remote"),
-        (["--tcp", "127.0.0.1:0", "--pty"], "not allowed with"),
-        (["--tcp", "127.0.0.1:0", "--link", "x"], "leave out --tcp"),
-        (["--usbip", "127.0.0.1:0", "--link", "x"], "leave out --tcp and --usbip"),
-        (["--usbip", "here"], "HOST:PORT like 127.0.0.1:5000"),
-        (["--usbip", "0.0.0.0:0"], "--allow-remote"),
-        (["--usb-class", "vendor"], "--usb-class is for --usbip"),
-        (["--dump", "/nowhere/at/all.npy"], "/nowhere"),
-        (["--link", "/nowhere/at/all"], "/nowhere"),
-    ],
-)
-def test_bad_arguments_are_refused_with_the_remedy(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        program.main(arguments)
-    assert end.value.code == 2
-    assert message in capsys.readouterr().err
-
-
-def test_help_has_examples(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["voxdisplay-sim", "--help"])
-    with pytest.raises(SystemExit) as end:
-        runpy.run_path(program.__file__, run_name="__main__")
-    assert end.value.code == 0
-    assert "voxdisplay-sim --tcp 127.0.0.1:5000" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "port"),
-    [
-        (["--pty"], "/dev/"),
-        (["--link", "LINK"], "/dev/"),
-        (["--tcp", "127.0.0.1:0"], "tcp://127.0.0.1:"),
-        (["--tcp", "[::1]:0"], "tcp://[::1]:"),
-        (["--tcp", "0.0.0.0:0", "--allow-remote"], "tcp://0.0.0.0:"),
-        (["--usbip", "127.0.0.1:0"], "usbip://127.0.0.1:"),
-        (["--usbip", "127.0.0.1:0", "--usb-class", "cdc-acm"], "usbip://127.0.0.1:"),
-    ],
-)
-def test_the_program_in_this_process(
-    arguments: list[str],
-    port: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    if "[::1]:0" in arguments:
-        try:
-            listen("::1", 0).close()
-        except OSError:
-            pytest.skip("no IPv6 here")
-    announce = program._announce
-
-    def announce_and_end(*place: object) -> None:
-        announce(*place)
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    monkeypatch.setattr(program, "_announce", announce_and_end)
-    arguments = [str(tmp_path / "port") if a == "LINK" else a for a in arguments]
-    before = signal.getsignal(signal.SIGTERM)
-    assert program.main(arguments) == 0
-    assert signal.getsignal(signal.SIGTERM) is before
-    assert json.loads(capsys.readouterr().out)["port"].startswith(port)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_picture_that_cannot_be_dumped_does_not_stop_the_device(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    device = Device(Config((3, 5, 7), refresh=0))
-    folder = tmp_path / "pictures"
-    folder.mkdir()
-    program._dump_swaps(device, folder / "front.npy")
-    device.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
-    assert np.load(folder / "front.npy")[0, 0, 0].tolist() == [255, 255, 255]
-    (folder / "front.npy").unlink()
-    folder.rmdir()
-    device.receive(data(1, 1, b"", CLEAR | COMMIT))
-    assert "not dumped" in capsys.readouterr().err
-    assert device.swaps == 2

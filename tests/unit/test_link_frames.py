@@ -1,0 +1,257 @@
+"""Frames on their way (protocol.md, 6, 9 and 12), with answers by hand."""
+
+import dataclasses
+
+import pytest
+from by_hand import INFO, SESSION, ack, on_display, opened, sent, told
+
+from voxdisplay.errors import TransportTimeout
+from voxdisplay.link import PageRead, Shown
+from voxdisplay.link.sender import PORTION_BYTES
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+
+# -- frames
+
+
+def test_a_frame_is_shown_when_an_ack_says_so():
+    link = opened()
+    ticket = link.present([b"\xa0", b"\xa1"])
+    first, second = sent(link, 0.0)
+    assert (first.seq, first.frame, first.flags, first.ops) == (0, 0, 1, b"\xa0")
+    assert (second.seq, second.frame, second.flags, second.ops) == (1, 0, 5, b"\xa1")
+    assert (link.backlog, link.payloads_left, link.idle) == (1, 2, False)
+    assert told(link, ack(1, 0), 0.1) == []
+    assert link.payloads_left == 1
+    assert told(link, ack(2, 1, flags=spec.ACK_FLAG_PENDING), 0.1) == []
+    shown = ack(2, 1, flags=spec.ACK_FLAG_SHOWN, digest=7)
+    assert told(link, shown, 0.2) == [Shown(ticket, 7)]
+    assert told(link, shown, 0.3) == []
+    assert (link.backlog, link.payloads_left, link.idle) == (0, 0, True)
+
+
+def test_a_frame_that_another_has_followed_is_over_without_word():
+    link = opened()
+    tickets = [link.present([]) for _ in range(3)]
+    assert [packet.frame for packet in sent(link, 0.0)] == [0, 1, 2]
+    assert told(link, ack(3, 2, frame=1, flags=1), 0.1) == [Shown(tickets[1], 0)]
+    assert told(link, ack(3, 2, frame=2, flags=1), 0.1) == [Shown(tickets[2], 0)]
+
+
+def test_a_frame_is_sent_while_it_is_coded_and_its_last_packet_commits():
+    """6: "COMMIT is on the frame's last packet, and on no other"."""
+    link = opened()
+    ticket = link.begin()
+    behind = link.present([b"\xa7"])
+    assert sent(link, 0.0) == []
+    for payloads, expected in (([], []), ([b"\xa0"], []), ([b"\xa1", b"\xa2"], [b"\xa0", b"\xa1"])):
+        link.supply(ticket, payloads, last=False)
+        packets_ = sent(link, 0.0)
+        assert [packet.ops for packet in packets_] == expected
+        assert not any(packet.flags & spec.DATA_FLAG_COMMIT for packet in packets_)
+    assert (link.payloads_in_all, link.payloads_left) == (4, 4)
+    told(link, ack(2, 1), 0.0)
+    assert link.payloads_left == 2
+    link.supply(ticket, [], last=True)
+    last, other = sent(link, 0.0)
+    assert (last.ops, last.frame) == (b"\xa2", 0)
+    assert last.flags == spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT
+    assert (other.ops, other.frame) == (b"\xa7", 1)
+    assert told(link, ack(4, 3, frame=1, flags=1), 0.1) == [Shown(behind, 0)]
+
+
+def test_a_frame_of_which_nothing_was_coded_is_an_empty_one():
+    link = opened()
+    link.supply(link.begin(), [], last=True)
+    (packet,) = sent(link, 0.0)
+    assert (packet.ops, packet.flags) == (b"", spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT)
+
+
+def test_what_is_not_queued_any_more_takes_no_payloads():
+    link = opened()
+    ticket = link.begin()
+    link.supply(ticket + 1, [b"\xa0"], last=True)
+    assert link.payloads_in_all == 0
+    assert sent(link, 0.0) == []
+
+
+def test_a_frame_that_was_half_coded_when_the_session_ended_goes_on():
+    link = opened()
+    ticket = link.begin()
+    link.supply(ticket, [b"\xa0", b"\xa1"], last=False)
+    assert [packet.ops for packet in sent(link, 0.0)] == [b"\xa0"]
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.1)
+    (hello,) = sent(link, 0.1)
+    told(link, dataclasses.replace(INFO, session=hello.session), 0.1)
+    link.supply(ticket, [b"\xa2"], last=True)
+    assert [packet.ops for packet in sent(link, 0.2)] == [b"\xa0", b"\xa1", b"\xa2"]
+
+
+def test_another_frame_is_wanted_before_the_line_runs_dry():
+    link = opened(rx_buffer=1 << 20)
+    assert link.hungry
+    ticket = link.begin()
+    link.supply(ticket, [bytes([0xA0])] * 4000, last=False)
+    assert link.hungry
+    link.supply(ticket, [bytes([0xA0])] * 400, last=False)
+    assert not link.hungry
+    sent(link, 0.0)
+    told(link, ack(1, 0, credit=1 << 20), 1e-5)  # a fast one has no more than it needs
+    assert link.hungry
+
+
+def test_what_is_much_goes_out_in_portions():
+    """The device is at work on the first while the next is made."""
+    link = opened(max_payload=4096, rx_buffer=1 << 16)
+    link.present([bytes(4096)] * 200)
+    now, taken, most = 0.0, 0, 0
+    while taken < 200:
+        portions = [sent(link, now)]
+        while link.next_timeout(now) == 0:
+            portions.append(sent(link, now))
+        most = max(most, len(portions))
+        assert max(map(len, portions)) * 4096 <= PORTION_BYTES
+        assert portions[0], "nothing is left behind until the device answers"
+        taken += sum(map(len, portions))
+        now += 1e-3
+        told(link, ack(taken % 256, (taken - 1) % 256, credit=1 << 16), now)
+    assert most > 1
+
+
+def test_a_packet_that_is_lost_again_and_again():
+    link = opened()
+    link.present([b"\xa0"])
+
+    def lose():
+        for now in range(100):
+            for packet in sent(link, now / 20):
+                if isinstance(packet, packets.Status):
+                    told(link, ack(0, packet.seq, flags=spec.ACK_FLAG_ASKED), now / 20)
+
+    with pytest.raises(TransportTimeout, match="did not arrive in 30 tries") as caught:
+        lose()
+    assert "noisy" in caught.value.hint
+
+
+def test_damage_is_asked_about_at_once():
+    """9.4: "SHOULD ask with STATUS at once"."""
+    link = opened()
+    link.present([b"\xa0"])
+    assert len(sent(link, 0.0)) == 1
+    told(link, ack(damaged=1), 0.01)
+    (status,) = sent(link, 0.01)
+    assert isinstance(status, packets.Status)
+    told(link, ack(0, status.seq, flags=spec.ACK_FLAG_ASKED, damaged=1), 0.02)
+    (again,) = sent(link, 0.02)
+    assert again.ops == b"\xa0"
+    assert link.counters.retransmitted == 1
+
+
+def test_when_all_waits_for_one_packet_a_status_follows_it_at_once():
+    """Were its answer lost, no other would come: only silence would tell."""
+    link = opened(rx_buffer=1 << 14)
+    link.present([b"\x00"] * 40)
+    assert len(sent(link, 0.0)) > 2
+    told(link, ack(0, 1, received=0b1), 0.001)  # 0 was damaged
+    again, *_ = sent(link, 0.001)
+    assert again.seq == 0
+    while (last := link.counters.packets - 1) < 31:
+        told(link, ack(0, last, received=(1 << last) - 1), 0.002)
+        sent(link, 0.002)
+    told(link, ack(0, 31, received=(1 << 31) - 1), 0.003)  # 0 was damaged again
+    again, status = sent(link, 0.003)
+    assert (again.seq, type(status)) == (0, packets.Status)
+    assert sent(link, 0.003) == [], "one question is enough"
+    told(link, ack(0, status.seq, received=(1 << 31) - 1, flags=spec.ACK_FLAG_ASKED), 0.004)
+    again, status = sent(link, 0.004)
+    assert (again.seq, type(status)) == (0, packets.Status)
+    told(link, ack(32, 0), 0.005)
+    assert all(isinstance(packet, packets.Data) for packet in sent(link, 0.005))
+
+
+def test_a_link_without_credit_asks_for_some():
+    """READ gets no ACK, and so gives no credit back."""
+    link = opened(rx_buffer=169)
+    for k in range(40):
+        link.read(k, 1)
+        for packet in sent(link, k * 1e-3):
+            answer_of(link, packet, k * 1e-3)
+        for packet in sent(link, k * 1e-3):
+            answer_of(link, packet, k * 1e-3)
+    assert link.idle
+    assert 0 < link.counters.statuses < 40
+    assert link.next_timeout(1.0) is None
+
+
+def answer_of(link, packet, now):
+    if isinstance(packet, packets.Read):
+        page = packets.Page(seq=packet.seq, start=packet.start, count=1, ops=b"\xa0")
+        assert told(link, page, now) == [PageRead(page)]
+    else:
+        told(link, ack(0, packet.seq, credit=169, flags=spec.ACK_FLAG_ASKED), now)
+
+
+def test_the_lost_come_before_the_new_and_wait_for_credit_too():
+    link = opened(rx_buffer=169)
+    link.present([bytes(90), b"\xa0"])
+    (first,) = sent(link, 0.0)
+    told(link, ack(damaged=1), 0.0)
+    (status,) = sent(link, 0.0)
+    told(link, ack(0, status.seq, credit=100, flags=spec.ACK_FLAG_ASKED, damaged=1), 0.0)
+    (asks_again,) = sent(link, 0.0)
+    assert isinstance(asks_again, packets.Status)
+    told(link, ack(0, asks_again.seq, credit=169, flags=spec.ACK_FLAG_ASKED, damaged=1), 0.0)
+    assert sent(link, 0.0)[0] == first
+
+
+# -- frames as differences
+
+
+def test_a_difference_is_sent_on_what_is_on_display():
+    """6: "without it, as a copy of the front page"."""
+    link = opened()
+    base = on_display(link)
+    ticket = link.present_on(base, [b"\x80\xa0", b"\xa1"], lambda: [b"\xa7"])
+    first, last = sent(link, 0.1)
+    assert [first.ops, last.ops] == [b"\x80\xa0", b"\xa1"]
+    assert [first.flags, last.flags] == [0, spec.DATA_FLAG_COMMIT]
+    assert told(link, ack(3, 2, frame=1, flags=1), 0.2) == [Shown(ticket, 0)]
+    assert link.on_display not in (base, None)
+    link.present_on(link.on_display, [], lambda: [b"\xa7"])
+    (nothing,) = sent(link, 0.3)
+    assert (nothing.ops, nothing.flags) == (b"", spec.DATA_FLAG_COMMIT)
+
+
+@pytest.mark.parametrize("why", ["another", "on its way", "behind another", "no session"])
+def test_a_difference_from_what_is_not_on_display_goes_whole(why):
+    link = opened()
+    base = on_display(link)
+    if why == "another":
+        link.present([b"\xa2"])
+        sent(link, 0.1)
+        told(link, ack(2, 1, frame=1, flags=1), 0.1)
+    elif why == "on its way":
+        link.present([b"\xa2"])
+        sent(link, 0.1)
+    elif why == "behind another":
+        link.present([b"\xa2"])
+    else:
+        link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.1)
+        (hello,) = sent(link, 0.1)
+        told(link, dataclasses.replace(INFO, session=hello.session), 0.1)
+    link.present_on(base, [b"\x80\xa0"], lambda: [b"\xa7"])
+    packet = [packet for packet in sent(link, 0.2) if isinstance(packet, packets.Data)][-1]
+    assert (packet.ops, packet.flags) == (b"\xa7", spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT)
+
+
+def test_a_difference_goes_whole_when_the_session_ends_before_it_is_shown():
+    link = opened()
+    link.present_on(on_display(link), [b"\x80\xa0"], lambda: [b"\xa7", b"\xa8"])
+    (packet,) = sent(link, 0.1)
+    assert packet.ops == b"\x80\xa0"
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.2)
+    (hello,) = sent(link, 0.2)
+    told(link, dataclasses.replace(INFO, session=hello.session), 0.3)
+    again = sent(link, 0.3)
+    assert [packet.ops for packet in again] == [b"\xa7", b"\xa8"]
+    assert {packet.flags & spec.DATA_FLAG_CLEAR for packet in again} == {spec.DATA_FLAG_CLEAR}

@@ -1,0 +1,163 @@
+"""What a link asks, and how long it waits (protocol.md, 9.3 and 10), with answers by hand."""
+
+import dataclasses
+
+import pytest
+from by_hand import BOOT, INFO, SESSION, ack, opened, sent, told
+
+from voxdisplay.errors import RemoteProtocolError, TransportTimeout
+from voxdisplay.link import Link, Restarted, Shown, Told
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+
+# -- silence
+
+
+def test_status_is_asked_ever_more_rarely_and_at_most_four_times():
+    """9.3: "MUST have no more than 4 of them without answer at one time"."""
+    link = Link(SESSION, 0.0, patience_s=100)
+    sent(link, 0.0)
+    told(link, INFO, 0.0)
+    link.present([b"\xa0"])
+    now, asked = 0.0, []
+    while link.ready:
+        asked += [now for packet in sent(link, now) if isinstance(packet, packets.Status)]
+        now += link.next_timeout(now)
+    assert asked == pytest.approx([0.25, 0.75, 1.75, 3.75])
+    assert now >= 7.75, "then it begins again with HELLO"
+
+
+def test_a_device_that_answers_nothing_but_hello_is_as_good_as_silent():
+    link = opened()
+    link.present([b"\xa0"])
+    now, hellos = 0.0, []
+
+    def answer_hello():
+        nonlocal now
+        while now < 100:
+            for packet in sent(link, now):
+                if isinstance(packet, packets.Hello):
+                    hellos.append(now)
+                    told(link, dataclasses.replace(INFO, session=packet.session), now)
+            now += max(link.next_timeout(now) or 0.0, 0.001)
+
+    with pytest.raises(
+        TransportTimeout, match=r"answers HELLO, and has said nothing else for 5\.0 s"
+    ):
+        answer_hello()
+    assert hellos
+
+
+def test_an_answer_counts_for_the_questions_before_it_and_not_for_those_behind():
+    link = opened()
+    link.present([b"\xa0"])
+    sent(link, 0.0)
+    tags = []
+    for now in (0.25, 0.75, 1.375):
+        (status,) = sent(link, now)
+        tags.append(status.seq)
+    told(link, ack(0, tags[1], flags=spec.ACK_FLAG_ASKED), 1.4)
+    count, now = 0, 1.4
+    while now < 4:
+        count += sum(isinstance(packet, packets.Status) for packet in sent(link, now))
+        now += 0.01
+        if not link.ready:
+            break
+    assert count == 3
+
+
+def test_a_caller_that_was_away_does_not_blame_the_device():
+    link = opened()
+    link.present([b"\xa0"])
+    sent(link, 0.0)
+    for now in (1000.0, 2000.0, 2000.01):
+        assert all(isinstance(packet, packets.Status) for packet in sent(link, now))
+    assert told(link, ack(1, 0, flags=1), 2000.02) == [Shown(1, 0)]
+    link.present([b"\xa0"])
+    sent(link, 9000.0)
+    assert link.next_timeout(9000.0) <= 2.5, "nor has it learnt that the line is slow"
+
+
+# -- asking what is on display
+
+
+def test_an_idle_link_may_be_asked_what_is_on_display():
+    """However long nothing was to be said; and a lost STATUS is asked again."""
+    link = opened()
+    link.ask()
+    (status,) = sent(link, 100.0)
+    assert isinstance(status, packets.Status)
+    assert sent(link, 100.001) == []
+    (again,) = sent(link, 100.0 + link.next_timeout(100.0))
+    assert again.seq != status.seq
+    answer = ack(last=again.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
+    assert told(link, answer, 101.0) == [Told(77)]
+    assert told(link, answer, 101.0) == []
+    assert link.next_timeout(101.0) is None
+
+
+def test_a_device_without_digest_is_asked_for_none():
+    link = opened(features=0)
+    link.ask()
+    (status,) = sent(link, 1.0)
+    answer = ack(last=status.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
+    assert told(link, answer, 1.0) == [Told(None)]
+
+
+def test_a_question_outlives_the_session():
+    link = opened()
+    link.ask()
+    sent(link, 1.0)
+    (restarted,) = told(link, ack(boot=BOOT + 1), 1.0)
+    assert restarted == Restarted()
+    (hello,) = sent(link, 1.0)
+    told(link, dataclasses.replace(INFO, session=hello.session, boot=BOOT + 1), 1.0)
+    (status,) = sent(link, 1.0)
+    assert isinstance(status, packets.Status)
+
+
+# -- reading
+
+
+def test_a_page_that_does_not_match():
+    for wrong in ({"start": 6}, {"count": 0}, {"count": 11}):
+        link = opened()
+        link.read(5, 10)
+        (read,) = sent(link, 0.0)
+        page = {"start": 5, "count": 10} | wrong
+        with pytest.raises(RemoteProtocolError, match="PAGE covers") as caught:
+            told(link, packets.Page(seq=read.seq, **page), 0.1)
+        assert caught.value.section == "10"
+
+
+def test_a_page_that_nobody_asked_for_is_dropped():
+    link = opened()
+    assert told(link, packets.Page(seq=1, start=0, count=1), 0.0) == []
+    link.read(0, 1)
+    (read,) = sent(link, 0.0)
+    assert told(link, packets.Page(seq=read.seq + 1, start=0, count=1), 0.0) == []
+    link.forget_reads()
+    assert told(link, packets.Page(seq=read.seq, start=0, count=1), 0.0) == []
+    assert link.idle
+
+
+def test_a_page_says_nothing_of_data():
+    """9.3: a packet is lost when an ACK shows it; the ACK of a DATA may come behind a PAGE."""
+    link = opened()
+    link.present([b"\xa0"])
+    link.read(0, 1)
+    data, read = sent(link, 0.0)
+    told(link, packets.Page(seq=read.seq, start=0, count=1, ops=b"\xa0"), 0.0)
+    assert sent(link, 0.0) == []
+    assert told(link, ack(1, data.seq, flags=1), 0.0) == [Shown(1, 0)]
+
+
+def test_a_read_whose_page_does_not_come_is_sent_again():
+    link = opened()
+    link.read(3, 4, back=True)
+    (read,) = sent(link, 0.0)
+    assert (read.flags, read.start, read.count) == (spec.READ_FLAG_BACK, 3, 4)
+    (status,) = sent(link, 0.25)
+    told(link, ack(0, status.seq, flags=spec.ACK_FLAG_ASKED), 0.3)
+    (again,) = sent(link, 0.3)
+    assert (again.start, again.count, again.seq != read.seq) == (3, 4, True)
