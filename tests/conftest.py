@@ -16,6 +16,9 @@ ROOT = Path(__file__).parents[1]
 # A shell starts what runs in the background with SIGINT ignored, and children inherit that: the
 # programs that tests interrupt would not hear it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# And nohup with SIGHUP ignored. What has a handler is its default again in a new program.
+if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda _number, _frame: None)
 # For a program that hangs; nothing is measured by it. An emulated machine needs more patience.
 DEADLINE_S = 60 * int(os.environ.get("TEST_PATIENCE", "1"))
 

@@ -31,7 +31,7 @@ def test_a_scene_as_a_picture(run, tmp_path):
     done = run("preview", TREFOIL, "-o", path, *options)
     assert done.returncode == 0
     assert done.stdout == ""
-    assert "495 voxels on 128x128x128 rgb888" in done.stderr
+    assert "496 voxels on 128x128x128 rgb888" in done.stderr
     scene = vd.load_scene(TREFOIL)
     frame = vd.Frame((128, 128, 128))
     for item in scene.items:
