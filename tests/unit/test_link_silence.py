@@ -6,7 +6,7 @@ import pytest
 from by_hand import BOOT, INFO, SESSION, ack, opened, sent, told
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
-from voxdisplay.link import Link, Restarted, Shown, Told
+from voxdisplay.link import Link, PageRead, Restarted, Shown, Told
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
@@ -161,3 +161,37 @@ def test_a_read_whose_page_does_not_come_is_sent_again():
     told(link, ack(0, status.seq, flags=spec.ACK_FLAG_ASKED), 0.3)
     (again,) = sent(link, 0.3)
     assert (again.start, again.count, again.seq != read.seq) == (3, 4, True)
+
+
+def test_many_reads_take_no_tag_whose_answer_is_still_to_come():
+    """Else the answer to a STATUS would be taken for one to a READ that was sent much later."""
+    link = opened(rx_buffer=1 << 16)
+    link.ask()
+    (status,) = sent(link, 0.0)
+    for start in range(100):
+        for count in (1, 2, 3):
+            link.read(start, count)
+    reads = sent(link, 0.0)
+    answer = ack(last=status.seq, flags=spec.ACK_FLAG_ASKED, credit=1 << 16)
+    assert told(link, answer, 0.1) == [Told(0)]
+    asked = []
+    while reads:
+        asked += [(read.start, read.count) for read in reads]
+        for read in reads:
+            page = packets.Page(seq=read.seq, start=read.start, count=read.count, ops=b"\xa0")
+            assert told(link, page, 0.1) == [PageRead(page)]
+        reads = sent(link, 0.1)
+    assert len(set(asked)) == len(asked) == 300
+    assert link.idle
+
+
+def test_a_page_tells_that_those_asked_for_before_it_are_lost():
+    """9: "answered in the order in which they are taken"."""
+    link = opened(rx_buffer=1 << 16)
+    for k in range(3):
+        link.read(k, 1)
+    first, second, third = sent(link, 0.0)
+    assert told(link, packets.Page(seq=second.seq, start=1, count=1, ops=b"\xa0"), 0.1)
+    (again,) = sent(link, 0.1)
+    assert (again.start, again.seq) == (0, third.seq + 1)
+    assert again.seq != first.seq

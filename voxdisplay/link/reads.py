@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
+
+MOST_ON_THE_WAY = 64  # far fewer than there are tags: none comes round before its answer
 
 
 @dataclass(slots=True, eq=False)
@@ -50,8 +53,9 @@ class Reads:
 
     @property
     def to_send(self) -> Iterator[Request]:
-        """Requests that are not on their way."""
-        return (request for request in self._requests if not request.ordinal)
+        """Requests that are not on their way, and may be."""
+        unsent = (request for request in self._requests if not request.ordinal)
+        return islice(unsent, max(0, MOST_ON_THE_WAY - self.on_the_way))
 
     @property
     def on_the_way(self) -> int:
@@ -96,4 +100,5 @@ class Reads:
                 offset=4,
             )
         self._requests.remove(request)
+        self.send_again(request.ordinal)  # answers keep their order
         return True
