@@ -1,17 +1,36 @@
 """A link and an emulated device over a bad line: what is shown is whole, and in the end right."""
 
 import random
+from collections import Counter
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import Faults, Rig, frames, random_frame
 
+from firmware_sim.session import Session, Verdict
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.link import PageRead, Refused
 from voxdisplay.pixel import PixelFormat
 from voxdisplay.wire import spec
 from voxdisplay.wire.spans import decode_spans
+
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_device_is_sent_what_it_has():
+    """9.3: "no packet is on its way twice", whatever the line does."""
+    judge = Session.judge
+
+    def watched(session, *packet):
+        verdict = judge(session, *packet)
+        assert verdict is not Verdict.DUPLICATE
+        return verdict
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Session, "judge", watched)
+        yield
+
 
 seeds = st.integers(0, 2**32 - 1)
 devices = st.fixed_dictionaries(
@@ -39,7 +58,7 @@ def rig_of(seed, device):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(seeds, devices)
 def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, device):
-    """9.3: "Then, and only then, the host sends it again"."""
+    """9.3: "Then, and only then, the host sends it again"; and nothing is asked."""
     rig = rig_of(seed, device)
     drawn = frames(rig.rng, rig.rng.randrange(1, 5), device["pixel_format"])
     tickets = [rig.present(frame) for frame in drawn]
@@ -48,8 +67,11 @@ def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, dev
     rig.assert_told(tickets[-1])
     assert rig.link.counters.retransmitted == 0
     assert rig.link.counters.sessions == 1
-    data = [body for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA]
-    assert len(data) == sum(max(1, len(f.payloads(device["max_payload"]))) for f in drawn)
+    sent = Counter(body[0] >> 4 for body in rig.sent)
+    if not device["jitter_s"]:  # otherwise it may be silent for longer than usual
+        # After several HELLO a small buffer may have no credit yet that the host knows of.
+        assert sent[spec.TYPE_STATUS] <= (sent[spec.TYPE_HELLO] > 1)
+    assert sent[spec.TYPE_DATA] == sum(max(1, len(f.payloads(device["max_payload"]))) for f in drawn)
 
 
 def faults_of(rng):
@@ -77,6 +99,18 @@ def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
     rig.run()
     rig.assert_shows(drawn[-1])
     rig.assert_told(tickets[-1])
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(seeds, st.sampled_from([0.0, 0.01, 0.3]), st.sampled_from(["down", "up", "both"]))
+def test_a_frame_of_many_windows_on_a_bad_line(seed, delay_s, where):
+    """Its window is at times full while all but one packet have been received."""
+    rig = Rig(seed=seed, delay_s=delay_s, rx_buffer=5000, patience_s=60, silent=seed % 9)
+    rig.down.faults = Faults(seed, packet=0.15) if where != "up" else None
+    rig.up.faults = Faults(seed + 1, packet=0.15) if where != "down" else None
+    rig.link.present([bytes(40)] * 150)
+    rig.run()
+    assert len(rig.shown) == 1
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)
