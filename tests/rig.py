@@ -6,6 +6,7 @@ The clock is a number, and every fault comes from a seed.
 from __future__ import annotations
 
 import random
+import re
 from collections import deque
 
 import document
@@ -59,10 +60,13 @@ class Faults:
 
 
 class Line:
-    """One direction: bytes arrive in order, ``delay_s`` after they were sent or later."""
+    """One direction: bytes arrive in order, ``delay_s`` after they were sent or later.
 
-    def __init__(self, delay_s, jitter_s, rng):
-        self.delay_s, self.jitter_s, self.rng = delay_s, jitter_s, rng
+    A byte takes ``byte_s``; a segment arrives with its last.
+    """
+
+    def __init__(self, delay_s, jitter_s, byte_s, rng):
+        self.delay_s, self.jitter_s, self.byte_s, self.rng = delay_s, jitter_s, byte_s, rng
         self.faults = None
         self.stalled_until_s = 0.0
         self._last_s = 0.0
@@ -73,8 +77,9 @@ class Line:
             data = self.faults.carry(data)
         at_s = now + self.delay_s + self.rng.random() * self.jitter_s
         self._last_s = max(self._last_s, at_s, self.stalled_until_s)
-        if data:
-            self._queue.append((self._last_s, data))
+        for segment in re.findall(rb"[^\0]*\0|[^\0]+", data):
+            self._last_s += len(segment) * self.byte_s
+            self._queue.append((self._last_s, segment))
 
     @property
     def due_s(self):
@@ -90,7 +95,9 @@ class Line:
 class Rig:
     """Link, line and device. ``step`` goes to the next moment at which anything happens."""
 
-    def __init__(self, *, seed=0, delay_s=0.001, jitter_s=0.0, patience_s=5.0, **config):
+    def __init__(
+        self, *, seed=0, delay_s=0.001, jitter_s=0.0, byte_s=0.0, patience_s=5.0, **config
+    ):
         self.rng = random.Random(seed)
         self.now = 0.0
         config = {"grid": GRID, "pixel_format": "index8", "refresh": 0, "max_payload": 64} | config
@@ -98,8 +105,8 @@ class Rig:
         self.device = Device(Config(**config))
         self.bench = Bench(self.device)
         self.alive = True
-        self.down = Line(delay_s, jitter_s, self.rng)
-        self.up = Line(delay_s, jitter_s, self.rng)
+        self.down = Line(delay_s, jitter_s, byte_s, self.rng)
+        self.up = Line(delay_s, jitter_s, byte_s, self.rng)
         self.link = Link(self.rng.randrange(1, 65536), self.now, patience_s=patience_s)
         self.events = []
         self.sent = []  # packets, in order
