@@ -169,6 +169,30 @@ def test_when_all_waits_for_one_packet_a_status_follows_it_at_once():
     assert all(isinstance(packet, packets.Data) for packet in sent(link, 0.005))
 
 
+def test_the_status_of_a_full_window_is_behind_all_portions():
+    """9.3: "right behind them"."""
+    link = opened(max_payload=20_000, rx_buffer=1 << 21)
+    link.present([bytes(PORTION_BYTES)] * 80)
+    for now in range(1, 9):  # of the first 8 none is damaged: now the line is known
+        out_of(link, now / 1000)
+        told(link, ack(min(link.counters.packets, 8), 7, credit=1 << 21), now / 1000)
+    while link.counters.packets < 40:  # 8 and 9 are, again and again
+        out_of(link, 0.01)
+        count = link.counters.packets
+        received = sum(1 << seq - 9 for seq in range(10, count))
+        told(link, ack(8, count - 1, received=received, credit=1 << 21), 0.01)
+    *again, status = out_of(link, 0.02)
+    assert [packet.seq for packet in again] == [8, 9]
+    assert isinstance(status, packets.Status)
+
+
+def out_of(link, now):
+    out = sent(link, now)
+    while link.next_timeout(now) == 0:
+        out += sent(link, now)
+    return out
+
+
 def test_a_link_without_credit_asks_for_some():
     """READ gets no ACK, and so gives no credit back."""
     link = opened(rx_buffer=169)

@@ -172,7 +172,7 @@ class Sender:
     def hangs(self) -> bool:
         """Whether all waits for one or two packets, so that without their answer no other came."""
         count, _ = self._window.on_the_way
-        return 0 < count <= LEAST_PACKETS and not self._window.has_room
+        return 0 < count <= LEAST_PACKETS and not (self.goes_on or self._window.has_room)
 
     def acknowledge(self, ack: packets.Ack, now: float) -> float | None:
         """Take an ACK; give how long ago the newest that it reports as received was sent.
