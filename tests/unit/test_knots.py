@@ -33,6 +33,16 @@ def test_breaks_are_looked_at_once() -> None:
     assert (samples.t[samples.piece == 0] <= 1).all()
 
 
+def test_no_parameter_is_looked_at_twice() -> None:
+    # There are 33 numbers in this range, fewer than there are looks at it.
+    coarse = Function(lambda t: (3.5 * (t - 1e15), 0.0, 0.0), 1e15, 1e15 + 4)
+    chain = Polyline([[0, 0, 0], [2, 9, 1], [4, 0, 2]])
+    looks = [first_look(batch) for batch in (Batch([coarse]), Batch([coarse, chain]))]
+    alone, beside = (look.t[look.piece == 0] for look in looks)
+    assert (np.diff(alone) > 0).all()
+    assert np.array_equal(alone, beside)
+
+
 @pytest.mark.parametrize("degree", range(2, 12))
 def test_no_turn_of_a_polynomial_is_missed(degree: int) -> None:
     # Zeros close together: the wildest polynomial of its degree inside the range.

@@ -119,6 +119,9 @@ def first_look(batch: Batch) -> Samples:
     breaks = [curve.breaks for curve in batch.curves]
     if any(each.size for each in breaks if each is not Curve.breaks):
         piece, t = _with_breaks(batch, piece, t, breaks)
+    fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
+    if not fresh.all():  # a break was there, or a range has fewer parameters than it has looks
+        piece, t = piece[fresh], t[fresh]
     return Samples(piece, t, batch.evaluate(piece, t), index)
 
 
@@ -129,9 +132,7 @@ def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> 
     inside = (turn > batch.first[of]) & (turn < batch.last[of])
     piece, t = np.append(piece, of[inside]), np.append(t, turn[inside])
     order = np.lexsort((t, piece))
-    piece, t = piece[order], t[order]
-    fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
-    return piece[fresh], t[fresh]
+    return piece[order], t[order]
 
 
 @twin
