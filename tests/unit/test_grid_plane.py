@@ -210,6 +210,17 @@ def test_many_jumps() -> None:
     assert_guaranteed(sequence)
 
 
+def test_a_plane_that_is_jumped_over_is_not_crossed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Where no crossing is found, memory may hold anything.
+    def dirty(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
+        return np.full(shape, np.nan if dtype is float else 0, dtype)
+
+    monkeypatch.setattr(np, "empty", dirty)
+    sequence = voxelize(Function(lambda t: (20 * t, 5.3 + 0.5 * (t > 1 / 3), 7.3)))
+    assert set(sequence.voxels[:, 1]) == {5}
+    assert_guaranteed(sequence)
+
+
 @pytest.mark.parametrize(
     ("function", "axis", "where"),
     [
