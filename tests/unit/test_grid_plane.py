@@ -292,6 +292,14 @@ def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
         assert alone.closed == many.closed
 
 
+def test_ranges_of_t_in_a_batch_may_be_of_any_size() -> None:
+    tiny = Function(lambda t: (50e300 * t, 40 * (1e300 * t) ** 2, 0.0), 0.0, 1e-300)
+    far = Function(lambda t: (t - 1e15, (t - 1e15) ** 2 / 4, 0.0), 1e15, 1e15 + 4)
+    curves = [tiny, far, tiny]
+    for curve, many in zip(curves, voxelize_many(curves), strict=True):
+        assert np.array_equal(voxelize(curve).voxels, many.voxels)
+
+
 def test_a_long_curve_is_the_same_alone_and_in_a_batch() -> None:
     long = paper_curve(8000, 4, 0)  # several blocks
     other = fourier_curve(1, "smooth", closed=False)

@@ -86,6 +86,7 @@ def settle(batch: Batch, samples: Samples) -> Samples:
         samples = batch.split(samples, parts)
 
 
+@np.errstate(all="ignore")  # between pieces, a step has no meaning and may be of any size
 def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
     """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
     while True:
