@@ -225,6 +225,21 @@ def test_a_batch_proves_what_each_proves_alone():
         assert alone.proof == many.proof
 
 
+def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypatch):
+    monkeypatch.setattr("voxdisplay.voxelize.knots.MOST_SAMPLES", 16_000)
+
+    class Loose(vd.Segment):
+        def enclosure(self, t_lo, t_hi):
+            low, high = super().enclosure(t_lo, t_hi)
+            return low, high + 3000 * (t_hi - t_lo)
+
+    loose = Loose((0, 0, 0), (9, 8, 7))
+    alone = voxelize(loose, certified=True)
+    beside, _ = voxelize_many([loose, spike(1e-3)], certified=True)
+    assert np.array_equal(alone.voxels, beside.voxels)
+    assert alone.proof == beside.proof
+
+
 def test_nothing_is_proven_of_the_march():
     with pytest.raises(ValueError, match="grid-plane"):
         voxelize(ANY["circle"], method="march", certified=True)

@@ -172,7 +172,9 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
-    excess = ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles).nonzero()[0]
+    grows = np.maximum.reduceat(parts, starts) > 1  # others are done, and no concern of these
+    over = grows & ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    excess = over.nonzero()[0]
     if not excess.size:
         return
     index = int(excess[0])
