@@ -269,6 +269,15 @@ def test_a_batch_says_which_curve_is_wrong() -> None:
         voxelize_many([*[good] * 40, bad])
 
 
+def test_slopes_may_be_infinite() -> None:
+    # No number holds 60 / 1e-310: the tangents that choose between corners are lost, no more.
+    def coil(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        turn = t / 1e-310
+        return 60 * np.cos(3 * turn), 60 * np.sin(3 * turn), 30 * turn
+
+    assert_guaranteed(voxelize(Function(coil, 0.0, 1e-310)))
+
+
 # ------------------------------------------------------------------------ batches and faces
 
 

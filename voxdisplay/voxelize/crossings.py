@@ -228,6 +228,7 @@ def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends
 
 
 @twin
+@np.errstate(all="ignore")
 def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
     """Look for the corners of the crossed faces that are nearest to the tangents.
 
