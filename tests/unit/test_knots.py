@@ -5,6 +5,7 @@ import pytest
 from space_curves import Function
 
 from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
+from voxdisplay.errors import CurveError
 from voxdisplay.voxelize.batch import Batch
 from voxdisplay.voxelize.knots import LOOK, first_look, knots
 
@@ -41,6 +42,22 @@ def test_no_parameter_is_looked_at_twice() -> None:
     alone, beside = (look.t[look.piece == 0] for look in looks)
     assert (np.diff(alone) > 0).all()
     assert np.array_equal(alone, beside)
+
+
+def test_curves_are_too_rough_alone_or_not_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    wriggle = Function(lambda t: (t, 0.4 * np.sin(700 * t), 0.0))
+
+    def settles(limit: int, curves: int) -> bool:
+        monkeypatch.setattr("voxdisplay.voxelize.knots.MOST_SAMPLES", limit)
+        try:
+            knots(Batch([wriggle] * curves))
+        except CurveError:
+            return False
+        return True
+
+    enough = next(limit for limit in range(0, 16_000, 16) if settles(limit, 1))
+    assert enough > 16 * 64
+    assert settles(enough, 3)
 
 
 @pytest.mark.parametrize("degree", range(2, 12))

@@ -168,7 +168,8 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
         return
     starts = samples.bounds[:-1]
-    length, count = np.add.reduceat(chord, starts), np.add.reduceat(parts, starts)
+    length = np.add.reduceat(chord, starts)
+    count = np.add.reduceat(parts * samples.joined, starts)
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
