@@ -1,13 +1,16 @@
 """How closely curves are looked at first, and that nothing hides between the looks."""
 
+from bisect import bisect_left
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from space_curves import Function
 
 from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelize.batch import Batch
-from voxdisplay.voxelize.knots import LOOK, first_look, knots
+from voxdisplay.voxelize.batch import Batch, Samples
+from voxdisplay.voxelize.knots import LOOK, first_look, knots, refine
 
 
 def test_curves_are_looked_at_as_closely_as_their_degree_asks() -> None:
@@ -44,19 +47,22 @@ def test_no_parameter_is_looked_at_twice() -> None:
     assert np.array_equal(alone, beside)
 
 
-def test_curves_are_too_rough_alone_or_not_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("look", [knots, lambda batch: refine(batch, first_look(batch), 0.1)])
+def test_curves_are_too_rough_alone_or_not_at_all(
+    look: Callable[[Batch], Samples], monkeypatch: pytest.MonkeyPatch
+) -> None:
     wriggle = Function(lambda t: (t, 0.4 * np.sin(700 * t), 0.0))
 
     def settles(limit: int, curves: int) -> bool:
         monkeypatch.setattr("voxdisplay.voxelize.knots.MOST_SAMPLES", limit)
         try:
-            knots(Batch([wriggle] * curves))
+            look(Batch([wriggle] * curves))
         except CurveError:
             return False
         return True
 
-    enough = next(limit for limit in range(0, 16_000, 16) if settles(limit, 1))
-    assert enough > 16 * 64
+    enough = bisect_left(range(20_000), True, key=lambda limit: settles(limit, 1))
+    assert enough > 64
     assert settles(enough, 3)
 
 

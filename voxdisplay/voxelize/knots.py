@@ -98,7 +98,7 @@ def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
         parts[~samples.joined] = 1
         if not (parts > 1).any():
             return samples
-        count = np.bincount(curve, parts, len(batch.curves))
+        count = np.bincount(curve, parts * samples.joined, len(batch.curves))
         if (count > MOST_SAMPLES).any():
             raise _too_rough(batch, int(np.argmax(count)))
         samples = batch.split(samples, parts)
