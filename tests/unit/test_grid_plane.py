@@ -255,7 +255,9 @@ def test_endless_curves_are_refused(function, message: str) -> None:
     assert caught.value.hint
 
 
-@pytest.mark.parametrize("t_range", [(0.0, np.inf), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0)])
+@pytest.mark.parametrize(
+    "t_range", [(0.0, np.inf), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0), (-1e308, 1e308)]
+)
 def test_bad_ranges_are_refused(t_range: tuple[float, float]) -> None:
     with pytest.raises(CurveError, match="range of t"):
         voxelize(Function(lambda t: (t, t, t), *t_range))
