@@ -211,7 +211,7 @@ def _corrected(batch: Batch, knots: Samples, aims: Aims) -> tuple[Aims, Floats]:
         return aims, points
     kept = np.ones(aims.t.size, dtype=bool)
     kept[off] = found
-    return Aims(*[each[kept] for each in aims]), points[:, kept]
+    return Aims._make(each[kept] for each in aims), points[:, kept]
 
 
 def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
