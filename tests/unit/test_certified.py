@@ -240,6 +240,14 @@ def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypat
     assert alone.proof == beside.proof
 
 
+def test_tips_are_left_whatever_curve_comes_before():
+    there = [(0.5, 0.5, 0.5), (0.5, 1.5, 0.5)]
+    back = vd.Polyline([*there, there[0]])
+    alone = voxelize(back, certified=True)
+    _, beside, _ = voxelize_many([vd.Segment(*there)] + [back] * 2, certified=True)
+    assert np.array_equal(alone.voxels, beside.voxels)
+
+
 def test_nothing_is_proven_of_the_march():
     with pytest.raises(ValueError, match="grid-plane"):
         voxelize(ANY["circle"], method="march", certified=True)
