@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from space_curves import Function
 
 import voxdisplay as vd
+from voxdisplay.compiled import use
 from voxdisplay.curves import Transformed
 from voxdisplay.voxelize import measure, voxelize, voxelize_many
 from voxdisplay.voxelize.certify import COVERAGE, END_ERROR, ERROR, Certificate, certify
@@ -240,12 +241,19 @@ def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypat
     assert alone.proof == beside.proof
 
 
-def test_tips_are_left_whatever_curve_comes_before():
-    there = [(0.5, 0.5, 0.5), (0.5, 1.5, 0.5)]
-    back = vd.Polyline([*there, there[0]])
-    alone = voxelize(back, certified=True)
-    _, beside, _ = voxelize_many([vd.Segment(*there)] + [back] * 2, certified=True)
-    assert np.array_equal(alone.voxels, beside.voxels)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_tips_are_left_whatever_curve_comes_before(compiled):
+    if compiled:
+        pytest.importorskip("numba")
+    before = use(compiled)
+    try:
+        there = [(0.5, 0.5, 0.5), (0.5, 1.5, 0.5)]
+        back = vd.Polyline([*there, there[0]])
+        alone = voxelize(back, certified=True)
+        _, beside, _ = voxelize_many([vd.Segment(*there)] + [back] * 2, certified=True)
+        assert np.array_equal(alone.voxels, beside.voxels)
+    finally:
+        use(before)
 
 
 def test_nothing_is_proven_of_the_march():
