@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from space_curves import Function
 
 import voxdisplay as vd
+from voxdisplay.compiled import use
 from voxdisplay.curves import Transformed
 from voxdisplay.voxelize import measure, voxelize, voxelize_many
 from voxdisplay.voxelize.certify import COVERAGE, END_ERROR, ERROR, Certificate, certify
@@ -223,6 +224,36 @@ def test_a_batch_proves_what_each_proves_alone():
         alone = voxelize(curve, certified=True)
         assert np.array_equal(alone.voxels, many.voxels)
         assert alone.proof == many.proof
+
+
+def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypatch):
+    monkeypatch.setattr("voxdisplay.voxelize.knots.MOST_SAMPLES", 16_000)
+
+    class Loose(vd.Segment):
+        def enclosure(self, t_lo, t_hi):
+            low, high = super().enclosure(t_lo, t_hi)
+            return low, high + 3000 * (t_hi - t_lo)
+
+    loose = Loose((0, 0, 0), (9, 8, 7))
+    alone = voxelize(loose, certified=True)
+    beside, _ = voxelize_many([loose, spike(1e-3)], certified=True)
+    assert np.array_equal(alone.voxels, beside.voxels)
+    assert alone.proof == beside.proof
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_tips_are_left_whatever_curve_comes_before(compiled):
+    if compiled:
+        pytest.importorskip("numba")
+    before = use(compiled)
+    try:
+        there = [(0.5, 0.5, 0.5), (0.5, 1.5, 0.5)]
+        back = vd.Polyline([*there, there[0]])
+        alone = voxelize(back, certified=True)
+        _, beside, _ = voxelize_many([vd.Segment(*there)] + [back] * 2, certified=True)
+        assert np.array_equal(alone.voxels, beside.voxels)
+    finally:
+        use(before)
 
 
 def test_nothing_is_proven_of_the_march():

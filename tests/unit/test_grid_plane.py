@@ -210,6 +210,17 @@ def test_many_jumps() -> None:
     assert_guaranteed(sequence)
 
 
+def test_a_plane_that_is_jumped_over_is_not_crossed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Where no crossing is found, memory may hold anything.
+    def dirty(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
+        return np.full(shape, np.nan if dtype is float else 0, dtype)
+
+    monkeypatch.setattr(np, "empty", dirty)
+    sequence = voxelize(Function(lambda t: (20 * t, 5.3 + 0.5 * (t > 1 / 3), 7.3)))
+    assert set(sequence.voxels[:, 1]) == {5}
+    assert_guaranteed(sequence)
+
+
 @pytest.mark.parametrize(
     ("function", "axis", "where"),
     [
@@ -244,7 +255,9 @@ def test_endless_curves_are_refused(function, message: str) -> None:
     assert caught.value.hint
 
 
-@pytest.mark.parametrize("t_range", [(0.0, np.inf), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0)])
+@pytest.mark.parametrize(
+    "t_range", [(0.0, np.inf), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0), (-1e308, 1e308)]
+)
 def test_bad_ranges_are_refused(t_range: tuple[float, float]) -> None:
     with pytest.raises(CurveError, match="range of t"):
         voxelize(Function(lambda t: (t, t, t), *t_range))
@@ -256,6 +269,15 @@ def test_a_batch_says_which_curve_is_wrong() -> None:
         voxelize_many([good, good, bad])
     with pytest.raises(CurveError, match=r"curve 40: y = -inf at t = 0\.0"):
         voxelize_many([*[good] * 40, bad])
+
+
+def test_slopes_may_be_infinite() -> None:
+    # No number holds 60 / 1e-310: the tangents that choose between corners are lost, no more.
+    def coil(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        turn = t / 1e-310
+        return 60 * np.cos(3 * turn), 60 * np.sin(3 * turn), 30 * turn
+
+    assert_guaranteed(voxelize(Function(coil, 0.0, 1e-310)))
 
 
 # ------------------------------------------------------------------------ batches and faces
@@ -279,6 +301,14 @@ def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
         assert np.array_equal(alone.t, many.t)
         assert np.array_equal(alone.starts, many.starts)
         assert alone.closed == many.closed
+
+
+def test_ranges_of_t_in_a_batch_may_be_of_any_size() -> None:
+    tiny = Function(lambda t: (50e300 * t, 40 * (1e300 * t) ** 2, 0.0), 0.0, 1e-300)
+    far = Function(lambda t: (t - 1e15, (t - 1e15) ** 2 / 4, 0.0), 1e15, 1e15 + 4)
+    curves = [tiny, far, tiny]
+    for curve, many in zip(curves, voxelize_many(curves), strict=True):
+        assert np.array_equal(voxelize(curve).voxels, many.voxels)
 
 
 def test_a_long_curve_is_the_same_alone_and_in_a_batch() -> None:

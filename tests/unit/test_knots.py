@@ -1,12 +1,16 @@
 """How closely curves are looked at first, and that nothing hides between the looks."""
 
+from bisect import bisect_left
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from space_curves import Function
 
 from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
-from voxdisplay.voxelize.batch import Batch
-from voxdisplay.voxelize.knots import LOOK, first_look, knots
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelize.batch import Batch, Samples
+from voxdisplay.voxelize.knots import LOOK, first_look, knots, refine
 
 
 def test_curves_are_looked_at_as_closely_as_their_degree_asks() -> None:
@@ -31,6 +35,35 @@ def test_breaks_are_looked_at_once() -> None:
         assert {0.0, 1.0, 2.0, 3.0} <= set(t.tolist())
         assert (np.diff(t) > 0).all()
     assert (samples.t[samples.piece == 0] <= 1).all()
+
+
+def test_no_parameter_is_looked_at_twice() -> None:
+    # There are 33 numbers in this range, fewer than there are looks at it.
+    coarse = Function(lambda t: (3.5 * (t - 1e15), 0.0, 0.0), 1e15, 1e15 + 4)
+    chain = Polyline([[0, 0, 0], [2, 9, 1], [4, 0, 2]])
+    looks = [first_look(batch) for batch in (Batch([coarse]), Batch([coarse, chain]))]
+    alone, beside = (look.t[look.piece == 0] for look in looks)
+    assert (np.diff(alone) > 0).all()
+    assert np.array_equal(alone, beside)
+
+
+@pytest.mark.parametrize("look", [knots, lambda batch: refine(batch, first_look(batch), 0.1)])
+def test_curves_are_too_rough_alone_or_not_at_all(
+    look: Callable[[Batch], Samples], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wriggle = Function(lambda t: (t, 0.4 * np.sin(700 * t), 0.0))
+
+    def settles(limit: int, curves: int) -> bool:
+        monkeypatch.setattr("voxdisplay.voxelize.knots.MOST_SAMPLES", limit)
+        try:
+            look(Batch([wriggle] * curves))
+        except CurveError:
+            return False
+        return True
+
+    enough = bisect_left(range(20_000), True, key=lambda limit: settles(limit, 1))
+    assert enough > 64
+    assert settles(enough, 3)
 
 
 @pytest.mark.parametrize("degree", range(2, 12))

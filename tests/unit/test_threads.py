@@ -174,6 +174,24 @@ def test_the_collector_of_garbage_is_left_as_it_was(*, on: bool) -> None:
         (gc.enable if was_on else gc.disable)()
 
 
+def test_an_interrupt_leaves_the_collector_of_garbage_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    disable = gc.disable
+
+    def interrupted() -> None:
+        disable()
+        raise KeyboardInterrupt  # as soon as the call is over
+
+    was_on = gc.isenabled()
+    gc.enable()
+    monkeypatch.setattr(gc, "disable", interrupted)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            voxelize_many(beziers(4))
+        assert gc.isenabled()
+    finally:
+        (gc.enable if was_on else disable)()
+
+
 def test_the_first_bad_curve_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DIGITISE, "CURVES", 4)
     far = Segment((0, 0, 0), (3e9, 0, 0))

@@ -91,7 +91,9 @@ class Batch:
         ends = chain.from_iterable([curve.t_range for curve in self.curves])
         ranges = np.fromiter(ends, dtype=float).reshape(-1, 2)
         self.first, self.last = ranges.T
-        good = np.isfinite(ranges).all(axis=1) & (self.first < self.last)
+        with np.errstate(all="ignore"):
+            length = self.last - self.first  # which may be too long for a number
+        good = np.isfinite(length) & (length > 0)
         if not good.all():
             index = int(np.argmin(good))
             raise CurveError(

@@ -171,21 +171,9 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
 
 
 def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> Crossings:
-    piece, axis, t, tau = knots.piece[aims.knot], aims.axis, aims.t, aims.tau
+    aims, points = _corrected(batch, knots, aims)
+    piece, t = knots.piece[aims.knot], aims.t
     curve = knots.curve[piece]
-    points = batch.evaluate(curve, t)
-    found = np.ones(t.size, dtype=bool)
-    miss = _of_axis(points, axis) - aims.level
-    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
-    if off.size:
-        level = aims.level[off]
-        bracket, ends = _brackets(knots, aims, miss, off)
-        t[off], points[:, off], found[off] = cross(
-            batch, curve[off], axis[off].astype(np.int64), level, bracket, ends
-        )
-        left = aims.knot[off]
-        tau[off] = (t[off] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
-
     nearest, better, gain, foot = corners(knots, slopes, aims, points)
     check = np.isfinite(foot).nonzero()[0]
     if check.size:  # at the foot of the perpendicular the curve must be near enough
@@ -199,11 +187,31 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
         far = check[(apart * apart).sum(axis=0) > 0.5]
         gain[far] = np.inf
 
-    heading = (2 * axis + aims.descends).astype(np.int8)
-    events = Events(piece.astype(np.int32), t, nearest, heading)
+    heading = (2 * aims.axis + aims.descends).astype(np.int8)
+    return Crossings(Events(piece.astype(np.int32), t, nearest, heading), better, gain)
+
+
+def _corrected(batch: Batch, knots: Samples, aims: Aims) -> tuple[Aims, Floats]:
+    """Find where planes are crossed, and the points there, but not those that are jumped over."""
+    curve = knots.curve[knots.piece[aims.knot]]
+    points = batch.evaluate(curve, aims.t)
+    miss = _of_axis(points, aims.axis) - aims.level
+    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
+    if not off.size:
+        return aims, points
+    bracket, ends = _brackets(knots, aims, miss, off)
+    axis = aims.axis[off].astype(np.int64)
+    aims.t[off], points[:, off], found = cross(
+        batch, curve[off], axis, aims.level[off], bracket, ends
+    )
+    hit = off[found]
+    left = aims.knot[hit]
+    aims.tau[hit] = (aims.t[hit] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
     if found.all():
-        return Crossings(events, better, gain)
-    return Crossings(events.take(found), better[:, found], gain[found])
+        return aims, points
+    kept = np.ones(aims.t.size, dtype=bool)
+    kept[off] = found
+    return Aims._make(each[kept] for each in aims), points[:, kept]
 
 
 def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
@@ -220,6 +228,7 @@ def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends
 
 
 @twin
+@np.errstate(all="ignore")
 def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
     """Look for the corners of the crossed faces that are nearest to the tangents.
 

@@ -125,8 +125,8 @@ def _nothing_to_collect() -> Iterator[None]:
     if not gc.isenabled():
         yield
         return
-    gc.disable()
     try:
+        gc.disable()  # in here: an interrupt may come as soon as that is done
         yield
     finally:
         gc.enable()

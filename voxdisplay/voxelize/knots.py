@@ -86,6 +86,7 @@ def settle(batch: Batch, samples: Samples) -> Samples:
         samples = batch.split(samples, parts)
 
 
+@np.errstate(all="ignore")  # between pieces, a step has no meaning and may be of any size
 def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
     """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
     while True:
@@ -97,7 +98,7 @@ def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
         parts[~samples.joined] = 1
         if not (parts > 1).any():
             return samples
-        count = np.bincount(curve, parts, len(batch.curves))
+        count = np.bincount(curve, parts * samples.joined, len(batch.curves))
         if (count > MOST_SAMPLES).any():
             raise _too_rough(batch, int(np.argmax(count)))
         samples = batch.split(samples, parts)
@@ -119,6 +120,9 @@ def first_look(batch: Batch) -> Samples:
     breaks = [curve.breaks for curve in batch.curves]
     if any(each.size for each in breaks if each is not Curve.breaks):
         piece, t = _with_breaks(batch, piece, t, breaks)
+    fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
+    if not fresh.all():  # a break was there, or a range has fewer parameters than it has looks
+        piece, t = piece[fresh], t[fresh]
     return Samples(piece, t, batch.evaluate(piece, t), index)
 
 
@@ -129,9 +133,7 @@ def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> 
     inside = (turn > batch.first[of]) & (turn < batch.last[of])
     piece, t = np.append(piece, of[inside]), np.append(t, turn[inside])
     order = np.lexsort((t, piece))
-    piece, t = piece[order], t[order]
-    fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
-    return piece[fresh], t[fresh]
+    return piece[order], t[order]
 
 
 @twin
@@ -166,11 +168,14 @@ def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> N
     if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
         return
     starts = samples.bounds[:-1]
-    length, count = np.add.reduceat(chord, starts), np.add.reduceat(parts, starts)
+    length = np.add.reduceat(chord, starts)
+    count = np.add.reduceat(parts * samples.joined, starts)
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
     wriggles = count > MOST_SAMPLES // 16 + 3 * length
-    excess = ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles).nonzero()[0]
+    grows = np.maximum.reduceat(parts, starts) > 1  # others are done, and no concern of these
+    over = grows & ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    excess = over.nonzero()[0]
     if not excess.size:
         return
     index = int(excess[0])

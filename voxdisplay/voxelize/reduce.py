@@ -127,8 +127,11 @@ def _over_tips(
     """Tell which short cuts would take a tip and still leave a chord beside them."""
     voxels, size = events.voxels, events.t.size
     before, after = np.maximum(starts - 1, 0), np.minimum(stops + 1, size - 1)
-    touches = near(voxels[:, before], voxels[:, stops]) & (before < starts)
-    touches |= near(voxels[:, starts], voxels[:, after]) & (after > stops)
+    piece = events.piece
+    apart = (before == starts) | (piece[before] != piece[starts])
+    touches = near(voxels[:, before], voxels[:, stops]) & ~apart
+    apart = (after == stops) | (piece[after] != piece[stops])
+    touches |= near(voxels[:, starts], voxels[:, after]) & ~apart
     low = np.minimum(voxels[:, starts], voxels[:, stops])
     high = np.maximum(voxels[:, starts], voxels[:, stops])
     out = np.zeros(starts.size, dtype=bool)

@@ -42,7 +42,8 @@ def cross(
     t : (n,) float64 array
     points : (3, n) float64 array
     found : (n,) bool array
-        False where a coordinate passes the level without taking it, within ``TOLERANCE``.
+        False where a coordinate passes the level without taking it, within ``TOLERANCE``; t and
+        points are not set there.
 
     """
     t = np.empty(curve.size)

@@ -222,10 +222,10 @@ def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool, window:
 
 
 @jit
-def _over_tip(voxels: Voxels, i: int, j: int) -> bool:
-    size = voxels.shape[1]
-    touches = (i > 0 and _near(voxels, i - 1, j)) or (j + 1 < size and _near(voxels, i, j + 1))
-    if not touches:
+def _over_tip(piece: Pieces, voxels: Voxels, i: int, j: int) -> bool:
+    before = i > 0 and piece[i - 1] == piece[i] and _near(voxels, i - 1, j)
+    after = j + 1 < piece.size and piece[j + 1] == piece[j] and _near(voxels, i, j + 1)
+    if not (before or after):
         return False
     for k in range(i + 1, j):
         for row in range(3):
@@ -305,7 +305,7 @@ def _reduce(
                     end += 1
                     connected &= end == i + 1 or _near(voxels, end - 2, end - 1)
             leap = _leap(voxels, i, begin, end, connected, window)
-        if leap > 1 and tips and _over_tip(voxels, i, i + leap):
+        if leap > 1 and tips and _over_tip(piece, voxels, i, i + leap):
             leap = 1
         if leap > 1 and way_t.size:
             j = i + leap
