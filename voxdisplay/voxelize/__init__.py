@@ -59,7 +59,8 @@ def voxelize(
     -------
     Sequence
         26-connected; the first voxel holds the curve's first point, the last its last; others
-        are within 0.7072 of the curve. Each has exactly two neighbours but for the contacts that
+        are within 0.7072 of the curve, if a step from one float t to the next moves it by less
+        than 0.002. Each has exactly two neighbours but for the contacts that
         ``.contact_pairs`` lists. A closed curve is one whose ends are within 0.001 voxels of each
         other, unless it says otherwise itself; its last voxel is a neighbour of the first.
 
