@@ -19,6 +19,16 @@ SESSION = 0x1234
 BOOT = 0xB007
 
 
+class Clock:
+    """A clock that stands still until it is set."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
 def packet(kind: int, flags: int = 0, seq: int = 0, frame: int = 0, payload: bytes = b"") -> bytes:
     return on_wire(bytes((kind << 4 | flags, seq, frame)) + payload)
 

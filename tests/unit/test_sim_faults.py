@@ -17,6 +17,7 @@ from simwire import (
     INFO,
     PENDING,
     SHOWN,
+    Clock,
     answers,
     data,
     hello,
@@ -31,14 +32,6 @@ from firmware_sim.wire import Wire
 
 NO_SESSION = 1
 BOTH = ("down", "up")
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 # What a text asks for

@@ -12,6 +12,7 @@ from simwire import (
     PENDING,
     SHOWN,
     Answer,
+    Clock,
     answers,
     data,
     hello,
@@ -28,14 +29,6 @@ from firmware_sim.serve import (
 from firmware_sim.wire import Wire
 
 WAIT = 20  # seconds after which a test has failed; none takes so long
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 def test_ticks_do_not_drift() -> None:
