@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from firmware_sim.baud_pacing import PacedWire, paced
 from firmware_sim.bench import Bench
 from firmware_sim.config import (
     FEATURES,
@@ -26,17 +27,16 @@ from firmware_sim.config import (
     parse_size,
 )
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
-from firmware_sim.pace import PacedWire, paced
 from firmware_sim.serve import check_local, linked, listen, open_pty, serve_tcp, serve_wire
 from firmware_sim.tap import Tap
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction, SerialFunction
 from firmware_sim.usb.usbip_server import serve_usbip
 from firmware_sim.viewer import viewer
-from firmware_sim.wire import Wire
 
 _EPILOG = """\
 examples:

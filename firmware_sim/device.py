@@ -13,12 +13,12 @@ from firmware_sim import spec
 from firmware_sim.config import Config
 from firmware_sim.info import announce
 from firmware_sim.memory import Memory
-from firmware_sim.pack import pack
+from firmware_sim.op_decoder import Unpacker
+from firmware_sim.packet_error import Refusal
+from firmware_sim.page_encoder import pack
 from firmware_sim.receiver import Receiver
-from firmware_sim.refusal import Refusal
 from firmware_sim.sender import send
 from firmware_sim.session import Session, State, Verdict
-from firmware_sim.unpack import Unpacker
 
 if TYPE_CHECKING:
     from collections.abc import Callable

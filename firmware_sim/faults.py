@@ -11,21 +11,21 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from firmware_sim import fault_kinds
-from firmware_sim.fault_kinds import Event, Fault, Piece, Strokes
+from firmware_sim import fault_types
+from firmware_sim.fault_types import Event, Fault, Piece, Strokes
 
 KINDS: Final[dict[str, type[Fault]]] = {
-    "flip": fault_kinds.Flip,
-    "drop": fault_kinds.Drop,
-    "double": fault_kinds.Double,
-    "insert": fault_kinds.Insert,
-    "lose": fault_kinds.Lose,
-    "delay": fault_kinds.Delay,
-    "reorder": fault_kinds.Reorder,
-    "short": fault_kinds.Short,
-    "stall": fault_kinds.Stall,
-    "reboot": fault_kinds.Reboot,
-    "unplug": fault_kinds.Unplug,
+    "flip": fault_types.Flip,
+    "drop": fault_types.Drop,
+    "double": fault_types.Double,
+    "insert": fault_types.Insert,
+    "lose": fault_types.Lose,
+    "delay": fault_types.Delay,
+    "reorder": fault_types.Reorder,
+    "short": fault_types.Short,
+    "stall": fault_types.Stall,
+    "reboot": fault_types.Reboot,
+    "unplug": fault_types.Unplug,
 }
 DIRECTIONS: Final = ("down", "up")  # to the device, and from it
 _TIMED: Final = ("delay", "stall")
@@ -200,9 +200,9 @@ class Line:
 
 def _make(fault: Spec, seed: str) -> Fault:
     strokes: Strokes = (
-        fault_kinds.Random(fault.rate, random.Random(seed))
+        fault_types.Random(fault.rate, random.Random(seed))
         if fault.after is None
-        else fault_kinds.Once(fault.after)
+        else fault_types.Once(fault.after)
     )
     return KINDS[fault.kind](strokes, fault.seconds, random.Random(f"{seed} besides"))
 

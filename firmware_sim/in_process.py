@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
+from firmware_sim.baud_pacing import PacedWire, paced
 from firmware_sim.bench import Bench
 from firmware_sim.config import (
     Config,
@@ -21,9 +22,8 @@ from firmware_sim.config import (
     parse_size,
 )
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.faults import parse_faults
-from firmware_sim.pace import PacedWire, paced
-from firmware_sim.wire import Wire
 
 # Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
 _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {

@@ -7,7 +7,7 @@ written in another form than the document's; it knows nothing of what the ops do
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.packet_error import Refusal
 
 OPERAND: Final = 0x1F  # the low five bits of an op byte
 _COUNT_BYTES: Final = 5  # section 7.2: the longest LEB128

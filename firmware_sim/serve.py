@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from firmware_sim.baud_pacing import PacedWire
+from firmware_sim.device_on_line import Wire
 from firmware_sim.in_process import InProcessPort, open_in_process
-from firmware_sim.pace import PacedWire
-from firmware_sim.wire import Wire
 
 __all__ = [
     "InProcessPort",

@@ -7,7 +7,7 @@ answers.
 from enum import Enum, auto
 
 from firmware_sim import spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.packet_error import Refusal
 
 _NO_FRAME = 255  # section 6, point 6: f before the first frame
 _SEQ, _FRAME, _CLEAR = 1, 2, 0  # offsets in the header that a refusal points at

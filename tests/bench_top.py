@@ -3,12 +3,12 @@
 Waiting costs nothing, and how busy the machine is does not matter. Work takes no time.
 """
 
+from firmware_sim.baud_pacing import PacedWire
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.faults import parse_faults
-from firmware_sim.pace import PacedWire
-from firmware_sim.wire import Wire
 
 _INSTANT_S = 1e-6  # a look at something that happens now
 

@@ -4,7 +4,7 @@ import dataclasses
 
 from voxdisplay.link import Link, Ready, Shown
 from voxdisplay.wire import packet as packets
-from voxdisplay.wire.stream import PacketStream
+from voxdisplay.wire.packet_stream import PacketStream
 
 SESSION, BOOT = 23063, 45063
 INFO = packets.Info(

@@ -10,8 +10,8 @@ from plain_decoder import Plain
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid as DeviceGrid
 from firmware_sim.memory import FORMATS, Page
-from firmware_sim.unpack import Unpacker
-from voxdisplay.pixel import PixelFormat
+from firmware_sim.op_decoder import Unpacker
+from voxdisplay.raster.pixel_format import PixelFormat
 
 HEADER = bytes(3)
 

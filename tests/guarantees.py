@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from space_curves import Function, chain, fourier_curve
 
-from voxdisplay import voxelize
+from voxdisplay import voxelization
 from voxdisplay.curves import Bezier, Curve, Lissajous, TorusKnot
-from voxdisplay.voxelize import measure
+from voxdisplay.voxelization import measure
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 ERROR, END_ERROR, COVERAGE = 0.7072, 0.8661, 2.5
 
 
-def check(sequence: voxelize.Sequence, curve: Curve) -> None:
+def check(sequence: voxelization.Sequence, curve: Curve) -> None:
     """Assert the guarantees for a curve without jumps."""
     voxels = sequence.voxels
     ends = np.floor(curve.position(np.array(curve.t_range))).T

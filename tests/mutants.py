@@ -17,7 +17,7 @@ from pathlib import Path
 TESTS = Path(__file__).parent
 DEPEND = (
     "voxdisplay.wire",
-    "voxdisplay.pixel",
+    "voxdisplay.raster.pixel_format",
     "voxdisplay.link",
     "firmware_sim",
     "sides",

@@ -7,7 +7,7 @@ from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from voxdisplay.wire import packet as packets
-from voxdisplay.wire.stream import PacketStream
+from voxdisplay.wire.packet_stream import PacketStream
 
 GRID = (17, 9, 5)
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.serve import serve_wire
-from firmware_sim.wire import Wire
 
 WAIT_S = 20
 

@@ -19,7 +19,7 @@ from voxdisplay.frame import Frame
 from voxdisplay.link import Link, Restarted, Shown
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
-from voxdisplay.wire.stream import PacketStream
+from voxdisplay.wire.packet_stream import PacketStream
 
 GRID = (17, 9, 5)
 

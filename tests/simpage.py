@@ -6,7 +6,7 @@ from fractions import Fraction
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import DEFAULT_PALETTE, FORMATS, Page
-from firmware_sim.unpack import Unpacker
+from firmware_sim.op_decoder import Unpacker
 
 CLEAR = b"\x11\0\0"  # the header of a DATA packet
 GRIDS = [(3, 5, 7), (17, 64, 40), (300, 4, 3), (1, 1, 1), (256, 2, 2)]

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.decoder import Decoder
-from voxdisplay.conformance.page import Page
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.reference_decoder import Decoder
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 _OPS = {

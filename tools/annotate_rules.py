@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from annotate_ops import Note, Reader, op_name
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.decoder import Decoder, Refused
-from voxdisplay.conformance.page import Page
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 HOST, DEVICE = "host", "device"

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from paper_tables import paper_curve
 
 import voxdisplay as vd
-from voxdisplay import compiled
+from voxdisplay.compute import kernel_backend
 from voxdisplay.curves import Bezier, Curve, Lissajous, TorusKnot
-from voxdisplay.curves.family import Curves
-from voxdisplay.voxelize import measure
+from voxdisplay.curves.batch_evaluation import Curves
+from voxdisplay.voxelization import measure
 
 Voxels = NDArray[np.int32]
 Points = NDArray[np.float64]
@@ -86,19 +86,19 @@ def jobs(*, quick: bool) -> Iterator[Job]:
 
 def grid_plane(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, in numpy."""
-    compiled.use(False)
+    kernel_backend.use(False)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
 def fast(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, compiled: the extra `fast`."""
-    compiled.use(True)
+    kernel_backend.use(True)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
 def certified(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, in numpy, and prove it."""
-    compiled.use(False)
+    kernel_backend.use(False)
     return [sequence.voxels for sequence in vd.voxelize_many(curves, certified=True)]
 
 
@@ -266,7 +266,7 @@ def bench_job(job: Job, tools: Sequence[str], repeats: int) -> None:
 
 def memory(curve: Curve) -> None:
     """Print how much memory this engine takes."""
-    compiled.use(False)
+    kernel_backend.use(False)
     tracemalloc.start()
     sequence = vd.voxelize(curve)
     kept, peak = (size / len(sequence) for size in tracemalloc.get_traced_memory())

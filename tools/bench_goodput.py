@@ -18,7 +18,7 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from voxdisplay.frame import Frame
 from voxdisplay.link import Link
-from voxdisplay.link.loss import OVERHEAD_BYTES
+from voxdisplay.link.payload_size import OVERHEAD_BYTES
 
 GRID = (64, 64, 32)
 LINES = ((115_200, 0.004), (921_600, 0.004), (3_000_000, 0.004), (12_000_000, 0.001))

@@ -24,8 +24,8 @@ from firmware_sim.device import Device
 from voxdisplay.curves import Bezier, Curve, Helix, Lissajous, TorusKnot
 from voxdisplay.frame import Frame
 from voxdisplay.link import Link
-from voxdisplay.wire import bricks, chains, packet, spans
-from voxdisplay.wire.ops import Coding
+from voxdisplay.wire import chains, packet, spans, voxel_sets
+from voxdisplay.wire.op_encoding import Coding
 
 SEED = 22
 PAYLOAD = 1024
@@ -333,7 +333,7 @@ def bench_speeds(repeats: int, side: int) -> None:
     print(f"\n{'stage':<40}{'seconds':>10}")
     rates = [
         ("STEP, Beziers", lambda: chains.encode_chains(voxels, pens, mono), len(voxels), "voxels"),
-        ("OCT, sphere shell", lambda: bricks.encode_bricks(shell, shell * 0 + 1, mono),
+        ("OCT, sphere shell", lambda: voxel_sets.encode_bricks(shell, shell * 0 + 1, mono),
          len(shell), "voxels"),
         ("SKIP/RUN/LIT/DIFF, head", lambda: spans.encode_spans(head, dense), len(head), "voxels"),
         ("reading back: LIT of a PAGE",
@@ -344,7 +344,7 @@ def bench_speeds(repeats: int, side: int) -> None:
     rows = [(name, work_s(work, repeats), amount, what) for name, work, amount, what in rates]
     coded = {
         "Beziers": (chains.encode_chains(voxels, pens, mono), len(voxels), mono),
-        "sphere shell": (bricks.encode_bricks(shell, shell * 0 + 1, mono), len(shell), mono),
+        "sphere shell": (voxel_sets.encode_bricks(shell, shell * 0 + 1, mono), len(shell), mono),
         "head": (spans.encode_spans(head, dense), len(head), dense),
     }
     for name, (ops, amount, coding) in coded.items():

@@ -24,8 +24,8 @@ from typing import Any
 from bench_usb import on_usb, on_usbip
 from serial import rfc2217
 
+from voxdisplay.display.handshake import greet
 from voxdisplay.errors import TransportError
-from voxdisplay.probe import greet
 from voxdisplay.transport import Transport, open_transport
 
 _HEAD = struct.Struct("<cQ")

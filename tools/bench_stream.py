@@ -29,7 +29,7 @@ from bench_ports import in_another_process
 from numpy.typing import NDArray
 
 import voxdisplay as vd
-from voxdisplay.device import device_info
+from voxdisplay.display.device_info import device_info
 from voxdisplay.errors import TransportClosed
 from voxdisplay.frame import Frame
 from voxdisplay.wire import packet as packets

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay.view.animation import Turntable, save_gif
-from voxdisplay.view.axes import stage
-from voxdisplay.view.blocks import half_blocks
+from voxdisplay.view.half_blocks import half_blocks
+from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import Look, picture, picture_of
-from voxdisplay.view.voxels import lit_voxels
+from voxdisplay.view.stage import stage
 
 SEED = 22
 RGB = vd.PixelFormat.RGB888

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import voxdisplay as vd
-from voxdisplay.voxelize import march, measure
+from voxdisplay.voxelization import measure, tangent_march
 
 TOLERANCE = 0.0015
 
@@ -80,7 +80,7 @@ def main() -> int:
     exact = close = 0
     for cell in CELLS:
         curve = paper_curve(cell.radius, cell.w)
-        trail = march.follow(curve, cell.variant, tangent=cell.tangent)
+        trail = tangent_march.follow(curve, cell.variant, tangent=cell.tangent)
         count = len(trail.voxels)
         e_max, e_av = float(trail.distances.max()), float(trail.distances.mean())
         true = measure.distances(trail.voxels, curve)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
-from voxdisplay.wire.stream import PacketStream
+from voxdisplay.wire.packet_stream import PacketStream
 
 _CHUNK = 1 << 16
 # A paced line is read in portions of this much time: short beside what the host may have ahead.

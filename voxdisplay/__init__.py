@@ -9,7 +9,6 @@
 """
 
 from importlib.metadata import version as _version
-from typing import TYPE_CHECKING
 
 from voxdisplay.curves import (
     Arc,
@@ -27,8 +26,9 @@ from voxdisplay.curves import (
     Segment,
     TorusKnot,
 )
-from voxdisplay.device import DeviceInfo
-from voxdisplay.display import Display, Receipt
+from voxdisplay.display.connect import open  # noqa: A004 - vd.open(port)
+from voxdisplay.display.device_info import DeviceInfo
+from voxdisplay.display.display import Display, Receipt
 from voxdisplay.errors import (
     CurveError,
     DesyncError,
@@ -46,16 +46,10 @@ from voxdisplay.errors import (
     VoxDisplayError,
 )
 from voxdisplay.frame import Drawing, Frame
-from voxdisplay.grid import Grid
-from voxdisplay.opening import open  # noqa: A004 - vd.open(port)
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.scene import Scene, load_scene, read_scene
-from voxdisplay.voxelize import Report, Sequence, voxelize_many
-
-if TYPE_CHECKING:
-    from voxdisplay.voxelize import voxelize
-else:
-    from voxdisplay import voxelize  # the package, which is callable
+from voxdisplay.voxelization import Report, Sequence, voxelize, voxelize_many
 
 __version__ = _version("voxdisplay")
 

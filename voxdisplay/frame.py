@@ -15,19 +15,19 @@ from itertools import chain
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from voxdisplay import voxelize as voxelizing
-from voxdisplay.color import Color, as_colors, spread
+from voxdisplay import voxelization
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
-from voxdisplay.grid import Grid
-from voxdisplay.palette import DEFAULT, Palette
-from voxdisplay.pixel import PixelFormat, Pixels, Values, lit
+from voxdisplay.raster.color import Color, as_colors, spread
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import DEFAULT, Palette
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, lit
 from voxdisplay.wire import spec
-from voxdisplay.wire.choice import Content, Items, encode, encode_page, join_items
-from voxdisplay.wire.colors import color_pieces
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
-from voxdisplay.wire.ops import Coding
-from voxdisplay.wire.pieces import Pieces
+from voxdisplay.wire.encoding_selection import Content, Items, encode, encode_page, join_items
+from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.palette_ops import color_pieces
+from voxdisplay.wire.payload_splitting import Pieces
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class Frame:
 
     def draw(
         self,
-        what: Curve | voxelizing.Sequence | ArrayLike,
+        what: Curve | voxelization.Sequence | ArrayLike,
         color: Color = "white",
     ) -> Drawing:
         """Draw a curve, a sequence or voxels over what is there.
@@ -125,7 +125,7 @@ class Frame:
         what : Curve, Sequence, or (N, 3) integer array
             Voxels of an array have columns x, y, z. What lies outside the grid is clipped.
         color : str, list of str, or (k, 3) uint8 array
-            A colour, or several spread along the curve. See `voxdisplay.color`.
+            A colour, or several spread along the curve. See `voxdisplay.raster.color`.
 
         Returns
         -------
@@ -134,15 +134,15 @@ class Frame:
 
         """
         if isinstance(what, Curve):
-            what = voxelizing.voxelize(what)
-        if isinstance(what, voxelizing.Sequence):
+            what = voxelization.voxelize(what)
+        if isinstance(what, voxelization.Sequence):
             return self._add(what.voxels, as_colors(color), _corners(what))
         return self._add(_as_voxels(what), as_colors(color), _NONE)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves, in order: the same as `draw` on each, but found together."""
         curves, colors = zip(*items, strict=True) if (items := list(items)) else ((), ())
-        sequences = voxelizing.voxelize_many(curves)
+        sequences = voxelization.voxelize_many(curves)
         return [self.draw(*pair) for pair in zip(sequences, colors, strict=True)]
 
     def _add(
@@ -366,7 +366,7 @@ _NONE = np.empty(0, dtype=np.int64)
 _WORN = 4
 
 
-def _corners(sequence: voxelizing.Sequence) -> NDArray[np.int64]:
+def _corners(sequence: voxelization.Sequence) -> NDArray[np.int64]:
     """Give the voxels at which a curve has its corners."""
     breaks = sequence.curve.breaks
     if not len(breaks):

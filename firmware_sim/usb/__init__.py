@@ -16,16 +16,16 @@ backends of pyusb.
 import re
 from typing import Any, Final
 
+from firmware_sim.baud_pacing import paced
 from firmware_sim.config import Config, parse_number
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.in_process import parse_url
-from firmware_sim.pace import paced
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction
 from firmware_sim.usb.host import Bus
 from firmware_sim.usb.usbip_host import DEFAULT_PORT, UsbIpHost
-from firmware_sim.wire import Wire
 
 _KEYS: Final[Any] = {"unplug": ("unplug_at", parse_number)}
 

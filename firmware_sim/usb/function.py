@@ -8,7 +8,8 @@ import struct
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.pace import PacedWire
+from firmware_sim.baud_pacing import PacedWire
+from firmware_sim.device_on_line import Wire
 from firmware_sim.usb.descriptors import (
     BULK,
     CS_INTERFACE,
@@ -18,7 +19,6 @@ from firmware_sim.usb.descriptors import (
     Interface,
 )
 from firmware_sim.usb.device import Setup
-from firmware_sim.wire import Wire
 
 TRIPLE: Final = (spec.USB_CLASS, spec.USB_SUBCLASS, spec.USB_PROTOCOL)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Session, around, mutant, on_hello
 from firmware_sim import device, spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.device_on_line import Wire
+from firmware_sim.packet_error import Refusal
 from firmware_sim.session import State, Verdict
-from firmware_sim.wire import Wire
 
 
 def _ack(patch, change):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from broken_devices.mutant import around, mutant
-from firmware_sim import arc, bits, spec, unpack
-from firmware_sim.refusal import Refusal
+from firmware_sim import op_decoder, range_coded_chains, range_decoder, spec
+from firmware_sim.packet_error import Refusal
 
 
 @mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-too-many", "7.7/arc-cut", "7.7/arc-long")
 def arc_models_learn_slower(patch):
-    patch.setattr(bits.spec, "ARC_ENOUGH", 8)
+    patch.setattr(range_decoder.spec, "ARC_ENOUGH", 8)
 
 
 @mutant("7.7/arc-long", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut", "7.7/arc-too-many")
@@ -19,17 +19,17 @@ def arc_forgets_turns(patch):
             self.way = 0
         old(self, bits_)
 
-    around(patch, arc._Axis, "turn", turn)
+    around(patch, range_coded_chains._Axis, "turn", turn)
 
 
 @mutant("7.7/arc-long", "7.7/arc-too-many", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut")
 def arc_runs_too_long(patch):
-    patch.setattr(arc.spec, "ARC_MAX_RUN", 7)
+    patch.setattr(range_coded_chains.spec, "ARC_MAX_RUN", 7)
 
 
 @mutant("7.7/arc-too-many")
 def arc_padding_taken(patch):
-    patch.setattr(bits.Bits, "done", property(lambda self: self._at >= len(self._data)))
+    patch.setattr(range_decoder.Bits, "done", property(lambda self: self._at >= len(self._data)))
 
     def step(old, *args):
         try:
@@ -38,7 +38,7 @@ def arc_padding_taken(patch):
             if refusal.code != spec.CODE_PADDING:
                 raise
 
-    around(patch, unpack, "arc", step)
+    around(patch, op_decoder, "arc", step)
 
 
 @mutant("7.7/arc-dot", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-behind-ops")
@@ -47,7 +47,7 @@ def arc_start_left_out(patch):
         for pen, voxels in old(*args):
             yield pen, voxels[1:]
 
-    around(patch, unpack, "arc", pieces)
+    around(patch, op_decoder, "arc", pieces)
 
 
 @mutant("7.7/arc-empty")
@@ -58,9 +58,9 @@ def empty_arc_refused(patch):
             raise operands_.refusal(spec.CODE_TRUNCATED, "")
         return found
 
-    around(patch, unpack, "arc", pieces)
+    around(patch, op_decoder, "arc", pieces)
 
 
 @mutant("7.7/arc-long")
 def arc_runs_without_end(patch):
-    patch.setattr(arc.spec, "ARC_MAX_RUN", 1 << 30)
+    patch.setattr(range_coded_chains.spec, "ARC_MAX_RUN", 1 << 30)

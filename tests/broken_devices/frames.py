@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Page, Session, around, mutant
 from firmware_sim import device, memory, spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.packet_error import Refusal
 from firmware_sim.session import State, Verdict
 
 

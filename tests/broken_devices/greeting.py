@@ -6,7 +6,7 @@ import dataclasses
 
 from broken_devices.mutant import Device, Session, around, mutant, on_hello
 from firmware_sim import device, info, memory, spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.packet_error import Refusal
 from firmware_sim.session import State
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from firmware_sim import device, memory, operands, receiver, unpack
+from firmware_sim import device, memory, op_decoder, operands, receiver
 from firmware_sim import session as sessions
 
 Device, Session, Receiver = device.Device, sessions.Session, receiver.Receiver
-Decoder, Operands, Page = unpack._Decoder, operands.Operands, memory.Page
+Decoder, Operands, Page = op_decoder._Decoder, operands.Operands, memory.Page
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from broken_devices.mutant import Device, Receiver, around, mutant
-from firmware_sim import spec, unpack
-from firmware_sim.refusal import Refusal
+from firmware_sim import op_decoder, spec
+from firmware_sim.packet_error import Refusal
 
 
 @mutant("3/too-long", "11/overrun", likely="crashed")
@@ -58,7 +58,7 @@ def dies_of_a_reserved_op(patch):
             raise Refusal(spec.CODE_OP, 0, "")
         old(self, packet, page)
 
-    around(patch, unpack.Unpacker, "draw", draw)
+    around(patch, op_decoder.Unpacker, "draw", draw)
 
 
 @mutant(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 
 from broken_devices.mutant import Decoder, Operands, Page, around, mutant, on_op
-from firmware_sim import operands, spec, unpack
+from firmware_sim import op_decoder, operands, spec
 from firmware_sim.grid import Grid
 
 
@@ -77,13 +77,13 @@ def octant_signs(patch):
 
 @mutant("7.1/octants", "7.1/from", likely="bit 0 is for axis main + 1")
 def crumb_bits_swapped(patch):
-    swapped = [bytes((0, 2, 1, 3)[c] for c in row) for row in unpack._CRUMBS]
-    patch.setattr(unpack, "_CRUMBS", swapped)
+    swapped = [bytes((0, 2, 1, 3)[c] for c in row) for row in op_decoder._CRUMBS]
+    patch.setattr(op_decoder, "_CRUMBS", swapped)
 
 
 @mutant("7.1/octants", "7.1/from", likely="lowest bits")
 def crumbs_high_first(patch):
-    patch.setattr(unpack, "_CRUMBS", [row[::-1] for row in unpack._CRUMBS])
+    patch.setattr(op_decoder, "_CRUMBS", [row[::-1] for row in op_decoder._CRUMBS])
 
 
 @mutant(
@@ -180,7 +180,7 @@ def literal_leaves_pen(patch):
     likely="lowest bits",
 )
 def mono_high_bit_first(patch):
-    patch.setattr(unpack, "_BITS", [row[::-1] for row in unpack._BITS])
+    patch.setattr(op_decoder, "_BITS", [row[::-1] for row in op_decoder._BITS])
 
 
 @mutant("11/pixel", pixel_format="mono1")
@@ -227,7 +227,7 @@ def pen_not_reset(patch):
             self.ops[op](decoder, op & 31)
         self.pen = decoder._pen
 
-    around(patch, unpack.Unpacker, "draw", draw)
+    around(patch, op_decoder.Unpacker, "draw", draw)
 
 
 @mutant("7/each-packet-anew", spreads=True, likely="cursor is not reset")
@@ -242,7 +242,7 @@ def cursor_not_reset(patch):
             self.ops[op](decoder, op & 31)
         page.cursor = decoder._cursor
 
-    around(patch, unpack.Unpacker, "draw", draw)
+    around(patch, op_decoder.Unpacker, "draw", draw)
 
     def clear(old, self):
         self.cursor = 0
@@ -279,7 +279,7 @@ def reserved_ops_skipped(patch):
         table[0x1F] = table[0x07] = lambda decoder, low: None
         return table
 
-    around(patch, unpack, "_ops", ops)
+    around(patch, op_decoder, "_ops", ops)
 
 
 @mutant("7.8/past-the-end", "11/first-op-first")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Session, around, mutant, on_op
 from firmware_sim import spec
-from firmware_sim.refusal import Refusal
+from firmware_sim.packet_error import Refusal
 
 
 def _refused(patch, change):

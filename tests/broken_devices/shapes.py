@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 
 from broken_devices.mutant import Operands, Page, around, mutant, on_op
-from firmware_sim import memory, shapes, unpack
+from firmware_sim import memory, op_decoder, shapes
 
 
 @mutant("7.3/lines", "7.3/line-ties", "7.3/shape-cursor", likely="rounded down")
@@ -20,13 +20,13 @@ def line_ties_down(patch):
         ] or [begin]
         return array("Q", [grid.index(*place) for place in places])
 
-    patch.setattr(unpack, "line", line)
+    patch.setattr(op_decoder, "line", line)
 
 
 @mutant("7.3/lines", "7.3/line-ties", "7.3/line-of-one")
 def line_without_its_end(patch):
     old = shapes.line
-    patch.setattr(unpack, "line", lambda *args: old(*args)[:-1])
+    patch.setattr(op_decoder, "line", lambda *args: old(*args)[:-1])
 
 
 @mutant("7.3/shape-cursor", "7.3/boxes", likely="left out")
@@ -39,7 +39,7 @@ def box_without_its_end(patch):
         high = [max(min(pair), max(pair) - 1) for pair in corners]
         return old(grid, grid.index(*low), tuple(high))
 
-    patch.setattr(unpack, "box", box)
+    patch.setattr(op_decoder, "box", box)
 
 
 @mutant("7.3/shape-cursor", "7.3/dots-cursor", likely="here it stayed")
@@ -98,13 +98,13 @@ def brick_moves_the_cursor(patch):
 
 @mutant("7.5/differences", "7.5/difference-pen", likely="lowest bits")
 def nibbles_high_first(patch):
-    patch.setattr(unpack, "_DIFFERENCES", [row[::-1] for row in unpack._DIFFERENCES])
+    patch.setattr(op_decoder, "_DIFFERENCES", [row[::-1] for row in op_decoder._DIFFERENCES])
 
 
 @mutant("7.5/differences", "7.5/difference-pen", likely="two's complement")
 def nibbles_unsigned(patch):
     table = [bytes((byte & 15, byte >> 4)) for byte in range(256)]
-    patch.setattr(unpack, "_DIFFERENCES", table)
+    patch.setattr(op_decoder, "_DIFFERENCES", table)
 
 
 @mutant("7.6/palette-of-a-page")

@@ -11,7 +11,7 @@ from PIL import Image
 
 import voxdisplay as vd
 from voxdisplay.cli.main import cli, main
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.picture import Look, picture
 

@@ -12,11 +12,11 @@ from bench_top import BenchTop
 
 from firmware_sim import crc
 from voxdisplay.conformance import CHECKS, ops, packets
-from voxdisplay.conformance.decoder import Decoder, Refused
-from voxdisplay.conformance.mistakes import MISTAKES
-from voxdisplay.conformance.page import Page
+from voxdisplay.conformance.announced import FEATURES, Said
+from voxdisplay.conformance.device_bugs import MISTAKES
+from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.conformance.run import Verdict, chosen, examine
-from voxdisplay.conformance.said import FEATURES, Said
 from voxdisplay.errors import TransportClosed
 from voxdisplay.wire import spec
 

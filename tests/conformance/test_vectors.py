@@ -8,20 +8,20 @@ import pytest
 from drawing import plain
 from sides import DeviceSide, features_of, flags_of, state_of
 
-from voxdisplay.grid import Grid
-from voxdisplay.palette import DEFAULT
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import DEFAULT
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
-from voxdisplay.wire.arcs import encode_arcs
 from voxdisplay.wire.chains import encode_chains
-from voxdisplay.wire.choice import Content, encode
-from voxdisplay.wire.colors import color_pieces
 from voxdisplay.wire.digest import digest, palette_digest
-from voxdisplay.wire.ops import Coding
-from voxdisplay.wire.pieces import Layout
+from voxdisplay.wire.encoding_selection import Content, encode
+from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.packet_stream import PacketStream
+from voxdisplay.wire.palette_ops import color_pieces
+from voxdisplay.wire.payload_splitting import Layout
+from voxdisplay.wire.range_coded_chains import encode_arcs
 from voxdisplay.wire.spans import decode_spans, encode_spans
-from voxdisplay.wire.stream import PacketStream
 
 
 def each(kind):

@@ -10,11 +10,11 @@ from types import SimpleNamespace
 import pytest
 from plugged import Plug
 
-from voxdisplay import baud
 from voxdisplay.cli import main
 from voxdisplay.cli import ports as command
-from voxdisplay.reconnect import Reconnect
-from voxdisplay.roll_call import probe_all
+from voxdisplay.display import baud
+from voxdisplay.display.reconnect import Reconnect
+from voxdisplay.display.scan import probe_all
 from voxdisplay.transport import discovery
 from voxdisplay.transport.discovery import FoundPort, all_ports, find_port, serial_ports
 

@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 
 import voxdisplay as vd
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.export import save_html
+from voxdisplay.view.html_export import save_html
 
 ROOT = Path(__file__).parents[2]
 SIZE = (3, 5, 7)

@@ -12,7 +12,7 @@ from carriers import CARRIERS, WAIT_S, Rfc2217Server
 import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from voxdisplay import baud
+from voxdisplay.display import baud
 from voxdisplay.transport import open_transport
 
 # pyserial's reader of rfc2217:// is a thread of the old style.

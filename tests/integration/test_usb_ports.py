@@ -14,6 +14,7 @@ from usb_lab import until
 import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.serve import listen
 from firmware_sim.usb import open_usbip
 from firmware_sim.usb.backend import Backend
@@ -21,7 +22,6 @@ from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction
 from firmware_sim.usb.host import Bus
 from firmware_sim.usb.usbip_server import Server
-from firmware_sim.wire import Wire
 from voxdisplay.cli.main import main
 from voxdisplay.transport import usb as port_module
 

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 import voxdisplay as vd
 from voxdisplay.frame import Frame
-from voxdisplay.grid import Grid
-from voxdisplay.pixel import PixelFormat
-from voxdisplay.wire import choice
-from voxdisplay.wire import plain as plainly
-from voxdisplay.wire.bricks import encode_bricks
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.wire import encoding_selection
+from voxdisplay.wire import raw_pixels as plainly
 from voxdisplay.wire.chains import encode_chains
-from voxdisplay.wire.ops import Coding
+from voxdisplay.wire.op_encoding import Coding
 from voxdisplay.wire.spans import encode_spans
+from voxdisplay.wire.voxel_sets import encode_bricks
 
 GRIDS = [Grid(17, 12, 20), Grid(3, 5, 7), Grid(300, 4, 3), Grid(1, 1, 1)]
 # What a feature adds to the ops that every device has.
@@ -115,9 +115,9 @@ def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_pe
     frame = some_frame(np.random.default_rng(seed), device)
     frame.device = device
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(choice, "_LARGE_SET", 100)
-        patch.setattr(choice, "_SLAB_VOXELS", 1)
-        patch.setattr(choice, "_PARSED_VOXELS", 150)
+        patch.setattr(encoding_selection, "_LARGE_SET", 100)
+        patch.setattr(encoding_selection, "_SLAB_VOXELS", 1)
+        patch.setattr(encoding_selection, "_PARSED_VOXELS", 150)
         patch.setattr(plainly, "_SLAB_VOXELS", 160)
         portions = list(frame.coded(*device[2:], bytes_per_s))
     assert_draws([payload for portion in portions for payload in portion], frame)
@@ -133,11 +133,14 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
         return len(list(filter(None, frame.coded(1024, (), rate))))
 
     assert portions(11_520) == 1, "in one piece it is shorter, and the line is busy for seconds"
-    assert portions(1.2e6) == voxels // choice._PARSED_VOXELS
+    assert portions(1.2e6) == voxels // encoding_selection._PARSED_VOXELS
     assert portions(1e9) == voxels // plainly._SLAB_VOXELS
     solid = Frame((128, 128, 32), "index8")
     solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
-    assert len(list(filter(None, solid.coded(1024, (), 1e9)))) == voxels // choice._SLAB_VOXELS
+    assert (
+        len(list(filter(None, solid.coded(1024, (), 1e9))))
+        == voxels // encoding_selection._SLAB_VOXELS
+    )
     solid.draw([(1, 2, 3)], "red")
     solid.device = (solid.grid, solid.format, 1024, frozenset())
     assert_draws(list(chain.from_iterable(solid.coded(1024, (), 1e9))), solid)

@@ -16,11 +16,11 @@ from guarantees import KINDS, profile
 from space_curves import Function
 
 import voxdisplay as vd
-from voxdisplay import compiled
+from voxdisplay.compute import kernel_backend
 from voxdisplay.curves import Bezier, Curve
-from voxdisplay.voxelize.events import Events
-from voxdisplay.voxelize.ranges import insert
-from voxdisplay.voxelize.reduce import reduce
+from voxdisplay.voxelization.index_ranges import insert
+from voxdisplay.voxelization.thinning import reduce
+from voxdisplay.voxelization.voxel_events import Events
 
 pytest.importorskip("numba")
 
@@ -30,11 +30,11 @@ MANY = 150
 
 @contextmanager
 def kernels(choice: bool) -> Iterator[None]:
-    before = compiled.use(choice)
+    before = kernel_backend.use(choice)
     try:
         yield
     finally:
-        compiled.use(before)
+        kernel_backend.use(before)
 
 
 def same(curves: list[Curve], *, certified: bool = False) -> None:
@@ -126,7 +126,7 @@ print("numba" in sys.modules, len(sequence))
 def test_an_interrupt_waits_for_the_compiler():
     done, before = [], signal.getsignal(signal.SIGINT)
 
-    @compiled.interrupts_wait()
+    @kernel_backend.interrupts_wait()
     def work():
         signal.raise_signal(signal.SIGINT)
         done.append("all of it")
@@ -139,7 +139,7 @@ def test_an_interrupt_waits_for_the_compiler():
 
 def test_without_an_interrupt_nothing_is_changed():
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(ValueError, match="its own"), compiled.interrupts_wait():
+    with pytest.raises(ValueError, match="its own"), kernel_backend.interrupts_wait():
         raise ValueError("its own")
     assert signal.getsignal(signal.SIGINT) is before
 
@@ -148,7 +148,7 @@ def test_in_another_thread_no_interrupt_can_come():
     done = []
 
     def work():
-        with compiled.interrupts_wait():
+        with kernel_backend.interrupts_wait():
             done.append(1)
 
     thread = threading.Thread(target=work)

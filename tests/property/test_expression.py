@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from voxdisplay.curves.expression import constant, parse
-from voxdisplay.curves.operations import FUNCTIONS
-from voxdisplay.curves.program import Expression
 from voxdisplay.errors import CurveError
+from voxdisplay.expressions.operations import FUNCTIONS
+from voxdisplay.expressions.parse import constant, parse
+from voxdisplay.expressions.program import Expression
 
 NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"} | {
     "min": "minimum",

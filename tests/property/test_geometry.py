@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from space_curves import Function, chain, fourier_curve, moved, turned
 
 from voxdisplay.curves.curve import Curve
-from voxdisplay.voxelize import measure, voxelize, voxelize_many
+from voxdisplay.voxelization import measure, voxelize, voxelize_many
 
 seeds = st.integers(0, 2**32 - 1)
 fouriers = st.builds(

@@ -11,7 +11,7 @@ from rig import Faults, Rig, frames, random_frame
 from firmware_sim.session import Session, Verdict
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.link import PageRead, Refused
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
 from voxdisplay.wire.spans import decode_spans
 

@@ -3,7 +3,7 @@
 import pytest
 from guarantees import KINDS, check, profile
 
-from voxdisplay.voxelize import voxelize_many
+from voxdisplay.voxelization import voxelize_many
 
 # The judge needs fifty times as long for a rough curve as for others.
 FEW = {kind: 8 if kind.startswith("rough") else 80 for kind in KINDS}

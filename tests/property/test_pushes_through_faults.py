@@ -13,8 +13,8 @@ import voxdisplay as vd
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
+from firmware_sim.device_on_line import Wire
 from firmware_sim.faults import parse_faults
-from firmware_sim.wire import Wire
 from voxdisplay.errors import TransportClosed
 
 GRID = (17, 9, 5)

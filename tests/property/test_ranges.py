@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from voxdisplay.voxelize.ranges import blocks, insert, spread
-from voxdisplay.voxelize.reduce import WINDOW, furthest
+from voxdisplay.voxelization.index_ranges import blocks, insert, spread
+from voxdisplay.voxelization.thinning import WINDOW, furthest
 
 LENGTHS = st.lists(st.integers(1, 40), min_size=1, max_size=12)
 UNIT = st.integers(-1, 1)

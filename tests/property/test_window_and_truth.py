@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from voxdisplay.link.window import Window
+from voxdisplay.link.send_window import Window
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from voxdisplay.errors import RemoteProtocolError
-from voxdisplay.grid import Grid
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.digest import digest
-from voxdisplay.wire.ops import Coding
+from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.packet_stream import PacketStream
 from voxdisplay.wire.spans import decode_spans, encode_spans
-from voxdisplay.wire.stream import PacketStream
 
 GRIDS = [Grid(3, 5, 7), Grid(17, 64, 40), Grid(300, 4, 3), Grid(1, 1, 1)]
 codings = st.builds(

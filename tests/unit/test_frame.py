@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from drawing import page_after, values_of
 
-from voxdisplay import Segment, voxelize
+from voxdisplay import Segment
 from voxdisplay.frame import Frame
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.pixel_format import PixelFormat
 
 GRID = (17, 64, 40)
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)

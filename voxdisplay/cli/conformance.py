@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from voxdisplay.baud import DEFAULT_BAUD, Baud, open_at
 from voxdisplay.cli.options import (
     DEFAULT_PORT,
     SecondsType,
@@ -18,11 +17,12 @@ from voxdisplay.cli.options import (
     progress_bar,
     timeout_option,
 )
+from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
 
 if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
+    from voxdisplay.conformance.announced import Said
     from voxdisplay.conformance.catalogue import Check
     from voxdisplay.conformance.run import Result
-    from voxdisplay.conformance.said import Said
 
 _EXIT_BROKEN = 1
 

@@ -10,12 +10,12 @@ import click
 
 from voxdisplay import __version__
 from voxdisplay.cli.conformance import conformance
-from voxdisplay.cli.device import clear, info, read
-from voxdisplay.cli.ending import EndedError, ended_by_signals, have_streams, say, told_to_end
+from voxdisplay.cli.device_commands import clear, info, read
 from voxdisplay.cli.plan import plan_command
 from voxdisplay.cli.ports import ports
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
+from voxdisplay.cli.signals import EndedError, ended_by_signals, have_streams, say, told_to_end
 from voxdisplay.cli.test_pattern import test_pattern
 from voxdisplay.cli.view import view
 from voxdisplay.cli.voxelize import voxelize

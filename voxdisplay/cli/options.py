@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import DEFAULT_BAUD, RATES, Baud
-from voxdisplay.cli.ending import say
+from voxdisplay.cli.signals import say
+from voxdisplay.display.baud import DEFAULT_BAUD, RATES, Baud
 from voxdisplay.transport.discovery import all_ports
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import DEFAULT_BAUD, Baud, open_at
 from voxdisplay.cli.options import (
     SizeType,
     baud_option,
@@ -19,8 +18,9 @@ from voxdisplay.cli.options import (
     plural,
     print_json,
 )
-from voxdisplay.cli.scenes import draw
-from voxdisplay.plan import COMMON_LINES, EVERY_FEATURE, Line, Plan, Receiver, plan
+from voxdisplay.cli.scene_drawing import draw
+from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
+from voxdisplay.display.plan import COMMON_LINES, EVERY_FEATURE, Line, Plan, Receiver, plan
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import Baud
 from voxdisplay.cli.options import (
     baud_option,
     device_json,
@@ -19,7 +18,8 @@ from voxdisplay.cli.options import (
     print_json,
     timeout_option,
 )
-from voxdisplay.roll_call import Answer, probe_all
+from voxdisplay.display.baud import Baud
+from voxdisplay.display.scan import Answer, probe_all
 from voxdisplay.transport.discovery import FoundPort, all_ports
 
 _SLACK_S = 2.0

@@ -8,14 +8,14 @@ from typing import Literal
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import SizeType, fit_option, note, plural, progress_bar
-from voxdisplay.cli.pictures import (
+from voxdisplay.cli.image_output import (
     PictureFileType,
     PictureSizeType,
     save_picture,
     view_angle_option,
 )
-from voxdisplay.cli.scenes import draw
+from voxdisplay.cli.options import SizeType, fit_option, note, plural, progress_bar
+from voxdisplay.cli.scene_drawing import draw
 
 _DEFAULT_GRID = vd.Grid(128, 128, 128)
 # Pixels of all pictures of a film: what a GIF takes in memory, in bytes.

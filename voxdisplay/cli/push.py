@@ -8,9 +8,7 @@ from typing import Literal, TextIO
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import Baud
-from voxdisplay.cli.ending import OnExit, leaving, on_exit_option
-from voxdisplay.cli.glimpse import glimpse
+from voxdisplay.cli.image_output import PictureFileType, save_page
 from voxdisplay.cli.options import (
     capture_option,
     device_json,
@@ -24,8 +22,10 @@ from voxdisplay.cli.options import (
     progress_bar,
     reconnect_option,
 )
-from voxdisplay.cli.pictures import PictureFileType, save_page
-from voxdisplay.cli.scenes import draw
+from voxdisplay.cli.scene_drawing import draw
+from voxdisplay.cli.signals import OnExit, leaving, on_exit_option
+from voxdisplay.cli.thumbnail import glimpse
+from voxdisplay.display.baud import Baud
 
 
 @click.command(

@@ -8,9 +8,6 @@ import click
 import numpy as np
 
 import voxdisplay as vd
-from voxdisplay import pattern
-from voxdisplay.baud import Baud
-from voxdisplay.cli.glimpse import glimpse
 from voxdisplay.cli.options import (
     device_json,
     json_option,
@@ -20,7 +17,10 @@ from voxdisplay.cli.options import (
     print_json,
     progress_bar,
 )
-from voxdisplay.pixel import Pixels
+from voxdisplay.cli.thumbnail import glimpse
+from voxdisplay.display import test_patterns
+from voxdisplay.display.baud import Baud
+from voxdisplay.raster.pixel_format import Pixels
 
 _GROWS = {"x": "right", "y": "away", "z": "up"}
 _LEGEND = {
@@ -45,7 +45,7 @@ _LEGEND = {
 @click.option(
     "--pattern",
     "name",
-    type=click.Choice(pattern.NAMES),
+    type=click.Choice(test_patterns.NAMES),
     default="axes",
     show_default=True,
     help="Axes and corners, labelled by colour; a plane that marches along each axis; all voxels.",
@@ -80,7 +80,7 @@ def test_pattern(
     The check is of the display's memory. Whether its optics show that memory the right way round,
     only eyes can tell: the pattern is made for them.
     """
-    share = pattern.BRIGHTNESS[name] if brightness is None else brightness / 100
+    share = test_patterns.BRIGHTNESS[name] if brightness is None else brightness / 100
     with open_display(port, baud, timeout_s) as display:
         judged = _Judged()
         page = _show(display, name, share, judged if check else None, quiet=quiet)
@@ -110,14 +110,14 @@ class _Judged:
 
     def __init__(self) -> None:
         self.differing_voxels = 0
-        self._axes: dict[str, pattern.Finding] = {}
+        self._axes: dict[str, test_patterns.Finding] = {}
 
-    def add(self, step: pattern.Step, page: Pixels) -> None:
+    def add(self, step: test_patterns.Step, page: Pixels) -> None:
         """Judge one page more. A wrong one is not made good by a right one."""
         meant = step.frame.array()
         differs = meant != page
         self.differing_voxels += int((differs.any(axis=-1) if differs.ndim == 4 else differs).sum())
-        for finding in pattern.findings(meant, page, step.axes):
+        for finding in test_patterns.findings(meant, page, step.axes):
             before = self._axes.get(finding.axis)
             if before is None or before.right is None or finding.right is False:
                 self._axes[finding.axis] = finding
@@ -150,7 +150,7 @@ class _Judged:
         return "\n".join(lines)
 
 
-def _verdict(finding: pattern.Finding) -> str:
+def _verdict(finding: test_patterns.Finding) -> str:
     if finding.right is None:
         return "cannot be told: on this display the pattern looks the same either way"
     if finding.right:
@@ -172,7 +172,7 @@ def _show(
     total = sum(info.grid) if name == "plane" else 1
     last = None
     with progress_bar("showing", hidden=quiet) as progress:
-        for number, step in enumerate(pattern.steps(name, info.grid, info.format, share)):
+        for number, step in enumerate(test_patterns.steps(name, info.grid, info.format, share)):
             page = None
             try:
                 display.present(step.frame)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import voxdisplay as vd
-from voxdisplay.baud import Baud
 from voxdisplay.cli.options import SizeType, note, open_display, port_options
-from voxdisplay.cli.scenes import draw
-from voxdisplay.pixel import Pixels
+from voxdisplay.cli.scene_drawing import draw
+from voxdisplay.display.baud import Baud
+from voxdisplay.raster.pixel_format import Pixels
 
 if TYPE_CHECKING:
     from voxdisplay.view.live.sources import Source
@@ -195,8 +195,8 @@ def _frame(scene: str, display_size: vd.Grid | None) -> vd.Frame:
 
 @contextlib.contextmanager
 def _of_scene(scene: str, display_size: vd.Grid | None) -> Iterator[View]:
+    from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
     from voxdisplay.view.terminal import View  # noqa: PLC0415
-    from voxdisplay.view.voxels import lit_voxels  # noqa: PLC0415
 
     frame = _frame(scene, display_size)
     lit = lit_voxels(frame.array(), frame.grid, frame.format)
@@ -205,8 +205,8 @@ def _of_scene(scene: str, display_size: vd.Grid | None) -> Iterator[View]:
 
 @contextlib.contextmanager
 def _of_display(port: str | None, baud: Baud, timeout_s: float) -> Iterator[View]:
+    from voxdisplay.view.lit_voxels import Lit, lit_voxels  # noqa: PLC0415
     from voxdisplay.view.terminal import View  # noqa: PLC0415
-    from voxdisplay.view.voxels import Lit, lit_voxels  # noqa: PLC0415
 
     with open_display(port, baud, timeout_s) as display:
         info, watched = display.info, _Watched(display)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay.cli.options import SizeType, json_option, note, plural, print_json
-from voxdisplay.cli.scenes import voxelize_scene
-from voxdisplay.voxelize import march
+from voxdisplay.cli.scene_drawing import voxelize_scene
+from voxdisplay.voxelization import tangent_march
 
 _COLUMNS = ("object", "x", "y", "z")
 
@@ -153,7 +153,7 @@ def _how(
         if certified:
             raise click.BadParameter("nothing is proven of the march", param_hint="--certified")
         try:
-            pitch, reach = march.search_steps(variant, pitch, reach)
+            pitch, reach = tangent_march.search_steps(variant, pitch, reach)
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="--pitch, --reach") from error
     elif pitch is not None or reach is not None:

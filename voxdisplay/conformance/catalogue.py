@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.announced import Said
 
 if TYPE_CHECKING:
     from voxdisplay.conformance.probe import Probe

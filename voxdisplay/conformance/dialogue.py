@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.hearing import Hearing
+from voxdisplay.conformance.announced import Said
 from voxdisplay.conformance.packets import SHOWN, Answer
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.response_reader import Hearing
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.transport import Transport
 from voxdisplay.wire import spec

@@ -9,9 +9,9 @@ import random
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-from voxdisplay.conformance.decoder import Decoder, Place, Refused
-from voxdisplay.conformance.page import Page
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.reference_decoder import Decoder, Place, Refused
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 END = bytes((spec.OP_END,))

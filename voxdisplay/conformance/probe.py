@@ -9,12 +9,12 @@ import itertools
 from collections.abc import Iterable, Iterator
 from typing import NoReturn
 
-from voxdisplay.conformance import mistakes, packets
-from voxdisplay.conformance.decoder import Decoder, Refused
+from voxdisplay.conformance import device_bugs, packets
+from voxdisplay.conformance.announced import Said
 from voxdisplay.conformance.dialogue import Broken, Dialogue, NotApplicable
 from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, Answer
-from voxdisplay.conformance.page import Page
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 _MANY_PAGES = 10_000
@@ -56,7 +56,7 @@ class Probe(Dialogue):
 
     def _why_refused(self, error: Answer, payload: bytes) -> str:
         at = error.offset - packets.HEADER_BYTES
-        found = mistakes.refusals_by_mistake(self.said, payload)
+        found = device_bugs.refusals_by_mistake(self.said, payload)
         likely = _either(why for why, code, where in found if (code, where) == (error.code, at))
         if not likely and 0 <= at < len(payload):
             return f"look at how the op {payload[at]:02X} at byte {at} of the payload is read"
@@ -151,7 +151,7 @@ class Probe(Dialogue):
             likely = next(
                 (
                     why
-                    for d, why in mistakes.digests_by_mistake(said, must, before)
+                    for d, why in device_bugs.digests_by_mistake(said, must, before)
                     if d == ack.digest
                 ),
                 "the pixels read back are right: the digest is not kept as section 8 says",
@@ -180,8 +180,8 @@ class Probe(Dialogue):
     def _suspects(
         self, must: Page, before: Page, base: Page, payloads: list[bytes]
     ) -> Iterator[tuple[str, Page]]:
-        yield from mistakes.pages_by_mistake(self.said, base, payloads)
-        yield from mistakes.other_orders(self.said, must)
+        yield from device_bugs.pages_by_mistake(self.said, base, payloads)
+        yield from device_bugs.other_orders(self.said, must)
         for start, why in (
             (before, "CLEAR does not make the back page dark"),
             (Page(), "without CLEAR a frame starts as a copy of the front page: here it was dark"),

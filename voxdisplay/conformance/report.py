@@ -7,10 +7,10 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Any
 
+from voxdisplay.conformance.announced import FEATURES, FORMATS
 from voxdisplay.conformance.catalogue import SECTIONS
 from voxdisplay.conformance.dialogue import Line
 from voxdisplay.conformance.run import Report, Result, Verdict
-from voxdisplay.conformance.said import FEATURES, FORMATS
 
 _LAST_LINES = 8  # of a transcript, unless all is shown
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
-from voxdisplay.conformance import first_contact
+from voxdisplay.conformance import handshake
+from voxdisplay.conformance.announced import FORMATS, Said
 from voxdisplay.conformance.catalogue import CHECKS, Check
 from voxdisplay.conformance.dialogue import Broken, Line, NotApplicable, Silent
-from voxdisplay.conformance.keeping import keep, put_back
 from voxdisplay.conformance.packets import NoSuchFieldError
 from voxdisplay.conformance.probe import Probe
-from voxdisplay.conformance.said import FORMATS, Said
+from voxdisplay.conformance.saved_page import keep, put_back
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
@@ -179,7 +179,7 @@ def _meet(probe: Probe) -> Result | None:
     try:
         met = probe.greet()
         if not met:
-            likely = first_contact.why_silent(probe)
+            likely = handshake.why_silent(probe)
     except TransportError as error:
         met, likely = False, str(error)
     said = probe.said
@@ -188,7 +188,7 @@ def _meet(probe: Probe) -> Result | None:
         return None
     came = str(probe.info) if met else "nothing that could be read"
     must = "an INFO that says what the device is"
-    return Result(first_contact.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
+    return Result(handshake.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
 
 
 def _none(stranger: Result, selected: list[Check]) -> Iterator[Result]:

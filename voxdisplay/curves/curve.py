@@ -7,16 +7,12 @@ colours and no display: only where it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Evaluate = Callable[[Ints, Floats], Floats]
-"""What `Curve.together` prepares."""
+from voxdisplay.compute.array_types import Evaluate, Floats, Ints
 
 
 class Curve(ABC):

@@ -1,4 +1,4 @@
-"""The compiled twins of functions of this package: see `voxdisplay.compiled`.
+"""The compiled twins of functions of this package: see `voxdisplay.compute.kernel_backend`.
 
 What is computed, and in what order, is what numpy does in their place, so that all bits agree.
 Several threads may be in them at once.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from voxdisplay.compiled import jit
-from voxdisplay.curves.curve import Floats, Ints
+from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.compute.kernel_backend import jit
 
 # Points worked on at once: they stay in the innermost cache.
 BLOCK = 128

@@ -12,13 +12,15 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from voxdisplay.curves import checks, program
-from voxdisplay.curves.curve import Curve, Evaluate, Floats
-from voxdisplay.curves.expression import constant, excerpt, parse
-from voxdisplay.curves.interval import Interval
-from voxdisplay.curves.params import resolve_params
-from voxdisplay.curves.program import Expression
+from voxdisplay.compute.array_types import Evaluate, Floats
+from voxdisplay.curves import arguments
+from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
+from voxdisplay.expressions import program
+from voxdisplay.expressions.interval import Interval
+from voxdisplay.expressions.params import resolve_params
+from voxdisplay.expressions.parse import constant, excerpt, parse
+from voxdisplay.expressions.program import Expression
 
 Formula = str | float | Expression
 Bounds = Sequence[str | float]
@@ -171,9 +173,9 @@ class Parametric(Curve):
 
 def _range(t: Bounds, values: Mapping[str, float]) -> tuple[float, float]:
     if isinstance(t, str) or len(t) != 2:
-        raise checks.ArgumentError("t", f"must be two numbers (a, b), not {excerpt(t)}")
+        raise arguments.ArgumentError("t", f"must be two numbers (a, b), not {excerpt(t)}")
     low, high = (constant(bound, values) for bound in t)
-    return checks.parameter_range("t", low, high)
+    return arguments.parameter_range("t", low, high)
 
 
 def _formula(axis: str, name: str, formula: Formula, values: Mapping[str, float]) -> Expression:

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
-from voxdisplay.curves.interval import Interval, cos, interval, sin
-from voxdisplay.curves.spans import Box, enclose_spans
+from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.curves import arguments
+from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.span_bounds import Box, enclose_spans
+from voxdisplay.expressions.interval import Interval, cos, interval, sin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,7 @@ class Polyline(Curve):
     _least = 2
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
-        vertices = checks.points("points", points, least=self._least)
+        vertices = arguments.points("points", points, least=self._least)
         if (closed and not np.array_equal(vertices[0], vertices[-1])) or len(vertices) == 1:
             vertices = np.concatenate((vertices, vertices[:1]))
         self.closed = closed
@@ -102,7 +103,7 @@ class Segment(Polyline):
     """The straight line from start (t = 0) to end (t = 1), each (3,)."""
 
     def __init__(self, start: ArrayLike, end: ArrayLike, *, closed: bool | None = None) -> None:
-        super().__init__((checks.vector("start", start), checks.vector("end", end)))
+        super().__init__((arguments.vector("start", start), arguments.vector("end", end)))
         self.closed = closed
 
 
@@ -124,7 +125,7 @@ class _Turning(Curve):
     ) -> None:
         self.t_range = t_range
         self.closed = closed
-        self._center = checks.vector("center", center)[:, None]
+        self._center = arguments.vector("center", center)[:, None]
         self._a, self._b = a[:, None], b[:, None]
         self._rise = np.zeros((3, 1)) if rise is None else rise[:, None]
 
@@ -169,7 +170,7 @@ class Ellipse(_Turning):
     """
 
     def __init__(self, center: ArrayLike, axes: ArrayLike, *, closed: bool = True) -> None:
-        a, b = checks.array("axes", axes, (2, 3))
+        a, b = arguments.array("axes", axes, (2, 3))
         super().__init__(center, a, b, closed=closed)
 
 
@@ -195,7 +196,7 @@ class Circle(_Turning):
         *,
         closed: bool = True,
     ) -> None:
-        radius = checks.positive("radius", radius)
+        radius = arguments.positive("radius", radius)
         u, v, _ = _frame("normal", normal)
         super().__init__(center, radius * u, radius * v, closed=closed)
 
@@ -223,13 +224,13 @@ class Arc(_Turning):
         *,
         closed: bool | None = None,
     ) -> None:
-        radius = checks.positive("radius", radius)
-        start, end = checks.finite("start", start), checks.finite("end", end)
+        radius = arguments.positive("radius", radius)
+        start, end = arguments.finite("start", start), arguments.finite("end", end)
         if start == end:
-            raise checks.ArgumentError("end", f"must differ from start: both are {start:g}")
+            raise arguments.ArgumentError("end", f"must differ from start: both are {start:g}")
         u, v, _ = _frame("normal", normal)
         turn = math.copysign(1.0, end - start)  # clockwise: t is minus the angle
-        t_range = checks.parameter_range("angle", turn * start, turn * end)
+        t_range = arguments.parameter_range("angle", turn * start, turn * end)
         super().__init__(center, radius * u, turn * radius * v, t_range=t_range, closed=closed)
 
 
@@ -264,16 +265,16 @@ class Helix(_Turning):
         start: float = 0.0,
         closed: bool | None = None,
     ) -> None:
-        radius = checks.positive("radius", radius)
-        start = checks.finite("start", start)
-        end = start + math.tau * checks.positive("turns", turns)
+        radius = arguments.positive("radius", radius)
+        start = arguments.finite("start", start)
+        end = start + math.tau * arguments.positive("turns", turns)
         u, v, n = _frame("axis", axis)
-        rise = checks.finite("pitch", pitch) / math.tau * n
+        rise = arguments.finite("pitch", pitch) / math.tau * n
         super().__init__(
-            checks.vector("center", center) - start * rise,
+            arguments.vector("center", center) - start * rise,
             radius * u,
             radius * v,
-            t_range=checks.parameter_range("angle", start, end),
+            t_range=arguments.parameter_range("angle", start, end),
             rise=rise,
             closed=closed,
         )
@@ -306,10 +307,10 @@ class Lissajous(Curve):
         closed: bool | None = None,
     ) -> None:
         self.closed = closed
-        self._center = checks.vector("center", center)[:, None]
-        self._amplitude = checks.vector("amplitude", amplitude)[:, None]
-        self._frequency = checks.vector("frequency", frequency)[:, None]
-        self._phase = checks.vector("phase", phase)[:, None]
+        self._center = arguments.vector("center", center)[:, None]
+        self._amplitude = arguments.vector("amplitude", amplitude)[:, None]
+        self._frequency = arguments.vector("frequency", frequency)[:, None]
+        self._phase = arguments.vector("phase", phase)[:, None]
 
     def position(self, t: Floats) -> Floats:
         """Give the points at t, (n,), as a (3, n) float64 array."""
@@ -357,17 +358,17 @@ class TorusKnot(Curve):
         *,
         closed: bool = True,
     ) -> None:
-        self._p, self._q = checks.whole("p", p), checks.whole("q", q)
+        self._p, self._q = arguments.whole("p", p), arguments.whole("q", q)
         if math.gcd(self._p, self._q) != 1:
-            raise checks.ArgumentError(
+            raise arguments.ArgumentError(
                 "p",
                 f"= {self._p} and q = {self._q} make no knot",
                 hint="they must have no common divisor: (2, 3) is a trefoil, (1, 5) a coil",
             )
         self.closed = closed
-        self._center = checks.vector("center", center)[:, None]
-        self._major = checks.positive("major", major)
-        self._minor = checks.positive("minor", minor)
+        self._center = arguments.vector("center", center)[:, None]
+        self._major = arguments.positive("major", major)
+        self._minor = arguments.positive("minor", minor)
         self._axes = np.stack(_frame("axis", axis), axis=1)
 
     def position(self, t: Floats) -> Floats:
@@ -402,11 +403,11 @@ class TorusKnot(Curve):
 
 def _frame(name: str, direction: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Give unit vectors u, v, n, right-handed, n along a direction, u where angles begin."""
-    n = checks.vector(name, direction)
+    n = arguments.vector(name, direction)
     n = n / (np.abs(n).max() or 1.0)  # so that its square neither overflows nor vanishes
     length = np.linalg.norm(n)
     if length == 0:
-        raise checks.ArgumentError(name, "has no direction: it is 0")
+        raise arguments.ArgumentError(name, "has no direction: it is 0")
     n = n / length
     towards = np.array([1.0, 0.0, 0.0])
     if np.hypot(n[1], n[2]) < 1e-9:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.compiled import twin
-from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Evaluate, Floats, Ints
-from voxdisplay.curves.interval import Interval, interval
-from voxdisplay.curves.spans import Box, control_box, enclose_spans
+from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.curves import arguments
+from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.span_bounds import Box, control_box, enclose_spans
+from voxdisplay.expressions.interval import Interval, interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +42,7 @@ class Bezier(Curve):
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
-        self._points = checks.points("points", points, least=2)
+        self._points = arguments.points("points", points, least=2)
         _check_degree("points", len(self._points) - 1)
         self.family = len(self._points)
         self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
@@ -119,11 +120,11 @@ class BSpline(Curve):
         closed: bool | None = None,
     ) -> None:
         self.closed = closed
-        self._degree = p = checks.whole("degree", degree)
+        self._degree = p = arguments.whole("degree", degree)
         if p < 1:
-            raise checks.ArgumentError("degree", f"must be 1 or more, not {p}")
+            raise arguments.ArgumentError("degree", f"must be 1 or more, not {p}")
         _check_degree("degree", p)
-        control = checks.points("points", points, least=p + 1)
+        control = arguments.points("points", points, least=p + 1)
         self._rational = weights is not None
         if weights is not None:
             control = _weighted(control, weights)
@@ -178,26 +179,26 @@ class BSpline(Curve):
 
 def _weighted(points: Floats, weights: ArrayLike) -> Floats:
     """Give homogeneous coordinates, (n, 4): x w, y w, z w, w."""
-    factors = checks.array("weights", weights, (len(points),))
+    factors = arguments.array("weights", weights, (len(points),))
     if (factors <= 0).any():
-        raise checks.ArgumentError("weights", f"must be positive, not {factors.min():g}")
+        raise arguments.ArgumentError("weights", f"must be positive, not {factors.min():g}")
     return np.column_stack((points * factors[:, None], factors))
 
 
 def _checked_knots(knots: ArrayLike, n: int, p: int) -> Floats:
-    values = checks.array("knots", knots, (None,))
+    values = arguments.array("knots", knots, (None,))
     if len(values) != n + p + 1:
-        raise checks.ArgumentError(
+        raise arguments.ArgumentError(
             "knots", f"are {len(values)}, not {n + p + 1}: {n} points + degree {p} + 1"
         )
     if (np.diff(values) < 0).any():
-        raise checks.ArgumentError("knots", "must not descend")
+        raise arguments.ArgumentError("knots", "must not descend")
     if values[p] == values[n]:
-        raise checks.ArgumentError("knots", "leave no range for t")
+        raise arguments.ArgumentError("knots", "leave no range for t")
     inside = values[(values > values[p]) & (values < values[n])]
     often, counts = np.unique(inside, return_counts=True)
     if (counts > p).any():
-        raise checks.ArgumentError(
+        raise arguments.ArgumentError(
             "knots", f"have {often[counts > p][0]:g} more than {p} times, which tears the curve"
         )
     return values
@@ -238,12 +239,12 @@ class CatmullRom(Curve):
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
-        nodes = checks.points("points", points, least=2)
+        nodes = arguments.points("points", points, least=2)
         if closed:
             nodes = np.concatenate((nodes, nodes[:1]))
         nodes = nodes[np.r_[True, (np.diff(nodes, axis=0) != 0).any(axis=1)]]
         if len(nodes) < 2:
-            raise checks.ArgumentError("points", "are all the same")
+            raise arguments.ArgumentError("points", "are all the same")
         ends = (
             (nodes[-2], nodes[1])
             if closed
@@ -304,4 +305,4 @@ class CatmullRom(Curve):
 
 def _check_degree(name: str, degree: int) -> None:
     if degree > MAX_DEGREE:
-        raise checks.ArgumentError(name, f"make degree {degree}: more than {MAX_DEGREE}")
+        raise arguments.ArgumentError(name, f"make degree {degree}: more than {MAX_DEGREE}")

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.curves import checks
-from voxdisplay.curves.curve import Curve, Evaluate, Floats
-from voxdisplay.curves.interval import Interval
+from voxdisplay.compute.array_types import Evaluate, Floats
+from voxdisplay.curves import arguments
+from voxdisplay.curves.curve import Curve
+from voxdisplay.expressions.interval import Interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,8 +31,8 @@ class Transformed(Curve):
 
     def __init__(self, curve: Curve, scale: float = 1.0, offset: ArrayLike = (0, 0, 0)) -> None:
         self.curve = curve
-        self.scale = checks.positive("scale", scale)
-        self.offset = checks.vector("offset", offset)
+        self.scale = arguments.positive("scale", scale)
+        self.offset = arguments.vector("offset", offset)
         self.t_range = curve.t_range
         self.closed = curve.closed
         self.breaks = curve.breaks

@@ -2,8 +2,8 @@
 
 from voxdisplay.link.counters import LinkCounters
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
-from voxdisplay.link.frames import OnDisplay
 from voxdisplay.link.link import Link
+from voxdisplay.link.outgoing_frames import OnDisplay
 
 __all__ = [
     "Event",

@@ -13,16 +13,16 @@ from collections.abc import Callable, Iterator
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link.counters import LinkCounters
 from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
-from voxdisplay.link.frames import Frames, OnDisplay
-from voxdisplay.link.greeting import Greeting, no_answer
-from voxdisplay.link.info import check_info
-from voxdisplay.link.loss import suited
-from voxdisplay.link.reads import Reads
+from voxdisplay.link.info_validation import check_info
+from voxdisplay.link.outgoing_frames import Frames, OnDisplay
+from voxdisplay.link.payload_size import suited
+from voxdisplay.link.readback import Reads
 from voxdisplay.link.sender import Sender
-from voxdisplay.link.silence import Silence
+from voxdisplay.link.session_opening import Greeting, no_answer
+from voxdisplay.link.silence_timer import Silence
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
-from voxdisplay.wire.stream import PacketStream
+from voxdisplay.wire.packet_stream import PacketStream
 
 MOST_LATE_S = 0.25  # a caller that comes back later than this was away
 MOST_RESTARTS = 8  # without a frame shown

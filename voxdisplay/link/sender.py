@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.link.counters import LinkCounters
-from voxdisplay.link.frames import Frames, OnDisplay
-from voxdisplay.link.loss import Loss
-from voxdisplay.link.pace import LEAST_PACKETS, Pace
-from voxdisplay.link.reads import Reads
-from voxdisplay.link.window import Window
+from voxdisplay.link.delivery_rate import LEAST_PACKETS, Pace
+from voxdisplay.link.outgoing_frames import Frames, OnDisplay
+from voxdisplay.link.payload_size import Loss
+from voxdisplay.link.readback import Reads
+from voxdisplay.link.send_window import Window
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 

@@ -4,6 +4,6 @@ Knows curves, colours and the grid; does not know voxels, frames or displays.
 """
 
 from voxdisplay.scene.model import Item, Scene
-from voxdisplay.scene.read import load_scene, read_scene
+from voxdisplay.scene.reader import load_scene, read_scene
 
 __all__ = ["Item", "Scene", "load_scene", "read_scene"]

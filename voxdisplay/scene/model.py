@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from voxdisplay.curves import Curve
-    from voxdisplay.grid import Grid
+    from voxdisplay.raster.grid import Grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,10 +10,10 @@ from typing import Annotated, get_args
 from msgspec import Meta, Struct, field
 
 from voxdisplay import curves
-from voxdisplay.curves.expression import MAX_LENGTH
-from voxdisplay.curves.params import MAX_PARAMS
 from voxdisplay.errors import CurveError
-from voxdisplay.scene.place import Place
+from voxdisplay.expressions.params import MAX_PARAMS
+from voxdisplay.expressions.parse import MAX_LENGTH
+from voxdisplay.scene.evaluation_context import Place
 
 MAX_SIDE = 65535
 

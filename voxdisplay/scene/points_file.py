@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.curves.expression import excerpt
 from voxdisplay.errors import CurveError, did_you_mean
+from voxdisplay.expressions.parse import excerpt
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

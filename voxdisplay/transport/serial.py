@@ -16,7 +16,7 @@ import serial
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport.diagnosis import explain, reason
-from voxdisplay.transport.latency import lower_latency
+from voxdisplay.transport.ftdi_latency import lower_latency
 
 _READ_BYTES = 1 << 16
 _WRITE_BYTES = 1 << 14

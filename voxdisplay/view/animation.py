@@ -18,12 +18,12 @@ from typing import Any, overload
 import numpy as np
 
 from voxdisplay.errors import MissingExtra
-from voxdisplay.grid import Grid
-from voxdisplay.view.axes import AXIS_COLORS
-from voxdisplay.view.light import gather
+from voxdisplay.raster.grid import Grid
+from voxdisplay.view.glow import gather
+from voxdisplay.view.lit_voxels import Lit
 from voxdisplay.view.picture import Look, meter, picture_of
 from voxdisplay.view.pillow import Image
-from voxdisplay.view.voxels import Lit
+from voxdisplay.view.stage import AXIS_COLORS
 
 # Pictures that the palette is made from, spread over the film, and how much a colour's frequency
 # counts in it: 0 not at all, 1 fully.

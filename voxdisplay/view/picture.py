@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.grid import Grid
-from voxdisplay.palette import Colors
-from voxdisplay.pixel import PixelFormat
-from voxdisplay.view.axes import GROUND, stage
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import Colors
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.light import Light, gather, spread
+from voxdisplay.view.glow import Light, gather, spread
+from voxdisplay.view.lit_voxels import Lit, lit_voxels
 from voxdisplay.view.pillow import Image, ImageChops
-from voxdisplay.view.voxels import Lit, lit_voxels
+from voxdisplay.view.stage import GROUND, stage
 
 SIZE = (800, 600)
 

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.grid import Grid
-from voxdisplay.palette import Colors
-from voxdisplay.pixel import PixelFormat
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import Colors
+from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
+from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import Look, picture
-from voxdisplay.view.voxels import lit_voxels
 
 Progress = Callable[[int, int], None]
 
@@ -116,7 +116,7 @@ def _mp4(path: Path, shot: Shot, progress: Progress | None) -> None:
 
 
 def _html(path: Path, shot: Shot, _: Progress | None) -> None:
-    from voxdisplay.view.export import save_html  # noqa: PLC0415 - it brings a page of its own
+    from voxdisplay.view.html_export import save_html  # noqa: PLC0415 - it brings a page of its own
 
     save_html(
         path,

@@ -17,10 +17,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
-from voxdisplay.grid import Grid
-from voxdisplay.view.blocks import CAMERA, full_color, half_blocks
+from voxdisplay.raster.grid import Grid
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.voxels import Lit
+from voxdisplay.view.half_blocks import CAMERA, full_color, half_blocks
+from voxdisplay.view.lit_voxels import Lit
 
 # Without a key, how soon a changed window size is seen, and how often a turning view is drawn.
 _GLANCE_S, _TURN_S = 0.25, 0.05

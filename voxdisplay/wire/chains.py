@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import Bools, Bytes, Coding, Ints, places, ranges
-from voxdisplay.wire.pieces import Layout, Pieces
+from voxdisplay.wire.op_encoding import Bools, Bytes, Coding, Ints, places, ranges
+from voxdisplay.wire.payload_splitting import Layout, Pieces
 
 Steps = NDArray[np.int32]
 _STEPS_PER_BYTE = 4

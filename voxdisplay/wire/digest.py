@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.pixel import PixelFormat, Pixels, Values, lit
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, lit
 from voxdisplay.wire import spec
 
 # What sets the value of a colour apart from that of a pixel.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import Bools, Bytes, Coding, Ints, ranges
+from voxdisplay.wire.op_encoding import Bools, Bytes, Coding, Ints, ranges
 
 TOP = spec.LIMIT_MAX_LEVEL
 SIDE = 1 << TOP

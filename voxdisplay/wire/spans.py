@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import RemoteProtocolError
-from voxdisplay.pixel import PixelFormat, Values
+from voxdisplay.raster.pixel_format import PixelFormat, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.ops import (
+from voxdisplay.wire.incremental import Steps, at_once
+from voxdisplay.wire.op_encoding import (
     SHORT_COUNT,
     Bools,
     Bytes,
@@ -25,9 +26,8 @@ from voxdisplay.wire.ops import (
     little_endian,
     ranges,
 )
-from voxdisplay.wire.parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
-from voxdisplay.wire.pieces import ANY, Layout, Pieces, no_pieces
-from voxdisplay.wire.steps import Steps, at_once
+from voxdisplay.wire.optimal_parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
+from voxdisplay.wire.payload_splitting import ANY, Layout, Pieces, no_pieces
 
 Look = Callable[[Ints], NDArray[np.integer]]
 

@@ -1,22 +1,22 @@
-"""The checks, a module for some sections each; in the order in which they are made."""
+"""The checks, one module per group of sections, imported in the order in which they are run."""
 
 from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is that of the checks
     delimiting,
-    kinds,
-    greeting,
+    packet_types,
+    handshake,
     frames,
-    waiting,
+    pending_swap,
     drawing,
     shapes,
-    bricks,
-    arcs,
+    voxel_sets,
+    range_coded_chains,
     digests,
     acks,
     window,
     credit,
-    reading,
-    outside,
+    readback,
+    out_of_bounds,
     refusals,
     malformed,
-    answers,
+    all_responses,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from voxdisplay.conformance.catalogue import check
-from voxdisplay.conformance.checks.kinds import demand_still_open
+from voxdisplay.conformance.checks.packet_types import demand_still_open
 from voxdisplay.conformance.packets import ASKED, body, data, status, wire
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.catalogue import check, ticking
-from voxdisplay.conformance.checks.waiting import shown_at
+from voxdisplay.conformance.checks.pending_swap import shown_at
 from voxdisplay.conformance.packets import ASKED, CLEAR, COMMIT, data, status, wire
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from voxdisplay.conformance import ops
+from voxdisplay.conformance.announced import Said
 from voxdisplay.conformance.catalogue import check, formats, seen, voxels
 from voxdisplay.conformance.probe import Probe
-from voxdisplay.conformance.said import Said
 from voxdisplay.wire import spec
 
 # Around every place where a count takes one more byte.

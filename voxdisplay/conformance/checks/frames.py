@@ -5,8 +5,8 @@ from __future__ import annotations
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.catalogue import at_once, check, seen, voxels
 from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, data
-from voxdisplay.conformance.page import Page
 from voxdisplay.conformance.probe import Probe
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.catalogue import check, feature, formats, seen, voxels
-from voxdisplay.conformance.checks.outside import prefixed
-from voxdisplay.conformance.decoder import Decoder, Refused
+from voxdisplay.conformance.checks.out_of_bounds import prefixed
 from voxdisplay.conformance.packets import CLEAR, COMMIT, body, data, hello, read, status
-from voxdisplay.conformance.page import Page
 from voxdisplay.conformance.probe import Probe
+from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 _HUGE = 100_000

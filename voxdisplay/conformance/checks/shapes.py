@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 
 from voxdisplay.conformance import ops
+from voxdisplay.conformance.announced import Said
 from voxdisplay.conformance.catalogue import check, feature, seen, voxels
 from voxdisplay.conformance.checks.drawing import long_axis
-from voxdisplay.conformance.decoder import Place
 from voxdisplay.conformance.probe import Probe
-from voxdisplay.conformance.said import Said
+from voxdisplay.conformance.reference_decoder import Place
 from voxdisplay.wire import spec
 
 _SIDE = 12  # of the part of the grid in which boxes are drawn

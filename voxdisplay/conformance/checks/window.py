@@ -6,8 +6,8 @@ from voxdisplay.conformance import ops
 from voxdisplay.conformance.catalogue import check, seen, voxels
 from voxdisplay.conformance.checks.frames import lit
 from voxdisplay.conformance.packets import CLEAR, COMMIT, data
-from voxdisplay.conformance.page import Page
 from voxdisplay.conformance.probe import Probe
+from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 

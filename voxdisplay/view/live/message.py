@@ -24,10 +24,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.grid import Grid
-from voxdisplay.palette import DEFAULT, Colors, Palette
-from voxdisplay.pixel import PixelFormat
-from voxdisplay.view.voxels import lit_voxels
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import DEFAULT, Colors, Palette
+from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.view.lit_voxels import lit_voxels
 
 _OFFSET = struct.Struct("<I")
 

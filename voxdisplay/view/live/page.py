@@ -1,7 +1,7 @@
 """The page that browsers get, and what it may do: nothing but what it does.
 
 It is one file, ``page.html``, without a build step and without anything from elsewhere. Served by
-`server` it asks for frames there; written into a file by `voxdisplay.view.export` it has them.
+`server` it asks for frames there; written into a file by `voxdisplay.view.html_export` it has them.
 """
 
 from __future__ import annotations

@@ -17,9 +17,9 @@ from typing import Protocol
 import numpy as np
 
 from voxdisplay.errors import OpenError, TransportClosed
-from voxdisplay.grid import Grid
-from voxdisplay.palette import DEFAULT
-from voxdisplay.pixel import PixelFormat, Pixels
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import DEFAULT
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels
 from voxdisplay.view.live.message import Moment
 
 _POLL_S = 0.05

@@ -1,0 +1,150 @@
+"""Range-coded chains: the op ARC as pieces of one pen each (7.7).
+
+Nothing is drawn here. It refuses what leads off the grid, for what follows then has no meaning.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from firmware_sim import spec
+from firmware_sim.grid import Grid
+from firmware_sim.memory import PixelFormat
+from firmware_sim.operands import Operands
+from firmware_sim.range_decoder import Bits
+
+_HISTORY: Final = 0x7F  # seven steps
+_OTHERS: Final = 0x3F  # the six before the latest
+
+
+class _Axis:
+    """What the decoder remembers of an axis."""
+
+    def __init__(self, side: int) -> None:
+        self.side = side
+        self.bits = (side - 1).bit_length()
+        self.begin(0)
+
+    def begin(self, place: int) -> None:
+        """Begin somewhere, with nothing remembered."""
+        self.place = place
+        self.last = 0
+        self.run = 0
+        self.prev = 0
+        self.prev2 = 0
+        self.past = 0
+        self.way = 0
+
+    @property
+    def streak(self) -> int:
+        return self.run if self.last else 0
+
+    def turn(self, bits: Bits) -> None:
+        """Move by one, in a direction that is decoded."""
+        if not self.way:
+            self.way = -1 if bits.plain(1) else 1
+        elif bits.bit(spec.ARC_TURN + (0 if self.last else min(self.run, 15))):
+            self.way = -self.way
+        self.place += self.way
+
+    def follows(self, bits: Bits) -> int:
+        """Return whether the axis moves in a step in which the main axis does."""
+        last, run = self.last, self.run
+        history = self.past >> 1 ^ (_OTHERS if last else 0)
+        longer = min(max(run - self.prev2, -2), 1) + 2
+        runs = 64 * last + 16 * longer + 8 * (self.prev > 1) + min(run, 7)
+        return last ^ bits.mixed(spec.ARC_HISTORY + history, spec.ARC_RUNS + runs)
+
+    def note(self, moved: int) -> None:
+        """Remember whether the axis moved."""
+        self.past = (self.past << 1 | moved) & _HISTORY
+        if moved == self.last:
+            self.run = min(self.run + 1, spec.ARC_MAX_RUN)
+        else:
+            self.prev2 = self.prev
+            self.prev = self.run
+            self.run = 1
+            self.last = moved
+
+
+def arc(
+    operands: Operands, grid: Grid, pixel_format: PixelFormat, pen: bytes
+) -> Iterator[tuple[bytes, list[int]]]:
+    """Decode an ARC.
+
+    Parameters
+    ----------
+    operands
+        Behind its op byte; all that is left there is taken.
+    grid, pixel_format
+        Those of the page.
+    pen
+        The pen before the op.
+
+    Yields
+    ------
+    pen : bytes
+        The pen of a piece.
+    voxels : list of int
+        Indices of the voxels that it draws, some perhaps more than once.
+
+    Raises
+    ------
+    Refusal
+        TRUNCATED, PADDING or OUTSIDE, when the pieces before have been yielded.
+    """
+    bits = Bits(
+        operands.rest(),
+        lambda: operands.refusal(spec.CODE_TRUNCATED, "the payload ends inside the op"),
+    )
+    axes = [_Axis(side) for side in grid.sides]
+    pixel_bits = 1 if pixel_format.code == spec.FORMAT_MONO1 else 8 * pixel_format.size
+    first = True
+    while bits.bit(spec.ARC_MORE):
+        jump = first or bits.bit(spec.ARC_JUMP)
+        first = False
+        if bits.bit(spec.ARC_INK):
+            pen = bits.plain(pixel_bits).to_bytes(pixel_format.size, "little")
+        if jump:
+            for axis in axes:
+                axis.begin(bits.plain(axis.bits))
+        count = bits.number()
+        voxels = []
+        if jump:
+            voxels.append(_index(operands, grid, axes))
+        for _ in range(count):
+            _step(bits, axes)
+            voxels.append(_index(operands, grid, axes))
+        yield pen, voxels
+    if not bits.done:
+        raise operands.refusal(spec.CODE_PADDING, "bytes behind the last bit")
+
+
+def _index(operands: Operands, grid: Grid, axes: list[_Axis]) -> int:
+    x, y, z = (axis.place for axis in axes)
+    if min(x, y, z) < 0 or not grid.holds(x, y, z):
+        raise operands.refusal(spec.CODE_OUTSIDE, f"({x}, {y}, {z})")
+    return grid.index(x, y, z)
+
+
+def _step(bits: Bits, axes: list[_Axis]) -> None:
+    streaks = [axis.streak for axis in axes]
+    main = streaks.index(max(streaks))
+    m, b, c = axes[main], axes[main - 2], axes[main - 1]
+    others = max(streaks[main - 2], streaks[main - 1])
+    m_moves = bits.bit(spec.ARC_MAIN + 8 * min(streaks[main], 3) + min(others, 7))
+    if m_moves:
+        m.turn(bits)
+        b_moves = b.follows(bits)
+    else:
+        b_moves = bits.bit(spec.ARC_LONE + min(streaks[main - 2], 7))
+    if b_moves:
+        b.turn(bits)
+    if m_moves:
+        c_moves = c.follows(bits)
+    else:
+        c_moves = bits.bit(spec.ARC_LONE + min(streaks[main - 1], 7)) if b_moves else 1
+    if c_moves:
+        c.turn(bits)
+    m.note(m_moves)
+    b.note(b_moves)
+    c.note(c_moves)

@@ -1,0 +1,235 @@
+"""Sessions, and what breaks the rules (protocol.md, 5, 11 and 13), with answers by hand."""
+
+import dataclasses
+
+import document
+import pytest
+from by_hand import BOOT, INFO, SESSION, ack, opened, sent, told
+
+from voxdisplay.errors import RemoteProtocolError, TransportTimeout
+from voxdisplay.link import Link, Ready, Refused, Restarted, Shown
+from voxdisplay.link.info_validation import check_info
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+
+# -- the session
+
+
+def test_hello_is_the_documents_with_a_00_before_it():
+    """3: "The sender of a session's first packet MUST send one 00 before it"."""
+    hello = next(v for v in document.vectors("packet") if v.name == "hello")
+    assert Link(SESSION, 0.0).transmit(0.0) == b"\0" + hello.hex("wire")
+
+
+def test_hello_is_repeated_unchanged_until_it_is_answered():
+    link = Link(SESSION, 0.0)
+    first = link.transmit(0.0)
+    assert link.transmit(0.1) == b""
+    assert link.next_timeout(0.1) == pytest.approx(0.15)
+    assert link.transmit(0.25) == first
+    told(link, INFO, 0.3)
+    assert link.ready
+    assert link.transmit(0.5) == b""
+    assert link.next_timeout(0.5) is None
+
+
+def test_hellos_that_may_still_be_in_the_buffer_cost_credit():
+    """9.2: "A host that has sent several HELLO [...] counts from the first"."""
+    payload = bytes(96)
+    enough = 64 + len(packets.encode(packets.Data(ops=payload)))
+    for hellos, fits in ((1, True), (2, False)):
+        link = Link(SESSION, 0.0)
+        for now in range(hellos):
+            link.transmit(float(now))
+        told(link, dataclasses.replace(INFO, rx_buffer=enough), 2.0)
+        link.present([payload])
+        assert isinstance(sent(link, 2.0)[0], packets.Data) == fits
+
+
+@pytest.mark.parametrize(
+    ("came", "said", "hint"),
+    [
+        (b"", "nothing came at all", "switched on"),
+        (b"login: ", "no packet: b'login: '", "baud rate"),
+        (b"login\0\0", "no packet: b'login'", "baud rate"),
+        (bytes(3000), "only zeros came, 3000 of them", "held low"),
+        (packets.encode(ack()), "packets came, but none that answers", "another program"),
+        (document.on_wire(b"\xf0\0\0\0"), "packets came, but none", "another program"),
+    ],
+)
+def test_a_hello_that_nobody_answers(came, said, hint):
+    link = Link(SESSION, 0.0, patience_s=1)
+    link.receive(came, 0.5)
+    link.transmit(0.9)
+    with pytest.raises(TransportTimeout, match="answered HELLO within 1 s") as caught:
+        link.transmit(1.0)
+    assert said in str(caught.value)
+    assert hint in caught.value.hint
+
+
+def test_before_a_session_all_but_info_is_dropped():
+    link = Link(SESSION, 0.0)
+    malformed = document.on_wire(bytes.fromhex("80 00 00 01 02"))
+    assert link.receive(malformed, 0.0) == []
+    assert told(link, ack(), 0.0) == []
+    assert told(link, packets.Error(code=1, session=0, offset=0), 0.0) == []
+    assert told(link, dataclasses.replace(INFO, session=SESSION + 1), 0.0) == []
+    assert not link.ready
+    assert link.receive(malformed + packets.encode(INFO), 0.0) == [Ready(INFO)]
+
+
+def test_an_info_that_is_too_short_breaks_the_protocol():
+    with pytest.raises(RemoteProtocolError, match="INFO"):
+        Link(SESSION, 0.0).receive(document.on_wire(packets.pack(INFO)[:20]), 0.0)
+
+
+def test_an_info_of_another_major_is_told_as_it_is():
+    link = Link(SESSION, 0.0)
+    (event,) = link.receive(document.on_wire(bytes.fromhex("90 00 00 02 17 5A 07 B0")), 0.0)
+    assert event.info.major == 2
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "named"),
+    [
+        ("nx", 0, "nx, ny, nz"),
+        ("ny", 0, "nx, ny, nz"),
+        ("nz", 0, "nx, ny, nz"),
+        ("pages", 1, "pages"),
+        ("max_payload", 63, "max_payload"),
+        ("rx_buffer", 168, "rx_buffer"),
+    ],
+)
+def test_an_info_that_contradicts_the_document(field, value, named):
+    check_info(dataclasses.replace(INFO, rx_buffer=169))
+    with pytest.raises(RemoteProtocolError, match=named) as caught:
+        check_info(dataclasses.replace(INFO, **{field: value}))
+    assert caught.value.section == "5"
+    with pytest.raises(RemoteProtocolError, match=named):
+        told(Link(SESSION, 0.0), dataclasses.replace(INFO, **{field: value}), 0.0)
+
+
+def test_a_grid_of_too_many_voxels():
+    check_info(dataclasses.replace(INFO, nx=32767, ny=65535, nz=1))
+    with pytest.raises(RemoteProtocolError, match="nx, ny, nz"):
+        check_info(dataclasses.replace(INFO, nx=32769, ny=65535, nz=1))
+
+
+def test_the_least_receive_buffer_is_enough():
+    """9.2: "large enough for 64 bytes and the longest packet as it is on the wire"."""
+    link = opened(max_payload=247, rx_buffer=254 + 1 + 1 + 64)
+    link.present([b"\xc0\x01" + b"\x81" * 245])
+    assert [len(packet.ops) for packet in sent(link, 0.0)] == [247]
+
+
+# -- what goes wrong
+
+
+def test_packets_of_another_session_are_dropped():
+    link = opened()
+    link.present([b"\xa0"])
+    sent(link, 0.0)
+    assert told(link, ack(1, 0, session=SESSION + 1, flags=1), 0.1) == []
+    assert told(link, ack(1, 0, session=SESSION + 1, boot=1, flags=1), 0.1) == []
+    assert told(link, dataclasses.replace(INFO, session=SESSION + 1, boot=1), 0.1) == []
+    assert told(link, packets.Error(code=7, session=SESSION + 1, offset=3), 0.1) == []
+    assert link.ready
+    assert link.backlog == 1
+
+
+def test_the_hosts_own_packets_are_dropped_and_so_is_an_unknown_type():
+    link = opened()
+    for packet in (packets.Hello(session=SESSION), packets.Status(), packets.Data()):
+        assert told(link, packet, 0.0) == []
+    assert link.receive(document.on_wire(b"\xc0\0\0later"), 0.0) == []
+    assert link.stream.counters.unknown == 1
+
+
+def test_an_answer_to_what_was_not_asked():
+    link = opened()
+    assert told(link, ack(0, 99, flags=spec.ACK_FLAG_ASKED), 0.1) == []
+    assert sent(link, 0.2) == []
+
+
+def test_an_info_that_comes_twice_is_dropped():
+    link = opened()
+    assert told(link, INFO, 0.1) == []
+    assert link.counters.sessions == 1
+
+
+@pytest.mark.parametrize(
+    "news",
+    [
+        ack(boot=BOOT + 1),
+        dataclasses.replace(INFO, boot=BOOT + 1),
+        packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0),
+    ],
+    ids=["ack", "info", "error"],
+)
+def test_a_device_that_has_restarted_gets_the_whole_frame_again(news):
+    """12: "begins again with HELLO and a whole frame"."""
+    link = opened()
+    link.present([b"\xa0", b"\xa1"])
+    link.read(0, 1)
+    before = sent(link, 0.0)
+    told(link, ack(1, 0), 0.1)
+    assert told(link, news, 0.2) == [Restarted()]
+    (hello,) = sent(link, 0.2)
+    assert hello.session == SESSION + 1
+    told(link, dataclasses.replace(INFO, session=SESSION + 1, boot=BOOT + 1), 0.3)
+    again = sent(link, 0.3)
+    assert again[:2] == before[:2]
+    assert (again[2].start, again[2].count) == (0, 1)
+
+
+def test_the_last_session_number_is_followed_by_the_first():
+    """5: a session is "a number of the host's choice, not 0"."""
+    link = Link(0xFFFF, 0.0)
+    told(link, dataclasses.replace(INFO, session=0xFFFF), 0.0)
+    told(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), 0.0)
+    assert [packet.session for packet in sent(link, 0.0)] == [1]
+
+
+def test_a_device_that_restarts_all_the_time():
+    link = opened()
+    link.present([b"\xa0"])
+
+    def restart():
+        for k in range(20):
+            sent(link, float(k))
+            told(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), float(k))
+            told(link, dataclasses.replace(INFO, session=SESSION + 1 + k), float(k))
+
+    with pytest.raises(TransportTimeout, match="lost the session 9 times"):
+        restart()
+
+
+@pytest.mark.parametrize("code", range(2, 15))
+@pytest.mark.parametrize("session", [0, SESSION])
+def test_what_a_device_refuses_is_told_and_a_session_begun(code, session):
+    link = opened()
+    link.present([b"\xe0"])
+    sent(link, 0.0)
+    error = packets.Error(code=code, session=session, offset=3, text="no")
+    assert told(link, error, 0.1) == [Refused(error)]
+    assert (link.backlog, link.ready) == (0, False)
+    # What was on its way behind it finds no session: that is no news.
+    late = packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0)
+    assert told(link, late, 0.1) == []
+    assert [packet.session for packet in sent(link, 0.1)] == [SESSION + 1]
+
+
+def test_a_malformed_packet_of_a_session_breaks_the_protocol_and_the_next_is_taken():
+    link = opened()
+    ticket = link.present([b"\xa0"])
+    sent(link, 0.0)
+    malformed = document.on_wire(bytes.fromhex("80 00 00 01 02"))
+    with pytest.raises(RemoteProtocolError, match="ACK"):
+        link.receive(malformed + packets.encode(ack(1, 0, flags=1)), 0.1)
+    assert link.receive(b"", 0.1) == [Shown(ticket, 0)]
+
+
+def test_an_ack_for_what_was_never_sent_breaks_the_protocol():
+    link = opened()
+    with pytest.raises(RemoteProtocolError, match="next is 9"):
+        told(link, ack(9, 8), 0.0)

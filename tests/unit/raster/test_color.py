@@ -1,0 +1,61 @@
+"""Colours as people write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from voxdisplay.raster.color import NAMED, parse_color, parse_colors
+
+
+@pytest.mark.parametrize(
+    ("text", "color"),
+    [
+        ("#ff8800", (255, 136, 0)),
+        ("#F80", (255, 136, 0)),
+        ("#123", (0x11, 0x22, 0x33)),
+        ("#123456", (0x12, 0x34, 0x56)),
+        ("orange", (255, 165, 0)),
+        (" RebeccaPurple ", (0x66, 0x33, 0x99)),
+        ("black", (0, 0, 0)),
+        ("white", (255, 255, 255)),
+    ],
+)
+def test_colors(text: str, color: tuple[int, int, int]) -> None:
+    assert parse_color(text) == color
+
+
+def test_css_has_148_names_and_each_is_a_color() -> None:
+    assert len(NAMED) == 148
+    assert parse_colors(list(NAMED)).shape == (148, 3)
+    # Seven colours have two names.
+    assert len({parse_color(name) for name in NAMED}) == 139
+    for name in NAMED:
+        assert parse_color(name.replace("grey", "gray")) == parse_color(name)
+
+
+@pytest.mark.parametrize("text", ["#", "#1", "#12", "#1234", "#12345", "#1234567", "#ggg", "", "0"])
+def test_what_is_no_color(text: str) -> None:
+    with pytest.raises(ValueError, match=r"unknown colour .*CSS colour name, #rgb or #rrggbb"):
+        parse_color(text)
+
+
+def test_the_nearest_name_is_named() -> None:
+    with pytest.raises(ValueError, match="'orang': did you mean 'orange'"):
+        parse_color("orang")
+
+
+def test_a_long_text_is_not_repeated() -> None:
+    with pytest.raises(ValueError, match="unknown colour") as caught:
+        parse_color("\ud800" * 100_000)
+    str(caught.value).encode()
+    assert len(str(caught.value)) < 200
+
+
+def test_one_color_and_several() -> None:
+    np.testing.assert_array_equal(parse_colors("red"), [[255, 0, 0]])
+    colors = parse_colors(["red", "#010203"])
+    np.testing.assert_array_equal(colors, [[255, 0, 0], [1, 2, 3]])
+    assert colors.dtype == np.uint8
+    with pytest.raises(ValueError, match="at least one"):
+        parse_colors([])

@@ -1,0 +1,371 @@
+"""Scene files: what they mean, and how wrong and hostile ones are refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import time
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from voxdisplay import curves
+from voxdisplay.errors import SceneError
+from voxdisplay.expressions.parse import MAX_LENGTH
+from voxdisplay.raster.grid import Grid
+from voxdisplay.scene import Scene, load_scene, read_scene, reader, schema
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = sorted((ROOT / "examples").glob("*.json"))
+
+SEGMENT = {"type": "segment", "from": [1, 2, 3], "to": [4, 5, 6]}
+PARAMETRIC = {"type": "parametric", "x": "t", "y": 0, "z": 0, "t": [0, 1]}
+POINTS = [[1, 2, 3], [4, 2, 1], [4, 6, 1], [0, 6, 5]]
+
+ONE_OF_EACH: list[dict[str, Any]] = [
+    PARAMETRIC | {"dx": 1, "dy": "0", "dz": "0*t"},
+    SEGMENT,
+    {"type": "polyline", "points": POINTS},
+    {"type": "arc", "center": [1, 2, 3], "radius": 2, "start": 0, "end": "90*deg"},
+    {"type": "circle", "center": [1, 2, 3], "radius": 2, "normal": [1, 0, 0]},
+    {"type": "ellipse", "center": [1, 2, 3], "axes": [[1, 0, 0], [0, 2, 0]]},
+    {"type": "helix", "center": [1, 2, 3], "radius": 2, "pitch": 1, "turns": 2, "start": "pi"},
+    {"type": "lissajous", "center": [1, 2, 3], "amplitude": [1, 2, 3], "frequency": [3, 4, 5]},
+    {"type": "torus_knot", "p": 2, "q": 3, "center": [1, 2, 3], "major": 3, "minor": 1},
+    {"type": "bezier", "points": POINTS},
+    {"type": "bspline", "points": POINTS, "degree": 2, "weights": [1, 2, 2, 1]},
+    {"type": "catmull_rom", "points": POINTS, "closed": True},
+    {"type": "points", "points": POINTS},
+]
+
+
+def scene_of(*things: dict[str, Any], **more: Any) -> Scene:
+    return read_scene(json.dumps({"objects": things} | more))
+
+
+def refused(data: object, **options: Any) -> SceneError:
+    """Read a scene that must be refused, soon and in few words."""
+    text = data if isinstance(data, str | bytes) else json.dumps(data)
+    start = time.perf_counter()
+    with pytest.raises(SceneError) as caught:
+        read_scene(text, **options)
+    assert time.perf_counter() - start < 1
+    assert len(str(caught.value)) < 400
+    str(caught.value).encode()
+    return caught.value
+
+
+class TestMeaning:
+    def test_the_papers_curve(self) -> None:
+        scene = load_scene(ROOT / "examples" / "paper-curve.json")
+        (item,) = scene.items
+        assert scene.size == (128, 128, 128)
+        assert item.type == "parametric"
+        assert item.path == "$.objects[0]"
+        assert item.color.tolist() == [[255, 136, 0]]
+        assert item.curve.closed is False
+        assert item.curve.t_range == (math.radians(-170), math.radians(170))
+        t = np.linspace(*item.curve.t_range, 100)
+        expected = np.stack(
+            (50 + 40 * np.cos(t), 50 + 40 * np.sin(t), 50 + 40 * (1 - np.cos(4 * t)))
+        )
+        np.testing.assert_allclose(item.curve.position(t), expected)
+        slope = np.stack((-40 * np.sin(t), 40 * np.cos(t), 160 * np.sin(4 * t)))
+        np.testing.assert_allclose(item.curve.derivative(t), slope, atol=1e-12)
+
+    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
+    def test_every_type(self, thing: dict[str, Any]) -> None:
+        (item,) = scene_of(thing).items
+        assert item.type == thing["type"]
+        assert type(item.curve).__name__.lower() == thing["type"].replace("_", "")
+        assert item.color.tolist() == [[255, 255, 255]]
+        assert np.isfinite(item.curve.position(np.array(item.curve.t_range))).all()
+
+    def test_every_type_is_tried(self) -> None:
+        assert {thing["type"] for thing in ONE_OF_EACH} == set(reader.TYPES)
+
+    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
+    def test_every_number_may_be_an_expression(self, thing: dict[str, Any]) -> None:
+        def expressed(value: Any) -> Any:
+            if isinstance(value, list):
+                return [expressed(each) for each in value]
+            number = isinstance(value, int) and not isinstance(value, bool)
+            return f"one*{value}" if number else value
+
+        written = {key: expressed(value) for key, value in thing.items()}
+        (plain,) = scene_of(thing).items
+        (item,) = scene_of(written, params={"one": "2 - 1"}).items
+        t = np.linspace(*plain.curve.t_range, 7)
+        np.testing.assert_array_equal(item.curve.position(t), plain.curve.position(t))
+
+    def test_a_file_that_is_one_object_is_a_scene_of_it(self) -> None:
+        scene = read_scene(json.dumps(SEGMENT))
+        assert scene.size is None
+        assert [item.path for item in scene.items] == ["$"]
+
+    def test_an_empty_scene_is_a_scene(self) -> None:
+        assert scene_of().items == ()
+
+    def test_params_reach_every_number_of_every_object(self) -> None:
+        (item,) = scene_of(
+            SEGMENT | {"from": ["a", "b", "a*b"]}, params={"b": "a + 1", "a": 2}
+        ).items
+        assert item.curve.position(np.zeros(1)).T.tolist() == [[2, 3, 6]]
+
+    def test_closed_and_colors(self) -> None:
+        open_, closed, ring, cut = scene_of(
+            SEGMENT | {"color": ["red", "#00f"]},
+            {"type": "polyline", "points": POINTS, "closed": True},
+            {"type": "circle", "center": [1, 2, 3], "radius": 2},
+            {"type": "circle", "center": [1, 2, 3], "radius": 2, "closed": False},
+        ).items
+        assert [item.curve.closed for item in (open_, closed, ring, cut)] == [
+            None,
+            True,
+            True,
+            False,
+        ]
+        assert open_.color.tolist() == [[255, 0, 0], [0, 0, 255]]
+
+    def test_bytes_with_a_byte_order_mark(self) -> None:
+        assert read_scene(b"\xef\xbb\xbf" + json.dumps(SEGMENT).encode()).items
+
+    def test_the_schemas_address_may_be_given(self) -> None:
+        assert read_scene('{"$schema": "scene.schema.json", "objects": []}').items == ()
+
+
+class TestFit:
+    SCENE = scene_of(SEGMENT, size=[128, 128, 128])
+
+    def test_equal_sizes_change_nothing(self) -> None:
+        assert self.SCENE.fitted(Grid(128, 128, 128)) == (self.SCENE, None)
+
+    def test_without_a_size_nothing_changes(self) -> None:
+        scene = scene_of(SEGMENT)
+        assert scene.fitted(Grid(3, 5, 7)) == (scene, None)
+
+    def test_none_keeps_the_numbers(self) -> None:
+        assert self.SCENE.fitted(Grid(3, 5, 7), "none") == (self.SCENE, None)
+
+    def test_contain_scales_alike_and_centres(self) -> None:
+        scene, note = self.SCENE.fitted(Grid(17, 64, 40))
+        assert note == "scene composed for 128x128x128, scaled by 0.133 to 17x64x40"
+        assert scene.size == (17, 64, 40)
+        scale = 17 / 128
+        middle = np.array([[17 / 2], [64 / 2], [40 / 2]])
+        t = np.array([0.0, 1.0])
+        expected = (np.array([[1.0, 4], [2, 5], [3, 6]]) - 64) * scale + middle
+        (item,) = scene.items
+        np.testing.assert_allclose(item.curve.position(t), expected)
+        np.testing.assert_allclose(item.curve.derivative(t), np.full((3, 2), 3 * scale))
+
+    def test_unknown_fit(self) -> None:
+        with pytest.raises(ValueError, match="'cover'"):
+            self.SCENE.fitted(Grid(3, 5, 7), "cover")  # type: ignore[arg-type]
+
+
+class TestMistakes:
+    @pytest.mark.parametrize(
+        ("data", "path", "message", "hint"),
+        [
+            (SEGMENT | {"colour": "red"}, "$", "unknown key 'colour'", "'color'"),
+            ({"objects": [SEGMENT | {"colr": 1}]}, "$.objects[0]", "unknown key 'colr'", "'color'"),
+            (SEGMENT | {"qqq": 1}, "$", "unknown key 'qqq'", "from, to, color, closed"),
+            ({"objets": []}, "$", "unknown key 'objets'", "'objects'"),
+            (SEGMENT | {"params": {}}, "$", "unknown key 'params'", "beside objects"),
+            (SEGMENT | {"type": "segmnt"}, "$.type", "unknown type 'segmnt'", "'segment'"),
+            ({"objects": [{"type": "cube"}]}, "$.objects[0].type", "type 'cube'", "torus_knot"),
+            ({"objects": [{"x": 1}]}, "$.objects[0]", "the key 'type' is missing", None),
+            ({"type": "segment", "from": [1, 2, 3]}, "$", "the key 'to' is missing", None),
+            ({}, "$", "the key 'objects' is missing", None),
+            ([], "$", "expected `object`", None),
+            (3, "$", "expected `object`", None),
+            (None, "$", "expected `object`", None),
+            ({"objects": {}}, "$.objects", "expected `array`", None),
+            ({"objects": [3]}, "$.objects[0]", "expected `object`", None),
+            (SEGMENT | {"to": [1, 2]}, "$.to", "of length 3, got 2", None),
+            (SEGMENT | {"to": [1, 2, True]}, "$.to[2]", "a number or an expression", None),
+            (SEGMENT | {"to": [1, 2, "t"]}, "$.to[2]", "'t' at column 1", "parametric"),
+            (SEGMENT | {"to": [1, 2, "a +"]}, "$.to[2]", "unknown name 'a'", None),
+            (SEGMENT | {"closed": 1}, "$.closed", "expected `bool", None),
+            (SEGMENT | {"color": "orang"}, "$.color", "did you mean 'orange'", None),
+            (SEGMENT | {"color": ["red", "x"]}, "$.color[1]", "unknown colour 'x'", None),
+            (SEGMENT | {"color": []}, "$.color", "length >= 1", None),
+            (SEGMENT | {"to": [1, 2, 1e308]}, "$.to[2]", "is too large", None),
+            (PARAMETRIC | {"x": "sine(t)"}, "$.x", "unknown function 'sine'", "'sin'"),
+            (PARAMETRIC | {"dz": "9**9**9"}, "$.dz", "not finite", None),
+            (PARAMETRIC | {"t": [1, 0]}, "$.t", "runs backwards", None),
+            (PARAMETRIC | {"t": [0, "1e308*10"]}, "$.t[1]", "not finite", None),
+            (
+                {"objects": [SEGMENT, {"type": "circle", "center": [1, 2, 3], "radius": -1}]},
+                "$.objects[1].radius",
+                "must be positive",
+                None,
+            ),
+            ({"type": "points"}, "$", "either the key 'points' or the key 'file'", None),
+            ({"type": "points", "points": [], "file": "a.csv"}, "$", "either", None),
+            ({"type": "points", "points": []}, "$.points", "0 of at least 1", None),
+            ({"type": "points", "file": "a.csv"}, "$.file", "no folder", None),
+            ({"objects": [], "params": {"a": "b"}}, "$.params.a", "unknown name 'b'", None),
+            ({"objects": [], "params": {"a": None}}, "$.params.a", "a number", None),
+            ({"objects": [], "params": {"a": "a"}}, "$.params", "circle", None),
+            ({"objects": [], "params": {"sin": 1}}, "$.params", "'sin'", None),
+            ({"objects": [], "size": [1, 2]}, "$.size", "length 3", None),
+            ({"objects": [], "size": [1, 2, 0]}, "$.size[2]", ">= 1", None),
+            ({"objects": [], "size": [1, 2, 65536]}, "$.size[2]", "<= 65535", None),
+            ({"objects": [], "size": [1, 2, "3"]}, "$.size[2]", "`int`", None),
+            ({"objects": [], "size": [9999] * 3}, "$.size", "more than 2147483648 voxels", None),
+        ],
+    )
+    def test_where_and_what(self, data: Any, path: str, message: str, hint: str | None) -> None:
+        error = refused(data)
+        assert error.path == path
+        assert message in str(error)
+        assert (hint or "") in (error.hint or "")
+
+
+class TestHostile:
+    @pytest.mark.parametrize(
+        ("data", "message"),
+        [
+            ("", "empty"),
+            (b"  \n", "empty"),
+            ("{", "not JSON: .*line 1, column 2"),
+            ('{"objects": [],}', "not JSON"),
+            (b"\0", "not JSON"),
+            ('{"objects": ["\0"]}', "not JSON"),
+            (b"\xff\xfe{\0}\0", "not UTF-8"),
+            ('{"a":' * 100_000, "nested too deeply"),
+            ("[" * 100_000, "nested too deeply"),
+            ('{"objects": [], "size": [1, 2, NaN]}', "NaN"),
+            ('{"objects": [], "size": [1, 2, -Infinity]}', "-Infinity"),
+            ('{"objects": [], "size": [1, 2, 1e999]}', "size"),
+            ('{"objects": [], "size": [1, 2, ' + "1" * 10**6 + "]}", "size"),
+            (
+                '{"type": "segment", "from": [1, 2, 1e999], "to": [1, 2, 3]}',
+                r"from\[2\] is not fin",
+            ),
+            ('{"objects": [], "objects": []}', "'objects' is twice"),
+            ('{"type": "points", "points": [[1, 2, 1e999]]}', r"points\[0\]\[2\] is not finite"),
+            ('{"objects": [], "\\ud800": 1}', "unknown key"),
+            ('{"type": "\\ud800"}', "surrogate"),
+            ('{"objects": [], "params": {"\\ud800": 1}}', "unknown key"),
+            ('{"objects": [], "params": {"a": "\\ud800"}}', "expected a value"),
+            ('{"type": "bezier", "points": [' + "[1,2,3]," * 5000 + "[1,2,3]]}", "degree"),
+            (json.dumps({"objects": [], "params": {f"a{i}": 1 for i in range(9999)}}), "1000"),
+            (json.dumps(SEGMENT | {"x" * 10**6: 1}), "unknown key"),
+            (json.dumps(SEGMENT | {"type": "x" * 10**6}), "unknown type"),
+            (json.dumps(SEGMENT | {"color": "x" * 10**6}), "unknown colour"),
+            (json.dumps(SEGMENT | {"` - at `$": 1}), "unknown"),
+            ('{"objects": [], "x` - at `$.objects[5]": 1}', "unknown key"),
+            ('{"objects": [], "x - at `$.params[...]": 1}', "unknown key"),
+            ('{"objects": [], "params": {"\\ud800": null}}', "unknown key"),
+        ],
+    )
+    def test_is_refused_at_once(self, data: str | bytes, message: str) -> None:
+        with pytest.raises(SceneError, match=message):
+            read_scene(data)
+        refused(data)
+
+    @pytest.mark.parametrize("length", [MAX_LENGTH + 1, 10_000_000])
+    def test_a_long_expression(self, length: int) -> None:
+        assert refused(PARAMETRIC | {"x": "1" * length}).path == "$.x"
+
+    def test_a_large_file(self) -> None:
+        refused(" " * (reader.MAX_BYTES + 1))
+
+    def test_a_deep_expression(self) -> None:
+        assert "nested" in str(refused(PARAMETRIC | {"x": "(" * 2000}))
+
+    @pytest.mark.parametrize("name", ["__import__('os')", "open('x')", "t.__class__", "eval"])
+    def test_names_of_python_are_unknown(self, name: str) -> None:
+        assert refused(PARAMETRIC | {"x": name}).path == "$.x"
+
+
+class TestLoad:
+    def test_missing(self, tmp_path: Path) -> None:
+        (tmp_path / "curve.json").write_text("{}")
+        with pytest.raises(SceneError, match=r"^no such file: .*curv\.json") as caught:
+            load_scene(tmp_path / "curv.json")
+        assert caught.value.hint == "did you mean 'curve.json'?"
+        with pytest.raises(SceneError, match="no such file") as caught:
+            load_scene(tmp_path / "no" / "curve.json")
+        assert "no folder" in str(caught.value.hint)
+
+    @pytest.mark.parametrize("name", [".", "a\0b", "\ud800", "x" * 5000, ""])
+    def test_what_cannot_be_read(
+        self, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(SceneError) as caught:
+            load_scene(name)
+        str(caught.value).encode()
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="has no /dev/zero")
+    def test_a_file_without_end(self) -> None:
+        with pytest.raises(SceneError, match="larger than"):
+            load_scene("/dev/zero")
+
+
+class TestSchema:
+    PUBLISHED = resources.files("voxdisplay").joinpath("scene.schema.json").read_text("utf-8")
+    VALIDATOR = jsonschema.Draft202012Validator(json.loads(PUBLISHED))
+
+    def test_it_is_current(self) -> None:
+        assert schema.text() == self.PUBLISHED, schema.__doc__
+
+    def test_it_is_a_schema(self) -> None:
+        jsonschema.Draft202012Validator.check_schema(self.VALIDATOR.schema)
+
+    @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+    def test_examples_are_valid_and_can_be_drawn(self, path: Path) -> None:
+        self.VALIDATOR.validate(json.loads(path.read_text()))
+        scene = load_scene(path)
+        assert scene.size
+        assert scene.items
+        for item in scene.items:
+            t = np.linspace(*item.curve.t_range, 1000)
+            points = item.curve.position(t)
+            assert (points >= 0).all()
+            # The paper's own curve sticks out of the top, by two voxels.
+            assert (points < np.array(scene.size)[:, None] + 2 * ("paper" in path.name)).all()
+
+    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
+    def test_every_type_is_valid(self, thing: dict[str, Any]) -> None:
+        self.VALIDATOR.validate(thing)
+        self.VALIDATOR.validate({"objects": [thing], "params": {"a": 1, "b": "a"}})
+
+    @pytest.mark.parametrize(
+        "data",
+        [
+            {},
+            [],
+            {"objects": [], "sise": [1, 2, 3]},
+            {"objects": [SEGMENT | {"colour": "red"}]},
+            SEGMENT | {"colour": "red"},
+            SEGMENT | {"type": "cube"},
+            SEGMENT | {"to": [1, 2]},
+            SEGMENT | {"to": [1, 2, None]},
+            {"objects": [], "size": [1, 2, 0]},
+        ],
+    )
+    def test_what_is_refused_is_invalid(self, data: Any) -> None:
+        assert not self.VALIDATOR.is_valid(data)
+        refused(data)
+
+    def test_every_curve_has_a_type(self) -> None:
+        kinds = {type(scene_of(thing).items[0].curve) for thing in ONE_OF_EACH}
+        public = {getattr(curves, name) for name in curves.__all__}
+        assert public - kinds == {curves.Curve, curves.Transformed}
+
+
+def test_importing_is_light() -> None:
+    code = "import voxdisplay.scene, sys; print('jsonschema' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,191 @@
+"""Section 5: HELLO, INFO and what becomes of the session before."""
+
+from __future__ import annotations
+
+import struct
+
+from voxdisplay.conformance import ops, packets
+from voxdisplay.conformance.announced import FEATURES, FORMATS
+from voxdisplay.conformance.catalogue import check, seen, ticking, voxels
+from voxdisplay.conformance.packets import COMMIT, SHOWN, Answer, body, data, hello
+from voxdisplay.conformance.probe import Probe
+from voxdisplay.conformance.reference_page import Page
+from voxdisplay.wire import spec
+
+_ATTEMPTS = 6
+
+
+def greeted(probe: Probe, packet: bytes) -> Answer:
+    """Send a HELLO; demand one INFO."""
+    info = probe.ask(packet)
+    probe.demand(info.kind == spec.TYPE_INFO, "INFO", info)
+    return info
+
+
+@check("5", "info-fields", "every field of INFO has a value that is allowed")
+def info_fields(probe: Probe) -> None:
+    info, said = probe.info, probe.said
+    known = sum(1 << bit for bit in FEATURES.values())
+    longest = packets.wire_size(info.max_payload)
+    needed = spec.LIMIT_RESERVE + longest
+    count = info.nx * info.ny * info.nz
+    for holds, must, came in (
+        (info.major == spec.VERSION_MAJOR, "major 1", info.major),
+        (info.format in FORMATS, "format 1 to 4", info.format),
+        (min(said.grid) > 0, "a voxel at least on each axis", said.grid),
+        (count <= spec.LIMIT_MAX_VOXELS, "at most 2^31 - 1 voxels", count),
+        (info.pages >= 2, "two pages at least", info.pages),
+        (info.max_payload >= spec.LIMIT_MIN_PAYLOAD, "max_payload 64 at least", info.max_payload),
+        (
+            info.rx_buffer >= needed,
+            f"rx_buffer {needed} at least: 64 bytes, and the longest packet on the wire",
+            info.rx_buffer,
+        ),
+        (not info.features & ~known, "no bit of features without a name", hex(info.features)),
+    ):
+        probe.demand(bool(holds), must, came)
+    for name in ("DIFF", "PALETTE"):
+        fits = not said.has(name) or info.format == spec.FORMAT_INDEX8
+        probe.demand(fits, f"{name} only with the format INDEX8", info)
+
+
+@check("5", "info-strings", "INFO ends with three strings in UTF-8")
+def info_strings(probe: Probe) -> None:
+    at, tail = 0, probe.info.tail
+    for name in ("name", "firmware", "serial"):
+        probe.demand(at < len(tail), f"a size of the string {name}", "the end of INFO")
+        end = at + 1 + tail[at]
+        probe.demand(end <= len(tail), f"{tail[at]} bytes of {name}", f"{len(tail) - at - 1}")
+        try:
+            tail[at + 1 : end].decode()
+        except UnicodeDecodeError:
+            probe.fail(f"{name} in UTF-8", tail[at + 1 : end].hex(" ").upper())
+        at = end
+
+
+@check("5", "info-same", "INFO says the same each time, but for the session")
+def info_same(probe: Probe) -> None:
+    for session in (1, 0x1234, 0xFFFF):
+        info = greeted(probe, hello(session))
+        probe.demand(info.session == session, f"session {session:04X}h in INFO", info)
+        same = info.body[:4] + info.body[6:] == probe.info.body[:4] + probe.info.body[6:]
+        probe.demand(same, f"as before: {probe.info}", info)
+
+
+@check("5", "hello-repeated", "each HELLO is answered with INFO, also one that is repeated")
+def hello_repeated(probe: Probe) -> None:
+    packet = hello(0x5A17)
+    come = probe.say(packet, packet, packet)
+    kinds = [answer.kind for answer in come]
+    probe.demand(kinds == 3 * [spec.TYPE_INFO], "3 times INFO", " and ".join(map(str, come)))
+    probe.demand_ack(probe.state, session=0x5A17, next=0)
+
+
+@check("5", "new-session", "a HELLO begins a session: next 0, nothing received, nothing shown")
+def new_session(probe: Probe) -> None:
+    probe.show(b"")
+    for seq in (1, 2, 5):
+        probe.ask(data(seq, 1))
+    probe.open()
+    probe.sync()
+    probe.demand_ack(probe.state, session=probe.session, next=0, received=0, shown=0, pending=0)
+    probe.draw(b"")
+
+
+@check(
+    "5", "front-page-stays", "the front page stays as it is, but its frame id is forgotten", seen
+)
+def front_page_stays(probe: Probe) -> None:
+    probe.show(ops.dot(probe.said, probe.said.voxels - 1))
+    probe.open()
+    probe.sync()
+    probe.demand_ack(probe.state, "SHOWN is clear until the session's first swap", shown=0, frame=0)
+    probe.look(probe.state, probe.front or Page())
+
+
+@check("5", "filling-dropped", "a frame that is not on display is dropped by HELLO", seen)
+def filling_dropped(probe: Probe) -> None:
+    probe.show(b"")
+    probe.draw(ops.dot(probe.said, 0))
+    probe.open()
+    probe.let_ticks_pass()
+    probe.sync()
+    probe.demand_ack(probe.state, shown=0, pending=0)
+    probe.look(probe.state, Page())
+    probe.show(b"", clear=False)
+
+
+@check("5", "pending-dropped", "so is one that waits for its tick", ticking, seen)
+def pending_dropped(probe: Probe) -> None:
+    for _ in range(_ATTEMPTS):
+        probe.show(b"")
+        session = probe.session % 65535 + 1
+        come = probe.say(data(1, 1, ops.dot(probe.said, 0), 1 | COMMIT), hello(session))
+        probe.session = session
+        kinds = [answer.kind for answer in come]
+        probe.demand(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
+        at = kinds.index(spec.TYPE_INFO)
+        if any(answer.flags & SHOWN and answer.frame == 1 for answer in come[:at]):
+            probe.open()
+            continue  # the tick was faster
+        probe.let_ticks_pass()
+        probe.sync()
+        probe.demand_ack(probe.state, shown=0, pending=0)
+        probe.look(probe.state, Page())
+        return
+
+
+@check("5", "other-major", "a HELLO of another major gets INFO, and opens no session")
+def other_major(probe: Probe) -> None:
+    probe.ask(data(0, 0))
+    for major in (0, 2, 255):
+        info = greeted(probe, hello(0x4321, major))
+        probe.demand(info.session == 0x4321, "the session of that HELLO in INFO", info)
+        probe.demand(info.major == spec.VERSION_MAJOR, "the device's own major in INFO", info)
+        probe.demand_ack(probe.state, "what was open stays open", session=probe.session, next=1)
+
+
+@check("5", "other-major-first", "also where no session is open")
+def other_major_first(probe: Probe) -> None:
+    probe.close()
+    greeted(probe, hello(0x4321, 2))
+    probe.demand(probe.state.kind == spec.TYPE_ERROR, "NO_SESSION answers STATUS", probe.state)
+
+
+@check("5", "hello-ignored", "flags, seq, frame, minor, reserved and further bytes are ignored")
+def hello_ignored(probe: Probe) -> None:
+    session = struct.pack("<H", probe.session)
+    for packet in (
+        body(spec.TYPE_HELLO, 15, 7, 9, b"\1" + session + b"\0\0"),
+        body(spec.TYPE_HELLO, 0, 0, 0, b"\1" + session + b"\xc8\xaa"),
+        body(spec.TYPE_HELLO, 0, 0, 0, b"\1" + session + b"\0\0" + bytes(range(40))),
+        body(spec.TYPE_HELLO, 1, 255, 255, b"\1" + session + b"\1\1\0\0\0"),
+    ):
+        info = greeted(probe, packet)
+        probe.demand(info.session == probe.session, "the session of the HELLO", info)
+        probe.demand_ack(probe.state, session=probe.session)
+
+
+@check(
+    "5", "hello-short", "a HELLO that ends before offset 8 is refused: LENGTH, whatever its major"
+)
+def hello_short(probe: Probe) -> None:
+    for payload in (b"\1\1\1\0", b"\1\1\1", b"\1", b"", b"\1\0\0\0", b"\2\0\0", b"\7\1\1\0"):
+        probe.refuse(body(spec.TYPE_HELLO, payload=payload), spec.CODE_LENGTH, 0)
+        probe.demand_ack(probe.state, "what was open stays open", session=probe.session)
+
+
+@check("5", "session-zero", "a HELLO with session 0 is refused: FIELD at 4, whatever its major")
+def session_zero(probe: Probe) -> None:
+    for major in (1, 0, 2):
+        probe.refuse(hello(0, major), spec.CODE_FIELD, 4)
+        probe.demand_ack(probe.state, "what was open stays open", session=probe.session)
+
+
+@check(
+    "5", "keep-in-new-session", "a first frame without CLEAR copies what is shown", seen, voxels(2)
+)
+def keep_in_new_session(probe: Probe) -> None:
+    probe.show(ops.dot(probe.said, 0))
+    probe.open()
+    probe.show(ops.dot(probe.said, 1), clear=False)

@@ -1,0 +1,262 @@
+"""ARC, section 7.7 of protocol.md, in its simplest form: one text for both directions.
+
+A coder has ``bit`` and ``plain``; each takes the bit that is wanted and gives the one that is
+coded. The `Reader` does not care what is wanted, the `Writer` codes just that; so the pieces and
+steps below are written once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.reference_decoder import Decoder, Place
+from voxdisplay.wire import spec
+
+_TOP = 1 << 24
+
+
+class Coder(Protocol):
+    """Codes bits."""
+
+    def bit(self, i: int, j: int | None = None, want: int = 0) -> int:
+        """Code a bit with models i and j."""
+
+    def plain(self, n: int, want: int = 0) -> int:
+        """Code n bits without models."""
+
+
+class _Models:
+    def __init__(self) -> None:
+        self.p = [spec.ARC_HALF] * spec.ARC_MODELS
+        self.seen = [0] * spec.ARC_MODELS
+
+    def learn(self, i: int, bit: int) -> None:
+        shift = 1 + (self.seen[i] >> 1)
+        if bit:
+            self.p[i] -= self.p[i] >> shift
+        else:
+            self.p[i] += (4096 - self.p[i]) >> shift
+        self.seen[i] = min(self.seen[i] + 1, spec.ARC_ENOUGH)
+
+
+class _RangeCoder:
+    def __init__(self) -> None:
+        self.models = _Models()
+        self.range = _TOP
+
+    def bit(self, i: int, j: int | None = None, want: int = 0) -> int:
+        j = i if j is None else j
+        chance = self.models.p[i] + self.models.p[j]
+        bit = self._code((self.range >> 13) * chance, want)
+        for model in {i, j}:
+            self.models.learn(model, bit)
+        return bit
+
+    def plain(self, n: int, want: int = 0) -> int:
+        value = 0
+        for place in reversed(range(n)):
+            value = value << 1 | self._code((self.range >> 13) * 4096, want >> place & 1)
+        return value
+
+    def _code(self, bound: int, want: int) -> int:
+        raise NotImplementedError
+
+
+class Reader(_RangeCoder):
+    """Decodes; the want of whoever asks is nothing to it."""
+
+    def __init__(self, data: bytes, decoder: Decoder) -> None:
+        super().__init__()
+        self._data = data
+        self._decoder = decoder
+        self._at = 0
+        self._value = 0
+        for _ in range(3):
+            self._value = self._value << 8 | self._next()
+
+    def _next(self) -> int:
+        self._at += 1
+        if self._at > len(self._data) + spec.ARC_BEHIND:
+            raise self._decoder.refuse(spec.CODE_TRUNCATED)
+        return self._data[self._at - 1] if self._at <= len(self._data) else 0
+
+    def _code(self, bound: int, want: int) -> int:
+        del want
+        bit = int(self._value >= bound)
+        if bit:
+            self._value -= bound
+            self.range -= bound
+        else:
+            self.range = bound
+        while self.range < _TOP:
+            self.range <<= 8
+            self._value = self._value << 8 | self._next()
+        return bit
+
+    def end(self) -> None:
+        """Demand that exactly three bytes behind the payload have been read."""
+        if self._at < len(self._data) + spec.ARC_BEHIND:
+            raise self._decoder.refuse(spec.CODE_PADDING)
+
+
+class Writer(_RangeCoder):
+    """Encodes what is wanted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._low = 0
+        self._numbers: list[int] = []
+
+    def _code(self, bound: int, want: int) -> int:
+        if want:
+            self._low += bound
+            self.range -= bound
+        else:
+            self.range = bound
+        while self.range < _TOP:
+            self._numbers.append(self._low >> 24)
+            self._low = self._low % _TOP << 8
+            self.range <<= 8
+        return want
+
+    def end(self) -> bytes:
+        """Give the bytes."""
+        numbers = [*self._numbers, (self._low + _TOP - 1) >> 24]
+        for at in reversed(range(1, len(numbers))):
+            numbers[at - 1] += numbers[at] >> 8
+        return bytes(number & 255 for number in numbers[1:])
+
+
+@dataclass(slots=True)
+class _Axis:
+    last: int = 0
+    run: int = 0
+    prev: int = 0
+    prev2: int = 0
+    past: int = 0
+    way: int = 0
+
+    @property
+    def streak(self) -> int:
+        return self.run if self.last else 0
+
+    def note(self, moved: int) -> None:
+        self.past = (self.past << 1 | moved) % 128
+        if moved == self.last:
+            self.run = min(self.run + 1, spec.ARC_MAX_RUN)
+        else:
+            self.prev2, self.prev, self.run, self.last = self.prev, self.run, 1, moved
+
+
+@dataclass(slots=True)
+class _Walk:
+    """The memory of the three axes."""
+
+    axes: list[_Axis] = field(default_factory=lambda: [_Axis(), _Axis(), _Axis()])
+
+    def step(self, coder: Coder, want: Place = (0, 0, 0)) -> Place:
+        axes = self.axes
+        streak = [axis.streak for axis in axes]
+        m = streak.index(max(streak))
+        b, c = (m + 1) % 3, (m + 2) % 3
+        way = [0, 0, 0]
+        model = spec.ARC_MAIN + 8 * min(streak[m], 3) + min(max(streak[b], streak[c]), 7)
+        if coder.bit(model, want=int(want[m] != 0)):
+            way[m] = self._way(coder, axes[m], want[m])
+        for a in (b, c):
+            axis, wanted = axes[a], int(want[a] != 0)
+            if way[m]:
+                h = axis.past >> 1 ^ (63 if axis.last else 0)
+                d = min(max(axis.run - axis.prev2, -2), 1) + 2
+                r = 64 * axis.last + 16 * d + 8 * (axis.prev > 1) + min(axis.run, 7)
+                bit = axis.last ^ coder.bit(
+                    spec.ARC_HISTORY + h, spec.ARC_RUNS + r, want=wanted ^ axis.last
+                )
+            elif a == b or way[b]:
+                bit = coder.bit(spec.ARC_LONE + min(streak[a], 7), want=wanted)
+            else:
+                bit = 1
+            if bit:
+                way[a] = self._way(coder, axis, want[a])
+        for axis, moved in zip(axes, way, strict=True):
+            axis.note(int(moved != 0))
+        return way[0], way[1], way[2]
+
+    def _way(self, coder: Coder, axis: _Axis, want: int) -> int:
+        if not axis.way:
+            axis.way = -1 if coder.plain(1, int(want < 0)) else 1
+        else:
+            t = 0 if axis.last else min(axis.run, 15)
+            if coder.bit(spec.ARC_TURN + t, want=int(want != axis.way)):
+                axis.way = -axis.way
+        return axis.way
+
+
+def _number(coder: Coder, want: int = 0) -> int:
+    k = 0
+    while k < spec.ARC_MAX_K and coder.bit(
+        spec.ARC_COUNT + k, want=int(want >= (1 << (k + 1)) - 1)
+    ):
+        k += 1
+    return (1 << k) - 1 + coder.plain(k, want - (1 << k) + 1)
+
+
+def _pen_bits(said: Said) -> int:
+    return 1 if said.format == spec.FORMAT_MONO1 else 8 * said.pixel_bytes
+
+
+def draw(decoder: Decoder) -> None:
+    """Draw the ARC of which a decoder has just read the op byte."""
+    coder = Reader(decoder.rest(), decoder)
+    walk, at, jump = _Walk(), (0, 0, 0), 1
+    first = True
+    while coder.bit(spec.ARC_MORE):
+        jump = 1 if first else coder.bit(spec.ARC_JUMP)
+        first = False
+        if coder.bit(spec.ARC_INK):
+            decoder.pen = coder.plain(_pen_bits(decoder.said))
+        if jump:
+            x, y, z = (coder.plain((side - 1).bit_length()) for side in decoder.said.grid)
+            at, walk = (x, y, z), _Walk()
+        steps = _number(coder)
+        if jump:
+            decoder.ink([at])
+        for _ in range(steps):
+            dx, dy, dz = walk.step(coder)
+            at = decoder.inside((at[0] + dx, at[1] + dy, at[2] + dz))
+            decoder.ink([at])
+    coder.end()
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Some of a curve: places side by side, from where it jumps to or where the last one ended."""
+
+    places: tuple[Place, ...]
+    pen: int | None = None
+    jump: bool = True
+
+
+def encode(said: Said, pieces: list[Piece]) -> bytes:
+    """Give the op ARC that draws pieces."""
+    coder = Writer()
+    walk, at = _Walk(), (0, 0, 0)
+    for number, piece in enumerate(pieces):
+        coder.bit(spec.ARC_MORE, want=1)
+        places = list(piece.places)
+        if number:
+            coder.bit(spec.ARC_JUMP, want=int(piece.jump))
+        if coder.bit(spec.ARC_INK, want=int(piece.pen is not None)):
+            coder.plain(_pen_bits(said), piece.pen or 0)
+        if piece.jump:
+            at, walk = places.pop(0), _Walk()
+            for a, side in zip(at, said.grid, strict=True):
+                coder.plain((side - 1).bit_length(), a)
+        _number(coder, len(places))
+        for place in places:
+            walk.step(coder, (place[0] - at[0], place[1] - at[1], place[2] - at[2]))
+            at = place
+    coder.bit(spec.ARC_MORE)
+    return bytes((spec.OP_ARC,)) + coder.end()

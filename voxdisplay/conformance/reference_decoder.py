@@ -1,0 +1,370 @@
+"""What ops draw: a third reading of section 7 of protocol.md, written for being read.
+
+It is the simplest decoder that refuses all that must be refused. Every rule that is easily misread
+is a small method of its own, so that ``mistakes`` can misread one at a time. Knows no packet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.reference_page import Page, rgb
+from voxdisplay.wire import spec
+
+Place = tuple[int, int, int]
+
+
+class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the kit
+    """Ops that a device refuses; ``at`` counts from the first byte of the payload."""
+
+    def __init__(self, code: int, at: int) -> None:
+        super().__init__(f"code {code} at {at}")
+        self.code = code
+        self.at = at
+
+
+class Decoder:
+    """Draws the payloads of DATA packets on a page."""
+
+    def __init__(self, said: Said, page: Page) -> None:
+        self.said = said
+        self.page = page
+        self.cursor = 0
+        self.pen = said.full
+        self._payload = b""
+        self._at = 0
+        self._op_at = 0
+
+    def draw(self, payload: bytes) -> None:
+        """Draw the ops of one packet, or raise `Refused`."""
+        self.begin_packet()
+        self.go_on(payload)
+
+    def go_on(self, payload: bytes) -> None:
+        """Draw ops that follow others in the same packet."""
+        self._payload, self._at = payload, 0
+        while self._at < len(payload):
+            self._op_at = self._at
+            self._op(self._byte())
+
+    # -- rules that can be misread
+
+    def begin_packet(self) -> None:
+        """At the start of each packet the cursor is 0 and the pen is the full pixel."""
+        self.cursor, self.pen = 0, self.said.full
+
+    def place_of(self, a: int, b: int, c: int) -> Place:
+        """Coordinates come in the order x, y, z."""
+        return a, b, c
+
+    def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
+        """Octant = 8 · main + (1 if x falls) + 2 · (1 if y falls) + 4 · (1 if z falls)."""
+        x, y, z = (-1 if octant >> axis & 1 else 1 for axis in range(3))
+        return octant >> 3, (x, y, z)
+
+    def chain_axes(self, crumb: int, main: int) -> set[int]:
+        """Bit 0 is for axis main + 1, bit 1 for axis main + 2."""
+        return {main} | {(main + 1 + bit) % 3 for bit in (0, 1) if crumb >> bit & 1}
+
+    def parts(self, raw: bytes, count: int, bits: int) -> list[int]:
+        """Crumbs, nibbles and MONO1 pixels: the first is in the lowest bits of the first byte."""
+        per_byte = 8 // bits
+        return [raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)]
+
+    def steps_of(self, byte: int) -> int:
+        """Give the steps of a chain: the byte is n - 1."""
+        return byte + 1
+
+    def chain_start(self, at: Place) -> list[Place]:
+        """Begin a chain by writing the voxel at the cursor."""
+        return [at]
+
+    def count_of(self, low: int) -> int:
+        """C = 0..30 is n = c + 1, and c = 31 is n = 32 + k; k is LEB128."""
+        return low + 1 if low < 31 else 32 + self._leb128()
+
+    def rounded(self, k: int, d: int, length: int) -> int:
+        """Ties of a LINE go up: floor((2 k d + L) / (2 L))."""
+        return (2 * k * d + length) // (2 * length) if length else 0
+
+    def span(self, a: int, b: int) -> range:
+        """Include both ends of a BOX, whichever is the larger."""
+        return range(min(a, b), max(a, b) + 1)
+
+    def child(self, bit: int) -> Place:
+        """Bit c = cx + 2 · cy + 4 · cz."""
+        return bit & 1, bit >> 1 & 1, bit >> 2 & 1
+
+    def difference(self, nibble: int) -> int:
+        """Four bits in two's complement."""
+        return nibble - 16 if nibble > 7 else nibble
+
+    def after_chain(self, begin: Place, end: Place) -> Place:
+        """After a chain the cursor is at the last voxel."""
+        del begin
+        return end
+
+    def after_shape(self, begin: Place, end: Place) -> Place:
+        """After LINE, BOX and DOTS the cursor is at the voxel named last."""
+        del begin
+        return end
+
+    def after_brick(self, cursor: int, corner: int) -> int:
+        """OCT leaves the cursor where it is."""
+        del corner
+        return cursor
+
+    def after_literal(self, before: int, last: int) -> int:
+        """LIT makes the last of its pixels the pen."""
+        del before
+        return last
+
+    def pixel_of(self, raw: bytes) -> int:
+        """Read a pixel's bytes as a little-endian integer."""
+        return int.from_bytes(raw, "little")
+
+    # -- reading
+
+    def refuse(self, code: int) -> Refused:
+        """Give the refusal of the op at hand."""
+        return Refused(code, self._op_at)
+
+    def _take(self, count: int) -> bytes:
+        if self._at + count > len(self._payload):
+            raise self.refuse(spec.CODE_TRUNCATED)
+        self._at += count
+        return self._payload[self._at - count : self._at]
+
+    def _byte(self) -> int:
+        return self._take(1)[0]
+
+    def rest(self) -> bytes:
+        """Give all that is left of the payload, and be at its end."""
+        return self._take(len(self._payload) - self._at)
+
+    def _place(self) -> Place:
+        size = self.said.coordinate_bytes
+        a, b, c = (int.from_bytes(self._take(size), "little") for _ in range(3))
+        return self.place_of(a, b, c)
+
+    def _leb128(self) -> int:
+        k = 0
+        for place in range(5):
+            byte = self._byte()
+            k |= (byte & 127) << 7 * place
+            if byte < 128:
+                if (place and not byte) or 32 + k >= 1 << 32:
+                    raise self.refuse(spec.CODE_COUNT)
+                return k
+        raise self.refuse(spec.CODE_COUNT)
+
+    def _parts(self, count: int, bits: int) -> list[int]:
+        raw = self._take(-(-count * bits // 8))
+        if count * bits % 8 and raw[-1] >> count * bits % 8:
+            raise self.refuse(spec.CODE_PADDING)
+        return self.parts(raw, count, bits)
+
+    def _pixels(self, count: int) -> list[int]:
+        if self.said.format == spec.FORMAT_MONO1:
+            return self._parts(count, 1)
+        size = self.said.pixel_bytes
+        raw = self._take(count * size)
+        return [self.pixel_of(raw[at : at + size]) for at in range(0, len(raw), size)]
+
+    # -- drawing
+
+    def inside(self, place: Place) -> Place:
+        """Give a place back that is on the grid."""
+        if not all(0 <= at < side for at, side in zip(place, self.said.grid, strict=True)):
+            raise self.refuse(spec.CODE_OUTSIDE)
+        return place
+
+    def _here(self) -> Place:
+        if self.cursor >= self.said.voxels:
+            raise self.refuse(spec.CODE_OUTSIDE)
+        return self.said.place(self.cursor)
+
+    def ink(self, places: Iterable[Place]) -> None:
+        """Write the pen to places."""
+        for index in [self.said.index(*self.inside(place)) for place in places]:
+            self.page.write(index, self.pen)
+
+    def _along(self, values: list[int]) -> None:
+        if self.cursor + len(values) > self.said.voxels:
+            raise self.refuse(spec.CODE_OUTSIDE)
+        for value in values:
+            self.page.write(self.cursor, value)
+            self.cursor += 1
+
+    # -- the ops
+
+    def _op(self, op: int) -> None:
+        for first, more, feature, draw in _OPS:
+            if first <= op <= first + more and (not feature or self.said.has(feature)):
+                draw(self, op - first)
+                return
+        raise self.refuse(spec.CODE_OP)
+
+    def op_end(self, _: int) -> None:
+        """Demand that nothing follows END but 00."""
+        if any(self.rest()):
+            raise self.refuse(spec.CODE_PADDING)
+
+    def op_move(self, _: int) -> None:
+        """Set the cursor by MOVE."""
+        self.cursor = self.said.index(*self.inside(self._place()))
+
+    def op_arc(self, _: int) -> None:
+        """Draw an ARC."""
+        from voxdisplay.conformance import range_coded_chains  # noqa: PLC0415 - it draws with this decoder
+
+        range_coded_chains.draw(self)
+
+    def op_pen(self, _: int) -> None:
+        """Set the pen by PEN."""
+        pen = self.pixel_of(self._take(self.said.pixel_bytes))
+        if self.said.format == spec.FORMAT_MONO1 and pen > 1:
+            raise self.refuse(spec.CODE_PIXEL)
+        self.pen = pen
+
+    def op_skip(self, low: int) -> None:
+        """Move the cursor on by SKIP."""
+        count = self.count_of(low)
+        if self.cursor + count > self.said.voxels:
+            raise self.refuse(spec.CODE_OUTSIDE)
+        self.cursor += count
+
+    def op_run(self, low: int) -> None:
+        """Draw a RUN."""
+        count = self.count_of(low)
+        if self.cursor + count > self.said.voxels:
+            raise self.refuse(spec.CODE_OUTSIDE)
+        self._along([self.pen] * count)
+
+    def op_literal(self, low: int) -> None:
+        """Draw a LIT."""
+        values = self._pixels(self.count_of(low))
+        self._along(values)
+        self.pen = self.after_literal(self.pen, values[-1])
+
+    def op_differences(self, low: int) -> None:
+        """Draw a DIFF."""
+        values, pen = [], self.pen
+        for nibble in self._parts(self.count_of(low), 4):
+            pen = (pen + self.difference(nibble)) % 256
+            values.append(pen)
+        self._along(values)
+        self.pen = pen
+
+    def op_step(self, octant: int) -> None:
+        """Draw a STEP."""
+        self._chain(octant, None)
+
+    def op_from(self, octant: int) -> None:
+        """Draw a FROM."""
+        self._chain(octant, self._place())
+
+    def _chain(self, octant: int, named: Place | None) -> None:
+        steps = self.steps_of(self._byte())
+        crumbs = self._parts(steps, 2)
+        at = begin = self.inside(named) if named else self._here()
+        main, signs = self.axes_of(octant)
+        places = self.chain_start(begin)
+        for crumb in crumbs:
+            moved = list(at)
+            for axis in self.chain_axes(crumb, main):
+                moved[axis] += signs[axis]
+            at = self.inside((moved[0], moved[1], moved[2]))
+            places.append(at)
+        self.ink(places)
+        self.cursor = self.said.index(*self.after_chain(begin, at))
+
+    def op_line(self, _: int) -> None:
+        """Draw a LINE."""
+        end = self._place()
+        begin = self._here()
+        self.inside(end)
+        d = [b - a for a, b in zip(begin, end, strict=True)]
+        length = max(map(abs, d))
+        x, y, z = (
+            [a + self.rounded(k, da, length) for k in range(length + 1)]
+            for a, da in zip(begin, d, strict=True)
+        )
+        self.ink(zip(x, y, z, strict=True))
+        self.cursor = self.said.index(*self.after_shape(begin, end))
+
+    def op_box(self, _: int) -> None:
+        """Draw a BOX."""
+        end = self._place()
+        begin = self._here()
+        self.inside(end)
+        xs, ys, zs = (self.span(a, b) for a, b in zip(begin, end, strict=True))
+        self.ink((x, y, z) for z in zs for y in ys for x in xs)
+        self.cursor = self.said.index(*self.after_shape(begin, end))
+
+    def op_dots(self, _: int) -> None:
+        """Draw DOTS."""
+        places = [self._place() for _ in range(self.steps_of(self._byte()))]
+        self.ink(places)
+        begin = self.said.place(min(self.cursor, self.said.voxels - 1))
+        self.cursor = self.said.index(*self.after_shape(begin, places[-1]))
+
+    def op_brick(self, level: int) -> None:
+        """Draw an OCT."""
+        x, y, z = self._place()
+        side = 1 << level
+        corner = (x * side, y * side, z * side)
+        nodes = [corner]
+        places: list[Place] = []
+        while side > 1:
+            children: list[Place] = []
+            side //= 2
+            for node in nodes:
+                mask = self._byte()
+                for bit in range(8):
+                    offset = (side * part for part in self.child(bit))
+                    x, y, z = (a + b for a, b in zip(node, offset, strict=True))
+                    at = (x, y, z)
+                    if not mask:
+                        places += self._cube(at, side)
+                    elif mask >> bit & 1:
+                        children.append(at)
+            nodes = children
+        self.ink(places + nodes)
+        self.cursor = self.after_brick(self.cursor, self.said.index(*corner))
+
+    def _cube(self, at: Place, side: int) -> list[Place]:
+        x, y, z = at
+        part = range(side)
+        return [(x + i, y + j, z + k) for k in part for j in part for i in part]
+
+    def op_colors(self, _: int) -> None:
+        """Set COLORS of the palette."""
+        first = self._byte()
+        count = self._byte() + 1
+        raw = self._take(3 * count)
+        if first + count > spec.LIMIT_MAX_COLORS:
+            raise self.refuse(spec.CODE_OUTSIDE)
+        for i in range(count):
+            self.page.palette[first + i] = rgb(*raw[3 * i : 3 * i + 3])
+
+
+# First op byte, how many more, the feature that they need, and what draws them.
+_OPS: tuple[tuple[int, int, str, Callable[[Decoder, int], None]], ...] = (
+    (spec.OP_END, 0, "", Decoder.op_end),
+    (spec.OP_PEN, 0, "", Decoder.op_pen),
+    (spec.OP_MOVE, 0, "", Decoder.op_move),
+    (spec.OP_LINE, 0, "LINE", Decoder.op_line),
+    (spec.OP_BOX, 0, "BOX", Decoder.op_box),
+    (spec.OP_DOTS, 0, "DOTS", Decoder.op_dots),
+    (spec.OP_COLORS, 0, "PALETTE", Decoder.op_colors),
+    (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", Decoder.op_step),
+    (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", Decoder.op_from),
+    (spec.OP_ARC, 0, "ARC", Decoder.op_arc),
+    (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", Decoder.op_brick),
+    (spec.OP_SKIP, 31, "", Decoder.op_skip),
+    (spec.OP_RUN, 31, "", Decoder.op_run),
+    (spec.OP_LIT, 31, "", Decoder.op_literal),
+    (spec.OP_DIFF, 31, "DIFF", Decoder.op_differences),
+)

@@ -1,0 +1,104 @@
+"""Checks of what curves are made from. Each error names the argument to blame."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, SupportsFloat
+
+import numpy as np
+
+from voxdisplay.errors import CurveError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from voxdisplay.compute.array_types import Floats
+
+
+LARGEST = 1e100
+"""No display is larger, and products of a few such numbers do not overflow."""
+
+
+class ArgumentError(CurveError):
+    """An argument of a curve is wrong.
+
+    Parameters
+    ----------
+    argument : str
+        Its name.
+    problem : str
+        What is wrong, to be read after the name.
+
+    """
+
+    def __init__(self, argument: str, problem: str, *, hint: str | None = None) -> None:
+        super().__init__(f"{argument} {problem}", hint=hint)
+        self.argument = argument
+
+
+def finite(name: str, value: SupportsFloat) -> float:
+    """Give a finite float, or raise ArgumentError."""
+    number = float(value)
+    if not math.isfinite(number):
+        raise ArgumentError(name, f"is not finite: {number}")
+    if abs(number) > LARGEST:
+        raise ArgumentError(name, f"is too large: {number:g}")
+    return number
+
+
+def positive(name: str, value: SupportsFloat) -> float:
+    """Give a positive finite float, or raise ArgumentError."""
+    number = finite(name, value)
+    if number <= 0:
+        raise ArgumentError(name, f"must be positive, not {number:g}")
+    return number
+
+
+def whole(name: str, value: SupportsFloat) -> int:
+    """Give an int, or raise ArgumentError when the number is not whole."""
+    number = finite(name, value)
+    if not number.is_integer():
+        raise ArgumentError(name, f"must be a whole number, not {number:g}")
+    return int(number)
+
+
+def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
+    """Give a finite float64 array of a shape, where None is any length, or raise ArgumentError."""
+    try:
+        numbers = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError(name, "is not an array of numbers") from None
+    fits = len(numbers.shape) == len(shape) and all(
+        want in (None, got) for got, want in zip(numbers.shape, shape, strict=True)
+    )
+    if not fits:
+        want = ", ".join("n" if side is None else str(side) for side in shape)
+        raise ArgumentError(
+            name, f"has shape {numbers.shape}, not ({want}{',' * (len(shape) == 1)})"
+        )
+    if not (np.abs(numbers) <= LARGEST).all():
+        first = tuple(np.argwhere(~(np.abs(numbers) <= LARGEST))[0])
+        finite(name + "".join(f"[{i}]" for i in first), numbers[first])
+    return numbers
+
+
+def vector(name: str, value: ArrayLike) -> Floats:
+    """Give a finite (3,) float64 array, or raise ArgumentError."""
+    return array(name, value, (3,))
+
+
+def points(name: str, value: ArrayLike, *, least: int) -> Floats:
+    """Give a finite (n, 3) float64 array of at least so many points, or raise ArgumentError."""
+    empty = isinstance(value, list | tuple) and not value
+    numbers = array(name, np.empty((0, 3)) if empty else value, (None, 3))
+    if len(numbers) < least:
+        raise ArgumentError(name, f"has {len(numbers)} of at least {least} points")
+    return numbers
+
+
+def parameter_range(name: str, low: float, high: float) -> tuple[float, float]:
+    """Give (low, high), finite and ascending, or raise ArgumentError."""
+    a, b = finite(f"{name}[0]", low), finite(f"{name}[1]", high)
+    if a >= b:
+        raise ArgumentError(name, f"{'is empty' if a == b else 'runs backwards'}: {a:g} to {b:g}")
+    return a, b

@@ -1,0 +1,1 @@
+"""Displays as users hold them: opening, sessions, frames on their way, and proof."""

@@ -1,0 +1,194 @@
+"""What a frame costs on the wire, before it is sent, and how many a second a line carries.
+
+Everything is counted on the packets themselves, coded as they would be for such a line and such a
+device. Knows no port, no session, and no device but by what it announces.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from itertools import chain
+from typing import Final, Self
+
+from voxdisplay.display.device_info import DeviceInfo
+from voxdisplay.frame import Frame
+from voxdisplay.link.payload_size import FIRST_PAYLOAD, suited
+from voxdisplay.wire import packet as packets
+from voxdisplay.wire import spec
+from voxdisplay.wire.features import worth_using
+from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_listing import list_ops
+
+EVERY_FEATURE: Final = tuple(
+    name.removeprefix("FEATURE_").lower() for name in vars(spec) if name.startswith("FEATURE_")
+)
+COMMON_BAUDS: Final = (
+    115_200, 230_400, 460_800, 921_600, 1_000_000, 2_000_000, 3_000_000, 6_000_000, 12_000_000,
+)  # fmt: skip
+_BITS_PER_BYTE: Final = 10  # a start bit, eight, a stop bit
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line, and what it carries each way at most.
+
+    Attributes
+    ----------
+    name : str
+    bytes_per_s : float
+
+    """
+
+    name: str
+    bytes_per_s: float
+
+    @classmethod
+    def serial(cls, baud: int) -> Line:
+        """Give a serial line: 8 data bits, no parity, 1 stop bit."""
+        return cls(f"{baud} Bd", baud / _BITS_PER_BYTE)
+
+
+# Bulk transfers at best, USB 2.0 specification, tables 5-9 and 5-10: 19 packets of 64 bytes in each
+# frame of 1 ms, and 13 of 512 bytes in each microframe of 125 us.
+USB_LINES: Final = (
+    Line("USB full speed", 19 * 64 * 1000.0),
+    Line("USB high speed", 13 * 512 * 8000.0),
+)
+COMMON_LINES: Final = (*map(Line.serial, COMMON_BAUDS), *USB_LINES)
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """What a device announces, as far as frames are coded by it.
+
+    Attributes
+    ----------
+    features : tuple of str
+        As in `DeviceInfo.features`; by default all that there are.
+    payload_bytes : int
+        The longest payload that it is sent while nothing has been lost.
+    refresh_hz : float
+        How many frames a second it shows at most; 0: any number.
+
+    """
+
+    features: tuple[str, ...] = EVERY_FEATURE
+    payload_bytes: int = FIRST_PAYLOAD
+    refresh_hz: float = 0.0
+
+    @classmethod
+    def of(cls, said: DeviceInfo) -> Self:
+        """Give the receiver that a device is."""
+        longest = suited(FIRST_PAYLOAD, said.max_payload_bytes, said.rx_buffer_bytes)
+        return cls(said.features, longest, said.refresh_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class OpCost:
+    """How often an op occurs, and how many bytes all of these have together."""
+
+    count: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What it takes to show a frame.
+
+    Attributes
+    ----------
+    line : Line
+    receiver : Receiver
+        What it was coded for.
+    voxels : int
+        Lit voxels.
+    packets : int
+        DATA packets.
+    op_bytes : int
+        Bytes of ops, all packets together.
+    wire_bytes : int
+        Bytes on the wire from host to device: headers, check values and delimiting included.
+    answer_bytes : int
+        Bytes on the wire from device to host: an ACK for each packet, and one for the swap.
+    ops : dict of str to OpCost
+        By the ops' names, in the order of protocol.md, section 7.
+
+    """
+
+    line: Line
+    receiver: Receiver
+    voxels: int
+    packets: int
+    op_bytes: int
+    wire_bytes: int
+    answer_bytes: int
+    ops: dict[str, OpCost]
+
+    @property
+    def seconds(self) -> float:
+        """How long the line is busy with the frame; both ways go at the same time."""
+        return max(self.wire_bytes, self.answer_bytes) / self.line.bytes_per_s
+
+    @property
+    def frames_per_s(self) -> float:
+        """How many such frames the line carries, one behind the other, and the device shows.
+
+        That is as many as there could be: a device may take longer to draw them than to get them.
+        """
+        carried = 1 / self.seconds
+        most = self.receiver.refresh_hz
+        return min(carried, most) if most else carried
+
+
+def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
+    """Find what it takes to show a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        Of the display's grid and format.
+    line : Line
+        What it is sent over. It is coded as the driver does when it knows that line.
+    receiver : Receiver
+        Who gets it.
+
+    """
+    longest, speed = receiver.payload_bytes, line.bytes_per_s
+    coded = frame.coded(longest, worth_using(receiver.features, speed), speed)
+    payloads = list(chain.from_iterable(coded)) or [b""]
+    coding = Coding(frame.grid, frame.format, longest)
+    count: Counter[str] = Counter()
+    size: Counter[str] = Counter()
+    wire_bytes = 0
+    for number, payload in enumerate(payloads):
+        commit = number == len(payloads) - 1
+        flags = spec.DATA_FLAG_CLEAR | commit * spec.DATA_FLAG_COMMIT
+        data = packets.Data(seq=number % 256, frame=0, flags=flags, ops=payload)
+        wire_bytes += len(packets.encode(data))
+        for name, op_bytes in list_ops(payload, coding):
+            count[name] += 1
+            size[name] += op_bytes
+    return Plan(
+        line=line,
+        receiver=receiver,
+        voxels=len(frame.lit()[0]),
+        packets=len(payloads),
+        op_bytes=sum(map(len, payloads)),
+        wire_bytes=wire_bytes,
+        answer_bytes=(len(payloads) + 1) * _ack_bytes(),
+        ops={name: OpCost(count[name], size[name]) for name in sorted(count, key=_place)},
+    )
+
+
+def _ack_bytes() -> int:
+    ack = packets.Ack(
+        flags=0, last=1, session=0x0101, boot=0x0101, received=0x01010101, credit=0x01010101,
+        digest=0x01010101, damaged=0x0101,
+    )  # fmt: skip
+    return len(packets.encode(ack))
+
+
+def _place(name: str) -> int:
+    """Give the place of an op in the table of section 7: that of its value; unknown ones last."""
+    return int(getattr(spec, f"OP_{name}", 256))

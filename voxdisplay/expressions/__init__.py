@@ -1,0 +1,1 @@
+"""Safe formulas: text to programs, their values, derivatives and enclosures. Knows no curves."""

@@ -1,0 +1,69 @@
+"""Params: names that a scene's or a curve's expressions share.
+
+Each is a number, or an expression in constants and other params. Knows no curves.
+"""
+
+from __future__ import annotations
+
+import re
+from graphlib import CycleError, TopologicalSorter
+from typing import TYPE_CHECKING
+
+from voxdisplay.errors import CurveError
+from voxdisplay.expressions.operations import FUNCTIONS
+from voxdisplay.expressions.parse import CONSTANTS, VARIABLE, constant, excerpt, names_in
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+MAX_PARAMS = 1000
+"""Most params of one scene or curve."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NAME_HINT = "a name is letters a-z A-Z, digits and _, and does not begin with a digit"
+
+
+def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
+    """Put params in an order in which each uses only earlier ones.
+
+    Raises
+    ------
+    CurveError
+        If one has a name that expressions cannot use or that means something else, or if they
+        go in a circle.
+
+    """
+    if len(params) > MAX_PARAMS:
+        raise CurveError(f"{len(params)} params are more than {MAX_PARAMS}")
+    for name in params:
+        if not _NAME.fullmatch(name):
+            raise CurveError(f"{excerpt(name)} cannot be the name of a param", hint=_NAME_HINT)
+        if name in FUNCTIONS or name in CONSTANTS or name == VARIABLE:
+            raise CurveError(f"a param cannot be called {name!r}: that has a meaning already")
+    uses = {
+        name: [word for word in names_in(str(source)) if word in params]
+        for name, source in params.items()
+    }
+    try:
+        return tuple(TopologicalSorter(uses).static_order())
+    except CycleError as error:
+        circle = " -> ".join(reversed(error.args[1]))
+        raise CurveError(f"params go in a circle: {excerpt(circle)}") from None
+
+
+def resolve_params(params: Mapping[str, str | float]) -> dict[str, float]:
+    """Compute params, which are numbers or expressions in constants and other params.
+
+    Raises
+    ------
+    CurveError
+        As `param_order` and `constant`; the message begins with the param's name.
+
+    """
+    values: dict[str, float] = {}
+    for name in param_order(params):
+        try:
+            values[name] = constant(params[name], values)
+        except CurveError as error:
+            raise CurveError(f"param {name}: {error}", hint=error.hint) from None
+    return values

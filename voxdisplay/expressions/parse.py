@@ -1,0 +1,295 @@
+"""Safe expressions: from text to a program, see `program`.
+
+::
+
+    expression = sum of terms        a + b, a - b
+    term       = product of factors  a * b, a / b
+    factor     = -a, +a, power
+    power      = atom ** factor      right associative; -2**2 is -(2**2), as in Python
+    atom       = number, name, function(expression, ...), (expression)
+
+Nothing else parses, and Python is never asked to parse or run the text. The length, the nesting
+and the number of steps are limited, and evaluation is float64 throughout, so that hostile text
+costs no more than a long expression does. Knows no curves, and nothing of where the text came
+from: an error names the column, the caller adds the place.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import reprlib
+from textwrap import shorten
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, cast
+
+import numpy as np
+
+from voxdisplay.errors import CurveError, did_you_mean
+from voxdisplay.expressions.operations import (
+    ADD,
+    DIVIDE,
+    FUNCTIONS,
+    MULTIPLY,
+    NEGATE,
+    POWER,
+    SUBTRACT,
+    Operation,
+)
+from voxdisplay.expressions.program import Expression, Step
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+
+MAX_LENGTH = 4096
+"""Longest text of an expression, in characters."""
+MAX_DEPTH = 100
+"""Deepest nesting of brackets, signs and right operands; bounds the parser's recursion."""
+MAX_STEPS = 1024
+"""Most numbers, names and operations in one expression."""
+
+CONSTANTS = {"pi": math.pi, "tau": math.tau, "e": math.e, "deg": math.pi / 180}
+VARIABLE = "t"
+
+
+def parse(
+    source: str | float, names: Mapping[str, float] | None = None, *, variable: bool = True
+) -> Expression:
+    """Parse an expression.
+
+    Parameters
+    ----------
+    source : str or float
+        The text; a number stands for itself.
+    names : mapping of str to float, optional
+        The values of params.
+    variable : bool
+        Whether t may occur.
+
+    Raises
+    ------
+    CurveError
+        If the text is not an expression, or too long, too deep or of too many steps: the message
+        names the column, counted from 1, and what was found there. If it does not depend on t
+        and its value is inf or nan.
+
+    """
+    if isinstance(source, str):
+        expression = _Parser(source, names or {}, variable=variable).parse()
+    else:
+        expression = Expression(str(source), (float(source),))
+    if expression.constant is not None and not math.isfinite(expression.constant):
+        raise CurveError(f"{excerpt(source)} is not finite: {expression.constant}")
+    return expression
+
+
+def constant(source: str | float, names: Mapping[str, float] | None = None) -> float:
+    """Parse an expression without t and give its value; raise CurveError as `parse` does."""
+    (value,) = parse(source, names, variable=False).program
+    return cast("float", value)
+
+
+def excerpt(value: object) -> str:
+    """Quote a value of any length, of any characters, in an error message."""
+    return _EXCERPT.repr(value)
+
+
+_EXCERPT = reprlib.Repr()
+_EXCERPT.maxstring = 60
+
+
+class _Token(NamedTuple):
+    kind: str  # "number", "name", "symbol", "end", or "other": no part of any expression
+    text: str
+    column: int
+
+
+_TOKEN = re.compile(
+    r"""(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
+      | (?P<name>[A-Za-z_][A-Za-z0-9_]*)
+      | (?P<symbol>\*\*|[-+*/(),])
+      | (?P<other>\S)""",
+    re.VERBOSE,
+)
+_SPELLINGS = {
+    "^": "**",
+    "\N{MINUS SIGN}": "-",
+    "\N{MULTIPLICATION SIGN}": "*",
+    "\N{MIDDLE DOT}": "*",
+    "\N{DIVISION SIGN}": "/",
+    "\N{GREEK SMALL LETTER PI}": "pi",
+    "\N{DEGREE SIGN}": "*deg",
+    "\N{SQUARE ROOT}": "sqrt",
+}
+"""What people write for what is written otherwise here."""
+
+
+def _tokens(source: str) -> Iterator[_Token]:
+    for match in _TOKEN.finditer(source):
+        yield _Token(match.lastgroup or "other", match.group(), match.start() + 1)
+    yield _Token("end", "", len(source) + 1)
+
+
+def names_in(source: str) -> list[str]:
+    """Give the names in a text, in order, whether it parses or not."""
+    return [token.text for token in _tokens(source[:MAX_LENGTH]) if token.kind == "name"]
+
+
+class _Infix(NamedTuple):
+    operation: Operation
+    left: int  # how tightly it binds what stands before it
+    right: int  # and what stands after it
+
+
+_INFIX = {
+    "+": _Infix(ADD, 10, 10),
+    "-": _Infix(SUBTRACT, 10, 10),
+    "*": _Infix(MULTIPLY, 20, 20),
+    "/": _Infix(DIVIDE, 20, 20),
+    "**": _Infix(POWER, 40, 39),
+}
+_SIGN = 30
+_PRODUCT_HINT = "a product is written with *"
+
+
+class _Parser:
+    """Pratt parser, writing the postfix program as it goes."""
+
+    def __init__(self, source: str, names: Mapping[str, float], *, variable: bool) -> None:
+        self.source = source
+        self.names = names
+        self.variable = variable
+        self.program: list[Step] = []
+        self.steps = 0
+        if len(source) > MAX_LENGTH:
+            self.fail(f"{len(source)} characters are more than {MAX_LENGTH}: {excerpt(source)}")
+        self.tokens = _tokens(source)
+        self.token = next(self.tokens)
+
+    def parse(self) -> Expression:
+        if self.token.kind == "end":
+            self.fail("the expression is empty")
+        self.expression(0, 0)
+        if self.token.kind != "end":
+            another = self.token.kind in {"name", "number"} or self.token.text == "("
+            hint = _PRODUCT_HINT if another else None
+            self.unexpected("an operator or the end", hint=hint)
+        return Expression(self.source, tuple(self.program))
+
+    def expression(self, binding: int, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            self.fail(f"nested more than {MAX_DEPTH} deep {self.place()}")
+        self.operand(depth)
+        while (infix := _INFIX.get(self.token.text)) and infix.left > binding:
+            self.advance()
+            self.expression(infix.right, depth + 1)
+            self.emit(infix.operation)
+
+    def operand(self, depth: int) -> None:
+        token = self.token
+        if token.kind == "number":
+            self.number(token)
+        elif token.kind == "name":
+            self.name(token, depth)
+        elif token.text in {"+", "-"}:
+            self.advance()
+            self.expression(_SIGN, depth + 1)
+            if token.text == "-":
+                self.emit(NEGATE)
+        elif token.text == "(":
+            self.advance()
+            self.expression(0, depth + 1)
+            self.expect(")")
+        else:
+            self.unexpected("a value")
+
+    def number(self, token: _Token) -> None:
+        value = float(token.text)
+        if not math.isfinite(value):
+            self.fail(f"the number {self.place(token)} is too large")
+        self.advance()
+        self.emit(value)
+
+    def name(self, token: _Token, depth: int) -> None:
+        name = token.text
+        self.advance()
+        called = self.token.text == "("
+        if name in FUNCTIONS:
+            if not called:
+                self.fail(f"the function {name!r} {self.place(token)} needs an argument in ( )")
+            self.call(token, FUNCTIONS[name], depth)
+            return
+        meaning: Step | None = CONSTANTS.get(name, self.names.get(name))
+        if name == VARIABLE and self.variable:
+            meaning = VARIABLE
+        if meaning is None:
+            self.unknown(token, called=called)
+        if called:
+            self.fail(f"{name!r} {self.place(token)} is not a function", hint=_PRODUCT_HINT)
+        self.emit(meaning)
+
+    def unknown(self, token: _Token, *, called: bool) -> NoReturn:
+        name = token.text
+        if name == VARIABLE:
+            self.fail(
+                f"'t' {self.place(token)} has no value here",
+                hint="t runs only in x, y, z, dx, dy, dz of a parametric curve",
+            )
+        known = [*CONSTANTS, *self.names, *FUNCTIONS] + [VARIABLE] * self.variable
+        what, like = ("function", list(FUNCTIONS)) if called else ("name", known)
+        hint = did_you_mean(name, like) or f"known: {shorten(', '.join(like), 200)}"
+        self.fail(f"unknown {what} {excerpt(name)} {self.place(token)}", hint=hint)
+
+    def call(self, token: _Token, function: Operation, depth: int) -> None:
+        count = 0
+        while count == 0 or self.token.text == ",":
+            self.advance()
+            if count == 0 and self.token.text == ")":
+                break
+            self.expression(0, depth + 1)
+            count += 1
+            if count == function.arity or (function.variadic and count > function.arity):
+                self.emit(function)
+        self.expect(")")
+        if count < function.arity or (count > function.arity and not function.variadic):
+            wanted = f"{function.arity}{' or more' if function.variadic else ''}"
+            plural = "" if wanted == "1" else "s"
+            self.fail(
+                f"{token.text} takes {wanted} argument{plural}, not {count}, {self.place(token)}"
+            )
+
+    def emit(self, step: Step) -> None:
+        """Append a step, computing at once what does not depend on t."""
+        self.steps += 1
+        if self.steps > MAX_STEPS:
+            self.fail(f"more than {MAX_STEPS} numbers, names and operations")
+        if isinstance(step, Operation):
+            # An operand that ends in a number is that number: everything else ends in t or in an
+            # operation on it.
+            operands = [x for x in self.program[-step.arity :] if isinstance(x, float)]
+            if len(operands) == step.arity:
+                with np.errstate(all="ignore"):
+                    value = float(step.value(*map(np.float64, operands)))
+                self.program[-step.arity :] = [value]
+                return
+        self.program.append(step)
+
+    def advance(self) -> None:
+        self.token = next(self.tokens)
+
+    def expect(self, symbol: str) -> None:
+        if self.token.text != symbol:
+            self.unexpected(f"{symbol!r} or an operator")
+        self.advance()
+
+    def place(self, token: _Token | None = None) -> str:
+        return f"at column {(token or self.token).column} of {excerpt(self.source)}"
+
+    def unexpected(self, wanted: str, hint: str | None = None) -> NoReturn:
+        if self.token.text in _SPELLINGS:
+            hint = f"write {_SPELLINGS[self.token.text]!r}"
+        found = "the end" if self.token.kind == "end" else excerpt(self.token.text)
+        self.fail(f"expected {wanted}, found {found} {self.place()}", hint=hint)
+
+    def fail(self, message: str, hint: str | None = None) -> NoReturn:
+        raise CurveError(message, hint=hint)

@@ -1,0 +1,1 @@
+"""Grids, pixel formats, colours and palettes. Knows no packets, curves or displays."""

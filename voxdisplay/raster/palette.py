@@ -1,0 +1,120 @@
+"""The palette of an INDEX8 page: which colour each pixel value shows, and how colours find values.
+
+On a display with the feature PALETTE every page brings its own (protocol.md, section 7.6), so that
+a frame can show any colours, 255 at most besides black. On others the default palette holds. Knows
+nothing of voxels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.raster.pixel_format import PixelFormat, Values
+
+Colors = NDArray[np.uint8]
+
+ENTRIES = 256
+DEFAULT: Colors = PixelFormat.INDEX8.rgb(np.arange(ENTRIES))
+DEFAULT.flags.writeable = False
+
+
+class Palette:
+    """Colours of pixel values. Pixel 0 is dark, whatever its entry says.
+
+    Parameters
+    ----------
+    colors : (256, 3) uint8 array, optional
+        Red, green and blue of each value; the default palette if left out.
+    grows : bool
+        Whether a colour that is missing may take an entry that no pixel has used.
+
+    Attributes
+    ----------
+    colors : (256, 3) uint8 array
+
+    """
+
+    def __init__(self, colors: Colors | None = None, *, grows: bool = False) -> None:
+        self.colors = (DEFAULT if colors is None else _checked(colors)).copy()
+        self._grows = grows
+        self._used = np.zeros(ENTRIES, dtype=np.bool_)
+        self._used[0] = True
+
+    def copy(self) -> Palette:
+        """Give another of the same colours, of which the same are used."""
+        twin = Palette(self.colors, grows=self._grows)
+        twin._used = self._used.copy()
+        return twin
+
+    def use(self, values: NDArray[np.integer]) -> None:
+        """Note that pixels have these values: their entries stay what they are."""
+        self._used[values] = True
+
+    def differs_from(self, other: Colors) -> NDArray[np.int64]:
+        """Give the entries that are not as in other colours, ascending."""
+        return np.flatnonzero((self.colors != other).any(axis=1))
+
+    def rgb(self, values: NDArray[np.integer]) -> Colors:
+        """Give the colours, (n, 3), that pixel values, (n,), show: black for 0."""
+        shown = self.colors.copy()
+        shown[0] = 0
+        return shown[np.asarray(values)]
+
+    def nearest(self, rgb: Colors) -> Values:
+        """Give the pixel values of colours, (n, 3): exact ones while there are entries left.
+
+        Where there are more colours than entries, those that get one are spread evenly over the
+        order in which they come; the others take the nearest by the sum of squared differences.
+        """
+        wanted, first, back = np.unique(_codes(rgb), return_index=True, return_inverse=True)
+        order = np.argsort(first)  # as they come
+        values = np.empty(len(wanted), dtype=np.int64)
+        values[order] = self._values_of(wanted[order])
+        self.use(values)
+        return values[back].astype(np.uint32)
+
+    def _values_of(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Give the values of different colours."""
+        entries = _codes(self.colors)
+        entries[0] = 0  # black is pixel 0
+        known, where = np.unique(entries, return_index=True)
+        at = np.searchsorted(known, wanted).clip(max=len(known) - 1)
+        values = np.where(known[at] == wanted, where[at], -1)
+        self.use(values[values >= 0])
+        missing = np.flatnonzero(values < 0)
+        if self._grows and len(missing):
+            free = np.flatnonzero(~self._used)
+            count = min(len(free), len(missing))
+            chosen = missing[np.arange(count) * len(missing) // max(count, 1)]
+            values[chosen] = free[:count]
+            self.colors[free[:count]] = _rgb(wanted[chosen])
+            self._used[free[:count]] = True
+            missing = np.flatnonzero(values < 0)
+        if len(missing):
+            shown = self.rgb(np.arange(ENTRIES)).astype(np.int64)
+            for begin in range(0, len(missing), ENTRIES):
+                some = missing[begin : begin + ENTRIES]
+                apart = _rgb(wanted[some]).astype(np.int64)[:, None] - shown
+                values[some] = (apart**2).sum(axis=2).argmin(axis=1)
+        return values
+
+
+def _codes(rgb: Colors) -> NDArray[np.int64]:
+    """Give colours as numbers."""
+    red, green, blue = rgb.astype(np.int64).T
+    return np.asarray(red << 16 | green << 8 | blue)
+
+
+def _rgb(codes: NDArray[np.int64]) -> Colors:
+    return np.stack((codes >> 16, codes >> 8 & 255, codes & 255), axis=1).astype(np.uint8)
+
+
+def _checked(colors: Colors) -> Colors:
+    colors = np.asarray(colors)
+    if colors.shape != DEFAULT.shape or colors.dtype != np.uint8:
+        raise ValueError(
+            f"a palette is a (256, 3) array of uint8, red, green and blue of each pixel value; "
+            f"this is {colors.shape} of {colors.dtype}"
+        )
+    return colors

@@ -1,0 +1,116 @@
+"""A picture made of text: two pixels a character, the upper half block and its ground.
+
+Gives text; who writes it to what terminal is not known here.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.raster.grid import Grid
+from voxdisplay.view.camera import Camera
+from voxdisplay.view.lit_voxels import Lit
+from voxdisplay.view.picture import Look, picture_of
+from voxdisplay.view.stage import AXIS_COLORS, tips
+
+RESET = "\x1b[0m"
+_HALF = "\N{UPPER HALF BLOCK}"
+# Drawn so much finer and reduced: thin lines keep their brightness, and edges are soft.
+_FINER = 2
+# Nearer than on a screen: there is no room to give away.
+CAMERA = Camera(distance=2.2)
+
+# The 6x6x6 colours and 24 greys that a terminal of 256 colours has from number 16 on.
+_LEVELS = (0, 95, 135, 175, 215, 255)
+_CUBE = np.array([(r, g, b) for r in _LEVELS for g in _LEVELS for b in _LEVELS])
+_XTERM = np.concatenate((_CUBE, np.arange(8, 248, 10)[:, None].repeat(3, axis=1)))
+
+
+def full_color(environment: Mapping[str, str] = os.environ) -> bool:
+    """Tell whether the terminal says that it has all colours, and not only 256."""
+    return environment.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
+
+
+def half_blocks(
+    lit: Lit,
+    grid: Grid,
+    columns: int,
+    rows: int,
+    *,
+    camera: Camera = CAMERA,
+    full: bool = True,
+) -> list[str]:
+    """Draw lit voxels as lines of text.
+
+    Parameters
+    ----------
+    lit : Lit
+    grid : Grid
+    columns, rows : int
+        Characters.
+    camera : Camera
+    full : bool
+        Use all colours, 24 bit; else the 256 that nearly every terminal has.
+
+    Returns
+    -------
+    list of str
+        ``rows`` lines without line ends, each of which resets the colours at its end.
+
+    """
+    size = columns * _FINER, 2 * rows * _FINER
+    look = Look(size=size, camera=camera, labels=False)
+    pixels = np.asarray(picture_of(lit, grid, look).reduce(_FINER))
+    names = _names(grid, replace(look, size=(columns, 2 * rows)))
+    codes = _codes(pixels, full=full)
+    return [
+        _line(codes[2 * row], codes[2 * row + 1], names.get(row, {}), full=full)
+        for row in range(rows)
+    ]
+
+
+def _names(grid: Grid, look: Look) -> dict[int, dict[int, int]]:
+    """Find where the axes' names stand: row -> column -> axis. A cell beyond each tip."""
+    x, y, _ = look.camera.project(np.vstack((np.zeros(3), tips(grid))), grid, look.size)
+    columns, rows = look.size[0], look.size[1] // 2
+    found: dict[int, dict[int, int]] = {}
+    for axis in range(3):
+        along = np.array([x[axis + 1] - x[0], y[axis + 1] - y[0]])
+        along = along / max(1.0, float(np.hypot(*along))) * 1.6
+        column = min(max(0, int(x[axis + 1] + along[0])), columns - 1)
+        row = min(max(0, int((y[axis + 1] + along[1]) / 2)), rows - 1)
+        found.setdefault(row, {})[column] = axis
+    return found
+
+
+def _codes(pixels: NDArray[np.uint8], *, full: bool) -> list[list[str]]:
+    """Give each pixel's colour as terminals write it, after 38; or 48;."""
+    if full:
+        return [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
+    flat, index = np.unique(pixels.reshape(-1, 3), axis=0, return_inverse=True)
+    apart = ((flat[:, None, :].astype(np.int64) - _XTERM) ** 2).sum(axis=2)
+    numbers = (16 + apart.argmin(axis=1))[index.reshape(pixels.shape[:2])]
+    return [[f"5;{number}" for number in row] for row in numbers.tolist()]
+
+
+def _line(upper: list[str], lower: list[str], names: dict[int, int], *, full: bool) -> str:
+    parts, front, back = [], "", ""
+    for column, (top, bottom) in enumerate(zip(upper, lower, strict=True)):
+        axis = names.get(column)
+        character = " " if top == bottom else _HALF
+        if axis is not None:
+            character = "xyz"[axis]
+            top = _codes(np.array([[AXIS_COLORS[axis]]], np.uint8), full=full)[0][0]  # noqa: PLW2901
+        if bottom != back:
+            parts.append(f"\x1b[48;{bottom}m")
+            back = bottom
+        if top != front and character != " ":
+            parts.append(f"\x1b[38;{top}m")
+            front = top
+        parts.append(character)
+    return "".join(parts) + RESET

@@ -1,0 +1,85 @@
+"""Pictures as a page for a browser that needs no server: it opens from a file, turns and plays.
+
+It is the page of the live view with the frames inside; see `voxdisplay.view.live.message` for
+what a frame is. Nothing in it comes from elsewhere, and it may ask for nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.palette import Colors
+from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.view.live.message import Moment, encode
+from voxdisplay.view.live.page import page, policy
+from voxdisplay.view.save import replacing
+
+_LEVEL = 9
+_HEAD = '<meta charset="utf-8">\n'
+_TITLE = "<title>voxdisplay</title>"
+_PLACE = '<script type="application/octet-stream" id="embedded">'
+
+
+def save_html(
+    path: Path | str,
+    pages: Sequence[NDArray[np.integer]],
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002 - the word of the command line
+    *,
+    title: str = "voxdisplay",
+    fps: float = 20.0,
+    palette: Colors | None = None,
+) -> None:
+    """Write pages as one HTML file, that takes the place of another only when it is whole.
+
+    Parameters
+    ----------
+    path : Path or str
+    pages : sequence of ndarray
+        As `Display.read` and `Frame.array` give them, indexed [z, y, x]; one at least.
+    grid : Grid
+    format : PixelFormat
+    title : str
+    fps : float
+        Pages a second, 0.1 to 120.
+    palette : (256, 3) uint8 array, optional
+        Of index8 pages; by default the default one.
+
+    Raises
+    ------
+    ValueError
+        If there is no page, one is not of this grid and format, or the rate is out of range.
+    OSError
+        If the file cannot be written.
+
+    """
+    if not len(pages):
+        raise ValueError("there is no page to write")
+    if not (math.isfinite(fps) and 0.1 <= fps <= 120):
+        raise ValueError(f"{fps} pages a second: take 0.1 to 120")
+    grid = Grid(*grid)
+    frames = [
+        Moment(np.asarray(one), grid, format, number, title, palette=palette)
+        for number, one in enumerate(pages, 1)
+    ]
+    packed = [zlib.compress(encode(frame), _LEVEL) for frame in frames]
+    data = json.dumps({"fps": fps, "frames": [base64.b64encode(f).decode() for f in packed]})
+    text = page()
+    for mark, more in (
+        (_HEAD, f'<meta http-equiv="Content-Security-Policy" content="{policy()}">\n'),
+        (_PLACE, data),  # base64 and numbers: nothing in it ends the script
+    ):
+        text = text.replace(mark, mark + more, 1)
+    text = text.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
+    with replacing(Path(path)) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")

@@ -1,0 +1,104 @@
+"""From curves to voxels: ordered, connected sequences along parametric space curves.
+
+``voxelize(curve)`` gives a `Sequence`; `measure` judges any list of voxels. This package knows
+curves only by their positions, and neither displays nor colours nor the wire. It needs numpy; with
+the extra `fast`, much work is done compiled, with the same voxels
+(`voxdisplay.compute.kernel_backend`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelization import measure, tangent_march
+from voxdisplay.voxelization.digitise import digitise
+from voxdisplay.voxelization.sequence import Report, Sequence, clip
+
+__all__ = ["Report", "Sequence", "clip", "march", "measure", "voxelize", "voxelize_many"]
+
+
+def voxelize(
+    curve: Curve,
+    *,
+    method: str = "grid-plane",
+    variant: int = 3,
+    tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
+    certified: bool = False,
+) -> Sequence:
+    """Find the voxels along a curve.
+
+    Parameters
+    ----------
+    curve : Curve
+        Any continuous curve; where it jumps, the sequence is split.
+    method : {"grid-plane", "march"}
+        The method of `grid_plane`, for which what is said below holds, or the paper's own, which
+        is there for comparison: `march`.
+    variant : {1, 2, 3}
+    tangent : {"analytic", "difference"}, optional
+        How the march finds distances, and tangents: see `march.follow`.
+    pitch, reach : float, optional
+        Step sizes of the march's search for the nearest point: in degrees where the parameter is
+        an angle around z, as for the paper's curves, else in voxels. By default those of the
+        paper's tables: see `march.follow`.
+    certified : bool
+        Prove what the report says, and that no feature is missed, however narrow, by bounds of
+        the curve's formula (`certify`); it takes about twice the time. Without it, features much
+        narrower than 1/64 of the range of t may be missed. Whether there is a proof, the report's
+        ``certified`` says, and what it says or why there is none, the sequence's ``proof``: a
+        curve that is a callable has no bounds, one that jumps cannot be proven to be one.
+
+    Returns
+    -------
+    Sequence
+        26-connected; the first voxel holds the curve's first point, the last its last; others
+        are within 0.7072 of the curve, if a step from one float t to the next moves it by less
+        than 0.002. Each has exactly two neighbours but for the contacts that
+        ``.contact_pairs`` lists. A closed curve is one whose ends are within 0.001 voxels of each
+        other, unless it says otherwise itself; its last voxel is a neighbour of the first.
+
+    Raises
+    ------
+    CurveError
+        If the curve cannot be evaluated, runs off, or has no end.
+    ValueError
+        If there is no such method or option, or the method has none such.
+
+    """
+    return voxelize_many(
+        [curve],
+        method=method,
+        variant=variant,
+        tangent=tangent,
+        pitch=pitch,
+        reach=reach,
+        certified=certified,
+    )[0]
+
+
+def voxelize_many(
+    curves: Iterable[Curve],
+    *,
+    method: str = "grid-plane",
+    variant: int = 3,
+    tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
+    certified: bool = False,
+) -> list[Sequence]:
+    """Find the voxels along many curves: as `voxelize`, but much faster than one by one."""
+    if method == "grid-plane":
+        if pitch is not None or reach is not None:
+            raise ValueError("pitch and reach are the march's: they go with method='march'")
+        return digitise(curves, certified=certified)
+    if method == "march":
+        if certified:
+            raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
+        return [
+            tangent_march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
+            for curve in curves
+        ]
+    raise ValueError(f"there is no method {method!r}: take 'grid-plane' or 'march'")

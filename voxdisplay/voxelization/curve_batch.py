@@ -1,0 +1,166 @@
+"""Where curves are: checked positions of many curves at once.
+
+Parameters and points only; this module must not know what a voxel is. All arrays hold many curves
+(or pieces of curves), one after the other, so that a thousand short curves cost at most a thousand
+calls of ``Curve.position`` and nothing else a thousand times. What a curve gets never depends on
+its neighbours in the batch: decisions are taken per interval, and positions found per curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import chain
+from operator import attrgetter
+
+import numpy as np
+
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.curves.batch_evaluation import Curves
+from voxdisplay.curves.curve import Curve
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelization.index_ranges import insert, spread
+
+AXES = "xyz"
+
+# Voxel indices are int32, and sums and differences of a few of them must be as well.
+FARTHEST = 2.0**30
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Points along pieces of curves.
+
+    Attributes
+    ----------
+    piece : (K,) int64 array
+        The piece each point belongs to, ascending.
+    t : (K,) float64 array
+        Parameters, ascending within a piece.
+    points : (3, K) float64 array
+        P(t), rows x, y, z, in voxels.
+    curve : (pieces,) int64 array
+        The curve that each piece is a part of, ascending.
+
+    """
+
+    piece: Ints
+    t: Floats
+    points: Floats
+    curve: Ints
+
+    @property
+    def joined(self) -> Bools:
+        """Which of the K - 1 steps stay inside a piece."""
+        return np.asarray(self.piece[1:] == self.piece[:-1])
+
+    @property
+    def bounds(self) -> Ints:
+        """Index of the first sample of each piece, and K: (pieces + 1,)."""
+        return self.piece.searchsorted(np.arange(self.curve.size + 1))
+
+    def curve_starts(self, curves: int) -> Ints:
+        """Index of the first sample of each of so many curves: (curves,)."""
+        return self.bounds[self.curve.searchsorted(np.arange(curves))]
+
+
+class Batch:
+    """Curves that are voxelised together.
+
+    Parameters
+    ----------
+    curves : iterable of Curve
+        Each with a finite range a < b.
+    number : int, optional
+        What messages call the first of them; without it they take the curve for the only one.
+
+    Raises
+    ------
+    CurveError
+        If a range is not finite or empty.
+
+    """
+
+    def __init__(self, curves: Iterable[Curve], number: int | None = None) -> None:
+        self.curves = list(curves)
+        self._number = number
+        ends = chain.from_iterable([curve.t_range for curve in self.curves])
+        ranges = np.fromiter(ends, dtype=float).reshape(-1, 2)
+        self.first, self.last = ranges.T
+        with np.errstate(all="ignore"):
+            length = self.last - self.first  # which may be too long for a number
+        good = np.isfinite(length) & (length > 0)
+        if not good.all():
+            index = int(np.argmin(good))
+            raise CurveError(
+                f"{self.name(index)}the range of t must be finite and ascending, "
+                f"not {self.first[index]} to {self.last[index]}"
+            )
+        self._together = Curves(self.curves)
+        # Parameters nearer to each other than this cannot be told apart everywhere in the range.
+        self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
+
+    @property
+    def reentrant(self) -> bool:
+        """Whether `evaluate` may be called from several threads at once."""
+        return all(self._together.of_each(attrgetter("reentrant")))
+
+    @property
+    def degrees(self) -> list[int | None]:
+        """Those of the curves, see `Curve.degree`."""
+        return self._together.of_each(attrgetter("degree"))
+
+    def name(self, index: int) -> str:
+        """Give the beginning of a message about a curve: nothing if it is the only one."""
+        return "" if self._number is None else f"curve {self._number + index}: "
+
+    @np.errstate(all="ignore")
+    def evaluate(self, curve: Ints, t: Floats) -> Floats:
+        """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).
+
+        Raises
+        ------
+        CurveError
+            If a position is not finite, or too far out to have a voxel.
+
+        """
+        points = self._together.positions(curve, t)
+        # And so not where P is not a number: it would be least and greatest.
+        near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
+        if not near:
+            at = int(np.argmin((np.abs(points) < FARTHEST).all(axis=0)))
+            raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])
+        return points
+
+    def _out_of_reach(self, index: int, t: float, point: Floats) -> CurveError:
+        row = int(np.argmin(np.abs(point) < FARTHEST))
+        where = f"{self.name(index)}{AXES[row]} = {point[row]:.6g} at t = {t!r}"
+        if not np.isfinite(point[row]):
+            hint = "shorten the range of t so that it keeps away from this parameter"
+            return CurveError(f"{where} is not finite", axis=AXES[row], hint=hint)
+        hint = "shorten the range of t, or scale the curve down"
+        return CurveError(f"{where} is too far out to have a voxel", axis=AXES[row], hint=hint)
+
+    def split(self, samples: Samples, parts: Ints) -> Samples:
+        """Cut steps of samples into equal parts.
+
+        Parameters
+        ----------
+        samples : Samples
+            K of them.
+        parts : (K - 1,) int64 array
+            Into how many parts each step is cut; 1 leaves it as it is.
+
+        """
+        cut = (parts > 1).nonzero()[0]
+        count = parts[cut] - 1
+        left = cut.repeat(count)
+        nth = spread(np.ones_like(count), count)
+        t_left = samples.t[left]
+        t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])
+        piece_fresh = samples.piece[left]
+
+        points = self.evaluate(samples.curve[piece_fresh], t_fresh)
+        mine = (samples.piece, samples.t, samples.points)
+        piece, t, points = insert(left + 1, mine, (piece_fresh, t_fresh, points))
+        return Samples(piece, t, points, samples.curve)

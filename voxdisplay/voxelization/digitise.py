@@ -1,0 +1,197 @@
+"""From curves to sequences, in batches: sample, trace, thin, close, prove, hand out.
+
+This module only puts the steps in order; it must not know how they are done.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from operator import attrgetter
+from time import perf_counter
+
+import numpy as np
+
+from voxdisplay.compute import kernel_backend, parallel
+from voxdisplay.compute.array_types import Ints
+from voxdisplay.curves.curve import Curve
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelization.adaptive_sampling import cut_at_jumps, first_look, settle
+from voxdisplay.voxelization.certify import Certificate, certify
+from voxdisplay.voxelization.curve_batch import Batch, Samples
+from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose, see
+from voxdisplay.voxelization.grid_plane import trace, trace_everything
+from voxdisplay.voxelization.loop_closing import close_loop
+from voxdisplay.voxelization.restoring import mend
+from voxdisplay.voxelization.sequence import Sequence
+from voxdisplay.voxelization.thinning import reduce
+from voxdisplay.voxelization.voxel_events import Events
+
+# Curves handled at once: enough to forget what a batch costs, but not many if they are long. So
+# many voxels may be in hand on all processors together.
+CURVES = 4096
+VOXELS = 2_000_000
+# Batches for each processor until it is seen whether the curves are still as long, and the fastest
+# has to wait for the others.
+BATCHES = 8
+# Ends this near to each other, in voxels, are one point, if the curve does not say.
+TOUCH = 1e-3
+
+ONE_PIECE = np.zeros(1, dtype=np.int64)
+ONE_PIECE.flags.writeable = False
+
+
+def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
+    """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
+    curves = list(curves)
+    sequences: list[Sequence] = []
+
+    def one_batch(low: int, size: int) -> list[Sequence]:
+        batch = Batch(curves[low : low + size], low if len(curves) > 1 else None)
+        ahead = (len(curves) - low) / len(batch.curves)
+        return _digitise(batch, ahead, certified=certified)
+
+    size, batches = 16, 1
+    while (begin := len(sequences)) < len(curves):
+        end = min(begin + size * batches, len(curves))
+        # Many short array operations in numpy would only wait for each other.
+        apart = kernel_backend.in_use() and all(map(attrgetter("reentrant"), curves[begin:end]))
+        do = parallel.in_order if apart else map
+        for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
+            sequences += fresh
+        voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
+        at_once = parallel.processors()
+        batches = at_once * (BATCHES if apart else 1)
+        size = min(CURVES, VOXELS // at_once * (end - begin) // voxels + 1)
+    return sequences
+
+
+def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
+    begin = perf_counter()
+    samples = settle(batch, first_look(batch))
+    kernel_backend.prepare(samples.t.size, ahead)
+    boxes = enclose(batch, samples) if certified else None
+    if boxes:
+        samples = settle(batch, see(batch, samples, boxes))
+    samples = cut_at_jumps(batch, samples)
+    traced = trace(batch, samples)
+    events = reduce(traced, samples, tips=certified)
+    closed = _closed(batch, samples)
+    starts = _starts(events)
+    voxels, t = np.ascontiguousarray(events.voxels.T), events.t
+    voxels.flags.writeable = t.flags.writeable = False
+    # Curve i has the pieces of[i] to of[i + 1], which begin and end at these of the bounds.
+    of = np.searchsorted(samples.curve[events.piece[starts]], np.arange(len(batch.curves) + 1))
+    bounds = np.append(starts, len(voxels))[of].tolist()
+    single = (np.diff(of) == 1).tolist()
+    seconds = (perf_counter() - begin) / len(voxels)
+    spans = zip(batch.curves, bounds, bounds[1:], strict=False)
+    if not boxes and all(single) and not any(closed):  # as most are
+        with _nothing_to_collect():
+            return [
+                Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
+                for curve, a, b in spans
+            ]
+    sequences = []
+    for index, (curve, low, high) in enumerate(spans):
+        begin = perf_counter()
+        own_voxels, own_t = voxels[low:high], t[low:high]
+        closes = closed[index] and single[index]
+        if closes:
+            thin = events.take(np.arange(low, high))
+            loop = close_loop(thin, curve.position, batch.last[index])
+            own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
+            own_voxels.flags.writeable = own_t.flags.writeable = False
+        spent = seconds * len(own_voxels) + perf_counter() - begin
+        own_starts = starts[of[index] : of[index + 1]] - low
+        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
+        if boxes:
+            thin = events.take(np.arange(low, high))
+            sequence = _proven(batch, sequence, boxes, index, thin, traced)
+            spent = seconds * len(sequence) + perf_counter() - begin
+            sequence = replace(sequence, seconds=spent)
+        sequences.append(sequence)
+    return sequences
+
+
+@contextmanager
+def _nothing_to_collect() -> Iterator[None]:
+    """Keep Python from looking for garbage while many objects are made, all of which stay.
+
+    With every so many it would go through all there are. If its collector is off, that stays so.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    try:
+        gc.disable()  # in here: an interrupt may come as soon as that is done
+        yield
+    finally:
+        gc.enable()
+
+
+def _proven(
+    batch: Batch, sequence: Sequence, boxes: Boxes, index: int, thin: Events, traced: Events
+) -> Sequence:
+    """Give the sequence with its proof, mended if need be, or with what is in the way of one."""
+    if index in boxes.doubts:
+        return replace(sequence, proof=boxes.doubts[index])
+    if len(sequence.starts) > 1:
+        return replace(sequence, proof="the curve jumps")
+    own = boxes.of_curve(index)
+    ends = boxes.t_lo[own], boxes.t_hi[own]
+    box = boxes.low[:, own], boxes.high[:, own]
+    curve, closed = sequence.curve, sequence.closed
+    proof = certify(curve, ends, box, sequence.voxels, sequence.t, closed=closed)
+    for again in (False, True):
+        if isinstance(proof, Certificate):
+            break
+        if again:
+            t = np.append(ends[0], ends[1][-1])
+            of = np.full(t.size, index)
+            points = batch.evaluate(of, t)
+            samples = Samples(np.zeros_like(of), t, points, np.array([index]))
+            full = trace_everything(batch, samples)
+            thin = reduce(full, samples, tips=True)
+        else:
+            full = traced.take(traced.piece == thin.piece[0])
+        mended = mend(thin, full, ends, box, closed=closed)
+        voxels = np.ascontiguousarray(mended.voxels.T)
+        voxels.flags.writeable = mended.t.flags.writeable = False
+        second = certify(curve, ends, box, voxels, mended.t, closed=closed)
+        if isinstance(second, Certificate):
+            return replace(sequence, voxels=voxels, t=mended.t, proof=second)
+    return replace(sequence, proof=proof)
+
+
+def _starts(events: Events) -> Ints:
+    """Find where pieces begin. A gap that could not be bridged is a jump like any other."""
+    ends = np.flatnonzero(events.piece[1:] != events.piece[:-1])
+    gaps = events.gaps()
+    ends = np.sort(np.concatenate((ends, gaps))) if gaps.size else ends
+    return np.concatenate(([0], ends + 1))
+
+
+def _closed(batch: Batch, samples: Samples) -> list[bool]:
+    """Tell which curves are closed, and stop at those that only say so."""
+    first = samples.curve_starts(len(batch.curves))
+    last = np.append(first[1:], samples.t.size) - 1
+    apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
+    closed: list[bool] = (apart <= TOUCH).tolist()
+    for index in np.flatnonzero(apart <= TOUCH).tolist():
+        own = samples.points[:, first[index] : last[index] + 1]
+        closed[index] = bool(np.abs(own - own[:, :1]).max() > TOUCH)  # a mere point is not
+    told = [(at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None]
+    for index, says in told:
+        ends = samples.points[:, [first[index], last[index]]]
+        closed[index] = says
+        if says and (np.abs(np.diff(np.floor(ends))) > 1).any():
+            raise CurveError(
+                f"{batch.name(index)}the curve is said to be closed, but its ends are "
+                f"{apart[index]:.6g} voxels apart",
+                hint="leave out `closed`, or complete the curve",
+            )
+    return closed

@@ -1,0 +1,197 @@
+"""Boxes around curves: what is proven to be in them, and what was overlooked without them.
+
+Samples say nothing about what a curve does between them, however many there are; bounds of its
+formula do. Here the range of t is cut until each interval's part of the curve is proven to be in
+a small box (`Curve.enclosure`). Knows neither voxels nor how bounds are found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.voxelization.curve_batch import AXES, Batch, Samples
+from voxdisplay.voxelization.index_ranges import spread
+
+# Boxes are narrower than this on every axis, in voxels.
+WIDTH = 1.0
+# A part of the curve that may be further than this from the straight line between two samples, in
+# voxels along an axis, was overlooked: samples are put in.
+ASIDE = 0.5
+# More boxes than this for one curve are not worth their proof.
+MOST_BOXES = 2_000_000
+# Intervals of which nothing is known lie around single parameters; as many as these, beside those
+# that a curve has to begin with, are a stretch without values, which cutting cannot settle.
+MOST_UNKNOWN = 4096
+# Into how many parts an interval is cut at once, at most.
+PARTS = 16
+# Intervals whose bounds are found at once: what is computed stays in a core's cache.
+CALL = 1 << 12
+
+
+@dataclass(frozen=True, slots=True)
+class Boxes:
+    """Boxes that hold curves, each from one parameter to another.
+
+    Attributes
+    ----------
+    curve : (n,) int64 array
+        Whose, ascending.
+    step : (n,) int64 array
+        The sample before each.
+    t_lo, t_hi : (n,) float64 arrays
+        Ascending along a curve. If there is no doubt about it, its range without a gap.
+    low, high : (3, n) float64 arrays
+        Bounds of P(t), t_lo <= t <= t_hi, in voxels.
+    doubts : dict of int to str
+        The curves of which not all is in boxes: why.
+
+    """
+
+    curve: Ints
+    step: Ints
+    t_lo: Floats
+    t_hi: Floats
+    low: Floats
+    high: Floats
+    doubts: dict[int, str]
+
+    def of_curve(self, index: int) -> slice:
+        """Find the boxes of a curve."""
+        return slice(*np.searchsorted(self.curve, (index, index + 1)))
+
+
+def enclose(batch: Batch, samples: Samples) -> Boxes:
+    """Put curves into boxes narrower than ``WIDTH``.
+
+    Parameters
+    ----------
+    batch : Batch
+        The curves.
+    samples : Samples
+        Where to cut first; not yet cut at jumps, so that pieces are curves.
+
+    """
+    doubts = {
+        index: "the curve is a function whose inside is not known"
+        for index, curve in enumerate(batch.curves)
+        if curve.enclosure(batch.first[index : index + 1], batch.first[index : index + 1]) is None
+    }
+    step = np.flatnonzero(samples.joined)
+    step = step[_certain(samples.piece[step], doubts)]
+    chord = np.abs(samples.points[:, step + 1] - samples.points[:, step]).max(axis=0, initial=0.0)
+    # As long as bounds are tight, that many boxes are needed.
+    parts = np.clip(np.ceil(1.05 * chord / WIDTH), 1, PARTS).astype(np.int64)
+    step, t_lo, t_hi = _cut(step, samples.t[step], samples.t[step + 1], parts)
+    settled = []
+    most_unknown = np.bincount(samples.piece[step], minlength=len(batch.curves)) + MOST_UNKNOWN
+    count = np.zeros(len(batch.curves), dtype=np.int64)
+    while step.size:
+        curve = samples.piece[step]
+        low, high = _bounds(batch, curve, t_lo, t_hi)
+        with np.errstate(all="ignore"):
+            width = (high - low).max(axis=0)
+        good = width < WIDTH  # and so not where nothing is known
+        settled.append((step[good], t_lo[good], t_hi[good], low[:, good], high[:, good]))
+        count += np.bincount(curve[good], minlength=count.size)
+        possible = np.floor((t_hi - t_lo) / batch.resolution[curve])
+        stuck = ~good & (possible < 2)
+        for at in np.flatnonzero(stuck)[::-1].tolist():  # of several, the first is named
+            axis = AXES[int(np.argmin(high[:, at] - low[:, at] < WIDTH))]
+            doubts[int(curve[at])] = (
+                f"{axis} may jump, or have no value, near t = {float(t_lo[at])!r}"
+            )
+        left = ~good & _certain(curve, doubts)
+        parts = np.where(np.isnan(width), 2, np.clip(1.1 * width / WIDTH, 2, PARTS))
+        parts = np.minimum(np.ceil(parts), possible)[left].astype(np.int64)
+        count_next = count + np.bincount(curve[left], parts, count.size).astype(np.int64)
+        for index in np.flatnonzero(count_next > MOST_BOXES).tolist():
+            doubts[index] = f"more than {MOST_BOXES} boxes would be needed"
+        unknown = np.bincount(curve[left], np.isnan(width[left]), count.size)
+        for index in np.flatnonzero(unknown > most_unknown).tolist():
+            near = float(t_lo[left][(curve[left] == index) & np.isnan(width[left])][0])
+            doubts[index] = f"there may be no curve at all near t = {near!r}"
+        on = _certain(curve[left], doubts)
+        step, t_lo, t_hi = _cut(step[left][on], t_lo[left][on], t_hi[left][on], parts[on])
+    if not settled:
+        nothing = np.empty(0)
+        rows = np.empty((3, 0))
+        return Boxes(step, step, nothing, nothing, rows, rows, doubts)
+    step, t_lo, t_hi = (np.concatenate([found[i] for found in settled]) for i in (0, 1, 2))
+    low, high = (np.concatenate([found[i] for found in settled], axis=1) for i in (3, 4))
+    order = np.lexsort((t_lo, step))
+    step = step[order]
+    return Boxes(
+        samples.piece[step], step, t_lo[order], t_hi[order], low[:, order], high[:, order], doubts
+    )
+
+
+def _certain(curve: Ints, doubts: dict[int, str]) -> Bools:
+    return ~np.isin(curve, list(doubts)) if doubts else np.ones(curve.size, dtype=bool)
+
+
+def _cut(step: Ints, t_lo: Floats, t_hi: Floats, parts: Ints) -> tuple[Ints, Floats, Floats]:
+    """Cut intervals into equal parts, which share their ends to the last bit."""
+    nth = spread(np.zeros_like(parts), parts)
+    step, t_lo, t_hi = np.repeat(step, parts), np.repeat(t_lo, parts), np.repeat(t_hi, parts)
+    parts = np.repeat(parts, parts)
+    begin = t_lo + (t_hi - t_lo) * (nth / parts)
+    end = np.where(nth + 1 == parts, t_hi, t_lo + (t_hi - t_lo) * ((nth + 1) / parts))
+    return step, begin, end
+
+
+def _bounds(batch: Batch, curve: Ints, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+    low, high = np.empty((3, t_lo.size)), np.empty((3, t_lo.size))
+    order = np.argsort(curve, kind="stable")
+    edges = np.flatnonzero(np.diff(curve[order])) + 1
+    with np.errstate(all="ignore"):
+        for start, stop in pairwise([0, *edges.tolist(), curve.size]):
+            enclosure = batch.curves[curve[order[start]]].enclosure
+            for begin in range(start, stop, CALL):
+                some = order[begin : min(begin + CALL, stop)]
+                box = enclosure(t_lo[some], t_hi[some])
+                if box is not None:
+                    low[:, some], high[:, some] = box
+    return low, high
+
+
+def see(batch: Batch, samples: Samples, boxes: Boxes) -> Samples:
+    """Put samples where the curve may be elsewhere than the samples there are suggest.
+
+    Parameters
+    ----------
+    batch : Batch
+        The curves.
+    samples : Samples
+        Those that the boxes were made with.
+    boxes : Boxes
+
+    Returns
+    -------
+    Samples
+        The same, and more in the steps that have boxes ``ASIDE``: at the ends of all of these
+        steps' boxes. Between two of them the curve moves by less than ``WIDTH``.
+
+    """
+    before, after = boxes.step, boxes.step + 1
+    begin, way = samples.points[:, before], np.diff(samples.points, axis=1)[:, before]
+    t, h = samples.t[before], samples.t[after] - samples.t[before]
+    ends = [begin + way * ((each - t) / h) for each in (boxes.t_lo, boxes.t_hi)]
+    under = np.minimum(*ends) - boxes.low
+    over = boxes.high - np.maximum(*ends)
+    aside = np.maximum(under, over).max(axis=0) > ASIDE
+    wild = np.zeros(samples.t.size, dtype=bool)
+    wild[before[aside]] = True
+    fresh = np.flatnonzero(wild[before] & (boxes.t_lo > t))
+    if not fresh.size:
+        return samples
+    at, t_fresh, curve = after[fresh], boxes.t_lo[fresh], boxes.curve[fresh]
+    return Samples(
+        np.insert(samples.piece, at, curve),
+        np.insert(samples.t, at, t_fresh),
+        np.insert(samples.points, at, batch.evaluate(curve, t_fresh), axis=1),
+        samples.curve,
+    )

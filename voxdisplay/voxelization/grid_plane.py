@@ -1,0 +1,170 @@
+"""Grid-plane intersection digitisation: from curves to voxels that lie along them.
+
+The method of Klette and Rosenfeld, *Digital Geometry* (2004), sections 2.3.5 and 11.1.1: a curve
+is drawn with the voxel centres nearest to where it crosses the mid-planes x_a = i + 1/2, the
+planes through the voxel centres. Why this holds for any continuous curve:
+
+Mid-planes cut space into dual cells, unit cubes with a voxel centre at each of the 8 corners. A
+crossing lies on a face of such a cell and is given the nearest of the face's corners, at most
+sqrt(1/2) away. Between two consecutive crossings the curve stays in one closed cell, so that
+their voxels are two of its corners: equal or 26-adjacent.
+
+Crossings of all planes give more voxels than needed. Where one axis dominates, its planes alone
+do, and of a face's corners the one nearest to the *line* through the crossing is better than the
+one nearest to the point. Both are liberties: where they tear the sequence, they are taken back.
+
+This module ends with connected events; thinning them out is ``reduce.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.voxelization.adaptive_sampling import refine
+from voxdisplay.voxelization.curve_batch import Batch, Samples
+from voxdisplay.voxelization.index_ranges import insert
+from voxdisplay.voxelization.plane_crossings import NUDGE, Crossings, dominant_crossings
+from voxdisplay.voxelization.root_finding import cross
+from voxdisplay.voxelization.voxel_events import OTHER, Events, Voxels, near
+
+# Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
+# Below 1 a step passes at most one plane of an axis; each further try is a finer look.
+LOOKS = (0.7, 0.35, 0.17, 0.08)
+# Where curves are sampled at first between two such events: so closely that hardly a crossing
+# needs a second guess.
+EIGHTHS = np.linspace(0.0, 1.0, 9)
+
+
+def trace(batch: Batch, knots: Samples) -> Events:
+    """Follow curves through the mid-planes.
+
+    Parameters
+    ----------
+    batch : Batch
+        The curves.
+    knots : Samples
+        Points along them, in connected pieces.
+
+    Returns
+    -------
+    Events
+        For every piece: the voxel of its first point, voxels of crossings, the voxel of its last
+        point. Consecutive ones are 26-adjacent or equal. All but the ends of a piece are within
+        0.7072 of the curve, those within 0.8661.
+
+    """
+    crossings = dominant_crossings(batch, knots)
+    events = choose_corners(crossings, knots)
+    return _bridge_gaps(batch, events, knots.curve)
+
+
+def trace_everything(batch: Batch, samples: Samples) -> Events:
+    """Follow curves through all mid-planes they pass between samples: as `trace`, but slowly.
+
+    Where a curve wriggles across its own way, the axis that changes most hides the others.
+    """
+    samples = refine(batch, samples, LOOKS[0])
+    piece, t, voxels = _all_crossings(batch, samples)
+    inner = Events(piece.astype(np.int32), t, voxels, np.full(t.size, OTHER))
+    crossings = Crossings(inner, voxels, np.full(t.size, np.inf))
+    return _bridge_gaps(batch, _with_ends(crossings, samples).events, samples.curve)
+
+
+def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
+    """Put the voxels of each piece's first and last point around its crossings."""
+    inner, bounds = crossings.events, knots.bounds
+    ends = bounds.repeat(2)[1:-1]
+    ends[1::2] -= 1
+    piece = knots.piece[ends].astype(np.int32)
+    around = inner.piece.searchsorted(np.arange(bounds.size))
+    at = around.repeat(2)[1:-1]
+
+    voxels = np.floor(knots.points.take(ends, axis=1)).astype(np.int32)
+    heading, gain = np.full(ends.size, OTHER), np.full(ends.size, np.inf)
+    *events, better, gain = insert(
+        at,
+        (inner.piece, inner.t, inner.voxels, inner.heading, crossings.better, crossings.gain),
+        (piece, knots.t[ends], voxels, heading, voxels, gain),
+    )
+    return Crossings(Events(*events), better, gain)
+
+
+@twin
+def choose_corners(crossings: Crossings, knots: Samples) -> Events:
+    """Prefer the better corners where neighbours stay neighbours; ends of pieces are added."""
+    crossings = _with_ends(crossings, knots)
+    events, better, gain = crossings.events, crossings.better, crossings.gain
+    nearest = events.voxels
+    gaps = events.gaps()
+    gain[gaps] = gain[gaps + 1] = np.inf  # what bridges a gap counts on the nearest corners
+    voxels = np.where(np.isfinite(gain), better, nearest)
+    bridged = np.zeros(events.t.size + 1, dtype=bool)
+    bridged[gaps] = True
+    torn = events.with_voxels(voxels).gaps()
+    while (torn := torn[~bridged[torn]]).size:
+        # Of two that fall apart, the one that gains less goes back: at least one has moved.
+        back = np.unique(np.where(gain[torn] <= gain[torn + 1], torn, torn + 1))
+        gain[back] = np.inf
+        voxels[:, back] = nearest[:, back]
+        look = np.unique(np.concatenate((back - 1, back)))
+        look = look[(look >= 0) & (look < events.t.size - 1)]
+        look = look[events.piece[look] == events.piece[look + 1]]
+        torn = look[~near(voxels[:, look], voxels[:, look + 1])]
+    return events.with_voxels(voxels)
+
+
+def _bridge_gaps(batch: Batch, events: Events, curve: Ints) -> Events:
+    """Fill in the crossings of all planes where consecutive voxels are not neighbours."""
+    for look in LOOKS:
+        gaps = events.gaps()
+        if not gaps.size:
+            return events
+        samples = _samples_between(batch, events, gaps, curve, look)
+        gap, t, voxels = _all_crossings(batch, samples)
+        events = _fill(events, gaps, gap, t, voxels)
+    gaps = events.gaps()
+    if gaps.size:
+        # Rough down to the resolution of t: draw with the voxels that hold the samples.
+        samples = _samples_between(batch, events, gaps, curve, LOOKS[-1])
+        voxels = np.floor(samples.points).astype(np.int32)
+        events = _fill(events, gaps, samples.piece, samples.t, voxels)
+    return events
+
+
+def _samples_between(
+    batch: Batch, events: Events, gaps: Ints, curve: Ints, longest: float
+) -> Samples:
+    """Sample the curves from event k to k + 1 for each k in ``gaps``; a "piece" is one gap."""
+    begin, end = events.t[gaps, None], events.t[gaps + 1, None]
+    t = ((1 - EIGHTHS) * begin + EIGHTHS * end).ravel()
+    gap = np.arange(gaps.size).repeat(EIGHTHS.size)
+    of_gap = curve[events.piece[gaps]]
+    points = batch.evaluate(of_gap[gap], t)
+    return refine(batch, Samples(gap, t, points, of_gap), longest)
+
+
+def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
+    """Find the crossings of mid-planes of all axes, in order: piece, t and nearest voxel."""
+    cells = np.floor(samples.points - 0.5)
+    passed = np.abs(cells[:, 1:] - cells[:, :-1]) == 1
+    step, axis = (passed & samples.joined).T.nonzero()
+    at = axis * samples.t.size + step  # of flat rows
+    level = np.maximum(cells.take(at), cells.take(at + 1)) + 0.5
+    piece = samples.piece[step]
+    bracket = samples.t[step], samples.t[step + 1]
+    ends = samples.points.take(at) - level, samples.points.take(at + 1) - level
+    t, points, found = cross(batch, samples.curve[piece], axis, level, bracket, ends)
+    voxels = np.floor(points + NUDGE)
+    voxels[axis, np.arange(axis.size)] = level - 0.5
+    order = np.lexsort((t, piece))
+    order = order[found[order]]
+    return piece[order], t[order], voxels.take(order, axis=1).astype(np.int32)
+
+
+def _fill(events: Events, gaps: Ints, gap: Ints, t: Floats, voxels: Voxels) -> Events:
+    """Insert voxels into gaps: ``gap`` says into which."""
+    at = gaps[gap]
+    other = Events(events.piece[at], t, voxels, np.full(t.size, OTHER))
+    return events.insert(at + 1, other)

@@ -1,0 +1,51 @@
+"""Index arithmetic for arrays that hold many ranges, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.compute.array_types import Ints
+from voxdisplay.compute.kernel_backend import twin
+
+Arrays = tuple[NDArray[Any], ...]
+
+
+def spread(low: Ints, count: Ints) -> Ints:
+    """Write out ranges: low, low + 1, ... ``count`` numbers for each."""
+    end: Ints = count.cumsum()
+    total = int(end[-1]) if end.size else 0
+    return np.asarray((low - (end - count)).repeat(count) + np.arange(total))
+
+
+def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
+    """Cut [0, stop) into blocks of about ``size``.
+
+    Cuts are made at ``starts``, where curves begin, and at multiples of ``size`` from there, so
+    that a curve is cut in the same places whatever comes before it.
+    """
+    edges = np.append(starts, stop)
+    begin = 0
+    while begin < stop:
+        end = int(edges[np.searchsorted(edges, begin + size, side="right") - 1])
+        end = end if end > begin else begin + size
+        yield begin, end
+        begin = end
+
+
+@twin
+def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
+    """Put columns between those of arrays, (M,) or (3, M): before the ones ``at``, ascending."""
+    size = arrays[0].shape[-1]
+    old = np.ones(size + at.size, dtype=bool)
+    new = at + np.arange(at.size)
+    old[new] = False
+    order = np.cumsum(old) - 1  # columns of the array, then of what is fresh
+    order[new] = np.arange(size, old.size)
+    return tuple(
+        np.concatenate((array, other), axis=-1).take(order, axis=-1)
+        for array, other in zip(arrays, fresh, strict=True)
+    )

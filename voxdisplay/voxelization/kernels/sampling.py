@@ -1,0 +1,252 @@
+"""From samples to the voxels of crossings: the twins of `knots` and `crossings`.
+
+Several threads may be in them at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.compute.kernel_backend import jit
+from voxdisplay.voxelization.adaptive_sampling import AMPLY, BEND, CHORD, PARTS
+from voxdisplay.voxelization.curve_batch import Samples
+from voxdisplay.voxelization.kernels.contiguous import Bytes, packed
+from voxdisplay.voxelization.plane_crossings import MARGIN, NUDGE, Aims, Corners
+from voxdisplay.voxelization.voxel_events import Voxels
+
+Limits = tuple[float, float, float, float]
+
+TINY = float(np.finfo(float).tiny)
+
+
+def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+    """See `knots.needed_parts`."""
+    points, limits = packed(samples.points), (CHORD, BEND, AMPLY, float(PARTS))
+    return _needed_parts(samples.piece, samples.t, points, resolution[samples.curve], limits)
+
+
+@jit
+def _most(a: float, b: float) -> float:
+    """Give the larger, or the one that is not a number, as numpy does."""
+    return a if a >= b or a != a else b  # noqa: PLR0124 - that is how to tell
+
+
+@jit
+def _parts(h: float, chord: float, second: float, resolution: float, limits: Limits) -> int:
+    most_chord, most_bend, amply, most_parts = limits
+    bend = h * h * second / 4
+    if (chord <= 0.99 * most_chord) & (bend <= 0.99 * most_bend):
+        return 1
+    wanted = _most(chord / most_chord, np.sqrt(bend / most_bend))
+    if not wanted > 1:  # or not a number
+        return 1
+    return max(int(min(np.ceil(amply * wanted), np.floor(h / resolution), most_parts)), 1)
+
+
+@jit
+def _needed_parts(
+    piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: Limits
+) -> tuple[Ints, Floats]:
+    size = t.size
+    parts, chord = np.ones(size - 1, dtype=np.int64), np.zeros(size - 1)
+    # Of the step before: its turn into this one is known only now.
+    before_x = before_y = before_z = before_h = before_turn = 0.0
+    inside = False
+    for k in range(size - 1):
+        joined = piece[k] == piece[k + 1]
+        h = x = y = z = turn = 0.0
+        if joined:
+            h = t[k + 1] - t[k]
+            x = points[0, k + 1] - points[0, k]
+            y = points[1, k + 1] - points[1, k]
+            z = points[2, k + 1] - points[2, k]
+            chord[k] = _most(_most(abs(x), abs(y)), abs(z))
+            x, y, z = x / h, y / h, z / h
+            if inside:
+                turn = _most(_most(abs(x - before_x), abs(y - before_y)), abs(z - before_z))
+                turn /= h + before_h
+        if inside:
+            second = _most(before_turn, turn)
+            parts[k - 1] = _parts(before_h, chord[k - 1], second, resolution[piece[k]], limits)
+        inside, before_h, before_turn = joined, h, turn
+        before_x, before_y, before_z = x, y, z
+    if inside:
+        at = size - 2
+        parts[at] = _parts(before_h, chord[at], before_turn, resolution[piece[at]], limits)
+    return parts, chord
+
+
+def slopes_at(knots: Samples) -> Floats:
+    """See `crossings.slopes_at`."""
+    return _slopes_at(knots.piece, knots.t, packed(knots.points))
+
+
+@jit
+def _slopes_at(piece: Ints, t: Floats, points: Floats) -> Floats:
+    size = t.size
+    slopes, velocity = np.zeros_like(points), np.empty(0)
+    first = 0
+    while first < size:
+        last = first
+        while last + 1 < size and piece[last + 1] == piece[first]:
+            last += 1
+        steps, times = last - first, t[first : last + 1]
+        if steps > velocity.size:
+            velocity = np.empty(steps)
+        for axis in range(3):
+            row, slope = points[axis, first : last + 1], slopes[axis, first : last + 1]
+            for k in range(steps):
+                velocity[k] = (row[k + 1] - row[k]) / (times[k + 1] - times[k])
+            for k in range(1, steps):
+                h, h_next = times[k] - times[k - 1], times[k + 1] - times[k]
+                slope[k] = (velocity[k - 1] * h_next + velocity[k] * h) / (h_next + h)
+            if steps == 1:
+                slope[0] = slope[1] = velocity[0]
+            elif steps:
+                slope[0] = 2 * velocity[0] - slope[1]
+                slope[steps] = 2 * velocity[steps - 1] - slope[steps - 1]
+        first = last + 1
+    return slopes
+
+
+def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
+    """See `crossings.aim`."""
+    points = packed(knots.points)
+    return Aims(*_aim(knots.piece, knots.t, points, packed(slopes), low, high, NUDGE))
+
+
+@jit
+def _monotone(slope: float) -> float:
+    return slope if 0 < slope < 3 else 1.0
+
+
+@jit
+def _aim(
+    piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int, nudge: float
+) -> tuple[Ints, Bytes, Bools, Floats, Floats, Floats]:
+    stop = min(high, t.size - 1)
+    # The steps that pass planes, of which axis, how many.
+    step, dominant = np.empty(stop - low + 1, dtype=np.int64), np.empty(stop - low + 1, np.int8)
+    planes = np.empty(stop - low + 1)
+    count, total = 0, 0.0
+    px, py, pz = points[0, low : stop + 1], points[1, low : stop + 1], points[2, low : stop + 1]
+    of = piece[low : stop + 1]
+    for k in range(stop - low):
+        x, y, z = px[k + 1] - px[k], py[k + 1] - py[k], pz[k + 1] - pz[k]
+        x, y, z = abs(x) * (1 + nudge), abs(y), abs(z) * (1 - nudge)
+        if (x >= y) & (x >= z):
+            axis, begin, end = 0, px[k], px[k + 1]
+        elif y >= z:
+            axis, begin, end = 1, py[k], py[k + 1]
+        else:
+            axis, begin, end = 2, pz[k], pz[k + 1]
+        passed = np.floor(end - 0.5) - np.floor(begin - 0.5)
+        if of[k] != of[k + 1]:
+            passed = 0.0
+        step[count], dominant[count], planes[count] = low + k, axis, passed
+        count += passed != 0
+        total += abs(passed)
+    size = int(total)
+    knot, axes = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int8)
+    descends = np.empty(size, dtype=np.bool_)
+    levels, taus, times = np.empty(size), np.empty(size), np.empty(size)
+    at = 0
+    for nth in range(count):
+        k, axis, passed = step[nth], dominant[nth], planes[nth]
+        h = t[k + 1] - t[k]
+        begin = points[axis, k]
+        length = points[axis, k + 1] - begin
+        m_left = _monotone(length / (slopes[axis, k] * h))
+        m_right = _monotone(length / (slopes[axis, k + 1] * h))
+        sense = 1.0 if passed > 0 else -1.0
+        first = np.floor(begin - 0.5) + (1.5 if passed > 0 else 0.5)
+        for plane in range(int(abs(passed))):
+            level = first + sense * plane
+            u = (level - begin) / length
+            rest = 1.0 - u
+            tau = u * (u * (3 - 2 * u) + rest * (m_left * rest - m_right * u))
+            knot[at], axes[at], descends[at] = k, axis, passed < 0
+            levels[at], taus[at] = level, tau
+            times[at] = min(max(t[k] + tau * h, t[k]), t[k + 1])
+            at += 1
+    return knot, axes, descends, levels, taus, times
+
+
+def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
+    """See `crossings.corners`."""
+    aimed = aims.knot, aims.axis, aims.level, aims.tau
+    return Corners(*_corners(knots.t, packed(slopes), *aimed, packed(points), NUDGE, MARGIN))
+
+
+@jit
+def _between(begin: float, end: float, share: float) -> float:
+    return begin + share * (end - begin)
+
+
+@jit
+def _dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> float:
+    return ax * bx + ay * by + az * bz
+
+
+@jit
+def _corners(
+    t: Floats,
+    slopes: Floats,
+    knot: Ints,
+    axes: Bytes,
+    level: Floats,
+    tau: Floats,
+    points: Floats,
+    nudge: float,
+    margin: float,
+) -> tuple[Voxels, Voxels, Floats, Floats]:
+    size = knot.size
+    nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
+    gain, foot = np.full(size, np.inf), np.full(size, np.inf)
+    for k in range(size):
+        left, axis, share, plane = knot[k], axes[k], tau[k], level[k] - 0.5
+        h = t[left + 1] - t[left]
+        x, y, z = points[0, k], points[1, k], points[2, k]
+        corner_x = plane if axis == 0 else np.floor(x + nudge)
+        corner_y = plane if axis == 1 else np.floor(y + nudge)
+        corner_z = plane if axis == 2 else np.floor(z + nudge)
+        apart_x, apart_y, apart_z = corner_x + 0.5 - x, corner_y + 0.5 - y, corner_z + 0.5 - z
+        along_x = _between(slopes[0, left] * h, slopes[0, left + 1] * h, share)
+        along_y = _between(slopes[1, left] * h, slopes[1, left + 1] * h, share)
+        along_z = _between(slopes[2, left] * h, slopes[2, left + 1] * h, share)
+        length = _most(np.sqrt(_dot(along_x, along_y, along_z, along_x, along_y, along_z)), TINY)
+        along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
+        project = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
+        # The two axes of the face.
+        first, second = (1 if axis == 0 else 0), (1 if axis == 2 else 2)
+        apart_1, apart_2 = (apart_y if axis == 0 else apart_x), (apart_y if axis == 2 else apart_z)
+        along_1, along_2 = (along_y if axis == 0 else along_x), (along_y if axis == 2 else along_z)
+        shift_1 = -along_1 if apart_1 > 0 else along_1
+        shift_2 = -along_2 if apart_2 > 0 else along_2
+        change_1 = 1.0 - 2.0 * abs(apart_1) - (2.0 * project + shift_1) * shift_1
+        change_2 = 1.0 - 2.0 * abs(apart_2) - (2.0 * project + shift_2) * shift_2
+        both = change_1 + change_2 - 2.0 * shift_1 * shift_2
+        best, move_1, move_2 = 0.0, False, False
+        if change_1 < best - margin:
+            best, move_1 = change_1, True
+        if change_2 < best - margin:
+            best, move_1, move_2 = change_2, False, True
+        if both < best - margin:
+            best, move_1, move_2 = both, True, True
+        nearest[0, k] = better[0, k] = int(corner_x)
+        nearest[1, k] = better[1, k] = int(corner_y)
+        nearest[2, k] = better[2, k] = int(corner_z)
+        if best < 0:
+            gain[k] = -best
+            step_1 = (-1 if apart_1 > 0 else 1) if move_1 else 0
+            step_2 = (-1 if apart_2 > 0 else 1) if move_2 else 0
+            better[first, k] += step_1
+            better[second, k] += step_2
+            apart_x += step_1 if axis != 0 else 0
+            apart_y += step_1 if axis == 0 else (step_2 if axis == 2 else 0)
+            apart_z += step_2 if axis != 2 else 0
+            if _dot(apart_x, apart_y, apart_z, apart_x, apart_y, apart_z) > 0.5:
+                reach = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
+                foot[k] = reach / length
+    return nearest, better, gain, foot

@@ -1,0 +1,326 @@
+"""The judge of a list of voxels: is it connected, and how far is it from its curve.
+
+Takes any (N, 3) array, wherever it comes from. It must not know how voxels are chosen and shares
+no code with the methods it judges: curves are sampled here anew, by bisection.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelization.index_ranges import spread
+from voxdisplay.voxelization.spatial_hash import COLUMNS, Cells
+
+Voxels = NDArray[np.integer]
+
+# The polyline in place of the curve: segments at most this long, with the curve's middle this
+# close to theirs (voxels). Distances do not depend on it; the search for candidates does.
+SEGMENT = 0.5
+SAG = 0.01
+# No distance is looked for along a polyline of more segments than this.
+MOST_SEGMENTS = 50_000_000
+# A candidate segment may be this much further away than the nearest, and hold the nearest point.
+SLACK = 4 * SAG
+GOLDEN = (5**0.5 - 1) / 2
+
+
+# ---------------------------------------------------------------------------- the voxels alone
+
+
+def gaps(voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None) -> Ints:
+    """Find where a sequence is torn.
+
+    Parameters
+    ----------
+    voxels : (N, 3) integer array
+        The sequence.
+    closed : bool
+        Whether the last voxel is followed by the first.
+    starts : (k,) integer array, optional
+        Where its pieces begin: nothing is joined there.
+
+    Returns
+    -------
+    (g,) int64 array
+        The i for which voxels i and i + 1 (N - 1 and 0) are neither 26-adjacent nor equal.
+
+    """
+    return np.flatnonzero(_joints(len(voxels), closed, starts) & ~_next_near(voxels))
+
+
+def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
+    """List where a sequence touches itself.
+
+    Parameters
+    ----------
+    voxels : (N, 3) integer array
+        The sequence.
+    closed : bool
+        Whether the last voxel is followed by the first.
+
+    Returns
+    -------
+    (c, 2) int64 array
+        All i < j of 26-adjacent or equal voxels with j - i > 1, cyclically if closed; ascending.
+
+    """
+    pairs = _touching(voxels)
+    distance = pairs[:, 1] - pairs[:, 0]
+    far = distance > 1
+    if closed:
+        far &= distance < len(voxels) - 1
+    pairs = pairs[far]
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def count_contacts(voxels: Voxels, *, closed: bool = False) -> int:
+    """Count the pairs that `contacts` would list, without listing them."""
+    total = 0
+    cells = Cells(voxels.T)
+    for offset in COLUMNS[:5]:
+        low, high = _later(cells, voxels, offset)
+        total += int((high - low).sum())
+    follow = _next_near(voxels)
+    if not closed or len(voxels) < 3:
+        follow = follow[:-1]
+    return total - int(np.count_nonzero(follow))
+
+
+def neighbour_violations(
+    voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None
+) -> Ints:
+    """Find the voxels that break the two-neighbour rule.
+
+    Parameters
+    ----------
+    voxels, closed, starts
+        As for `gaps`.
+
+    Returns
+    -------
+    (b,) int64 array
+        Indices of the voxels which do not have exactly two 26-neighbours in the sequence (the
+        ends of open pieces: one, a piece of one voxel: none). Every visit of a voxel counts.
+
+    """
+    size = len(voxels)
+    joint = _joints(size, closed, starts)
+    expected = joint.astype(np.int64) + np.roll(joint, 1)
+    if closed and size == 2:
+        expected[:] = 1
+    pairs = _touching(voxels)
+    return np.flatnonzero(np.bincount(pairs.reshape(-1), minlength=size) != expected)
+
+
+def _joints(size: int, closed: bool, starts: Voxels | None) -> Bools:
+    """Tell after which voxels, (N,), the next one must follow: the first after the last."""
+    joint = np.ones(size, dtype=bool)
+    if size:
+        joint[-1] = closed and size > 1
+    if starts is not None:
+        inner = np.asarray(starts, dtype=np.int64)
+        joint[inner[inner > 0] - 1] = False
+    return joint
+
+
+def _next_near(voxels: Voxels) -> Bools:
+    """Tell which voxels are near the next one, the first after the last."""
+    wide = voxels.astype(np.int64)
+    return np.asarray((np.abs(np.roll(wide, -1, axis=0) - wide) <= 1).all(axis=1))
+
+
+def _touching(voxels: Voxels) -> Ints:
+    """List all pairs i < j of 26-adjacent or equal voxels, (c, 2)."""
+    cells = Cells(voxels.T)
+    found = []
+    for offset in COLUMNS[:5]:
+        low, high = _later(cells, voxels, offset)
+        count = high - low
+        one = np.repeat(cells.order, count)
+        found.append(np.stack((one, cells.order[spread(low, count)]), axis=1))
+    return np.sort(np.concatenate(found), axis=1)
+
+
+def _later(cells: Cells, voxels: Voxels, offset: tuple[int, int]) -> tuple[Ints, Ints]:
+    """Look up the neighbours in a column; in a voxel's own column only those sorted after it."""
+    low, high = cells.column(voxels[cells.order].T, offset)
+    if offset == (0, 0):
+        low = np.arange(1, len(voxels) + 1)
+    return low, high
+
+
+# ------------------------------------------------------------------- the voxels and the curve
+
+
+def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> Floats:
+    """Measure how far voxel centres are from a curve.
+
+    Parameters
+    ----------
+    voxels : (N, 3) integer array
+        Any voxels; their centres are at + 1/2 (paper, equation 3).
+    curve : Curve
+        The curve, from P(a) to P(b).
+    hints : (n,) float64 array, optional
+        Parameters where to look, as well as everywhere: for features narrower than 1/256 of the
+        range of t. Distances are from the curve's points, whatever the hints.
+
+    Returns
+    -------
+    (N,) float64 array
+        Distance to the nearest point of the curve, in voxels, to about 1e-6: the nearest segments
+        of a fine polyline, then a golden-section search on the curve itself.
+
+    """
+    centres = np.asarray(voxels, dtype=float).T + 0.5
+    t, begin, solid = _polyline(curve, hints)
+    after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
+    t_end, end = t[after], begin[:, after]
+    middle = (begin + end) / 2
+    best = np.full(centres.shape[1], np.inf)
+    todo = np.arange(best.size)
+    size = 1.5
+    while todo.size:
+        cells = Cells(np.floor(middle / size))
+        for of, segment in cells.around(np.floor(centres[:, todo] / size)):
+            centre = centres[:, todo[of]]
+            rough = _from_segment(centre, begin[:, segment], end[:, segment])
+            voxel, nearest = _least(of, rough)
+            close = rough <= nearest[np.searchsorted(voxel, of)] + SLACK
+            arc = segment[close]
+            exact = _from_arc(curve, centre[:, close], t[arc], t_end[arc])
+            _, best[todo[voxel]] = _least(of[close], exact)
+        # Whatever was not looked at is further off than a cell, less half a segment.
+        todo = todo[best[todo] > size - SEGMENT / 2 - SLACK]
+        size *= 4
+    return best
+
+
+def coverage(voxels: Voxels, curve: Curve) -> float:
+    """Measure how far a curve gets away from the voxels that should show it.
+
+    Parameters
+    ----------
+    voxels : (N, 3) integer array
+        Any voxels.
+    curve : Curve
+        The curve.
+
+    Returns
+    -------
+    float
+        The largest distance of a point of the curve (of a fine polyline's vertices) from the
+        nearest voxel centre, in voxels; infinite if there are no voxels.
+
+    """
+    if not len(voxels):
+        return float("inf")
+    centres = np.asarray(voxels, dtype=float).T + 0.5
+    _, points, _ = _polyline(curve)
+    best = np.full(points.shape[1], np.inf)
+    todo = np.arange(best.size)
+    size = 1.5
+    while todo.size:
+        cells = Cells(np.floor(centres / size))
+        for of, voxel in cells.around(np.floor(points[:, todo] / size)):
+            apart = points[:, todo[of]] - centres[:, voxel]
+            point, nearest = _least(of, np.sqrt((apart * apart).sum(axis=0)))
+            best[todo[point]] = nearest
+        todo = todo[best[todo] > size]
+        size *= 4
+    return float(best.max())
+
+
+def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats, Bools]:
+    """Sample a curve finely, and at any hints.
+
+    Returns
+    -------
+    t : (n,) float64 array
+    points : (3, n) float64 array
+    solid : (n - 1,) bool array
+        False where the curve jumps from one sample to the next.
+
+    """
+    first, last = curve.t_range
+    resolution = 4 * float(np.spacing(max(abs(first), abs(last))))
+    t = np.union1d(np.linspace(first, last, 258), curve.breaks)
+    if hints is not None:
+        t = np.union1d(t, hints)
+    t = t[(t >= first) & (t <= last)]
+    points = _position(curve, t)
+    settled = np.zeros(t.size - 1, dtype=bool)
+    while not settled.all():
+        index = np.flatnonzero(~settled)
+        middle = (t[index] + t[index + 1]) / 2
+        there = _position(curve, middle)
+        length = points[:, index + 1] - points[:, index]
+        sag = there - (points[:, index] + points[:, index + 1]) / 2
+        fine = (length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT
+        fine &= (sag * sag).sum(axis=0) <= SAG * SAG
+        fine |= t[index + 1] - t[index] < resolution
+        t = np.insert(t, index + 1, middle)
+        points = np.insert(points, index + 1, there, axis=1)
+        settled = np.insert(settled, index, fine)
+        settled[index + np.arange(1, index.size + 1)] = fine
+        if t.size > MOST_SEGMENTS:
+            raise ValueError("the curve is too long or too rough to measure distances from it")
+    length = np.diff(points, axis=1)
+    return t, points, np.asarray((length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT)
+
+
+def _position(curve: Curve, t: Floats) -> Floats:
+    with np.errstate(all="ignore"):
+        points = np.asarray(curve.position(t), dtype=float)
+    good = np.isfinite(points).all(axis=0)
+    if not good.all():
+        raise ValueError(f"the curve has no point at t = {float(t[np.argmin(good)])!r}")
+    return points
+
+
+def _from_segment(point: Floats, begin: Floats, end: Floats) -> Floats:
+    """Distances, (n,), of points from segments, (3, n) each."""
+    along, apart = end - begin, point - begin
+    length = np.maximum((along * along).sum(axis=0), np.finfo(float).tiny)
+    share = np.clip((apart * along).sum(axis=0) / length, 0.0, 1.0)
+    apart -= share * along
+    return np.asarray(np.sqrt((apart * apart).sum(axis=0)))
+
+
+def _from_arc(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
+    """Least distances, (n,), of points (3, n) from P(t), low <= t <= high, one arc for each."""
+
+    def square(t: Floats) -> Floats:
+        apart = _position(curve, t) - point
+        return np.asarray((apart * apart).sum(axis=0))
+
+    best = np.minimum(square(low), square(high))
+    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_left, at_right = square(left), square(right)
+    for _ in range(16):
+        lower = at_left < at_right
+        low, high = np.where(lower, low, left), np.where(lower, right, high)
+        fresh = np.where(lower, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at_fresh = square(fresh)
+        left, right = np.where(lower, fresh, right), np.where(lower, left, fresh)
+        at_left, at_right = (
+            np.where(lower, at_fresh, at_right),
+            np.where(lower, at_left, at_fresh),
+        )
+    best = np.minimum(best, np.minimum(at_left, at_right))
+    # What is left of the arc is straight: drop a perpendicular on it.
+    here, there = _position(curve, low), _position(curve, high)
+    along = there - here
+    length = np.maximum((along * along).sum(axis=0), np.finfo(float).tiny)
+    share = np.clip(((point - here) * along).sum(axis=0) / length, 0.0, 1.0)
+    best = np.minimum(best, square(low + share * (high - low)))
+    return np.asarray(np.sqrt(best))
+
+
+def _least(group: Ints, values: Floats) -> tuple[Ints, Floats]:
+    """Give the groups there are, of an ascending list (n,), and the least value of each."""
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    return group[first], np.minimum.reduceat(values, first) if first.size else values

@@ -1,0 +1,315 @@
+"""Where curves pass the mid-planes of their dominant axis, and with which voxels to draw that.
+
+The bulk of the work is done here, in blocks, a constant number of array operations each. Nothing
+in this module looks at two crossings at once: whether the voxels hang together is
+``grid_plane.py``'s business.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.compute import parallel
+from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.voxelization.curve_batch import Batch, Samples
+from voxdisplay.voxelization.index_ranges import blocks, spread
+from voxdisplay.voxelization.root_finding import TOLERANCE, cross
+from voxdisplay.voxelization.voxel_events import Events, Voxels
+
+# Knot intervals handled at once: enough to forget what a call costs, few enough for what is
+# computed per crossing to stay in cache.
+BLOCK = 1 << 15
+# So many blocks are worth threads.
+MANY = 8
+# So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
+# the last bit, or lines along edges and diagonals waver.
+NUDGE = 1e-9
+# A corner must be better by this much, in square voxels, to be preferred to the nearest one.
+MARGIN = 1e-8
+
+Ends = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """Crossings of dominant mid-planes: ``events`` hold the nearest corners, ``better`` others.
+
+    ``gain`` (M,) says by how much, in square voxels, the corner in ``better`` (3, M) is nearer to
+    the tangent; infinite where there is no better one.
+    """
+
+    events: Events
+    better: Voxels
+    gain: Floats
+
+
+class Aims(NamedTuple):
+    """Where curves should cross the planes of the axis that changes most, one entry per plane."""
+
+    knot: Ints  # the last before it
+    axis: NDArray[np.int8]
+    descends: NDArray[np.bool_]
+    level: Floats  # of the plane: i + 1/2
+    tau: Floats  # where it is crossed, in steps between knots
+    t: Floats  # the parameter there
+
+
+class Corners(NamedTuple):
+    """Corners of the faces crossed, as the voxels they are the centres of: see `corners`."""
+
+    nearest: Voxels
+    better: Voxels
+    gain: Floats
+    foot: Floats
+
+
+def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
+    """Find all crossings between knots, along curves, of planes of the axis that changes most.
+
+    Their events are connected only where one axis goes on to dominate.
+    """
+    slopes = slopes_at(knots)
+
+    def crossings_of(block: tuple[int, int]) -> Crossings:
+        return _crossings_of(batch, knots, slopes, aim(knots, slopes, *block))
+
+    parts = [(0, knots.t.size)]
+    if knots.t.size > BLOCK:
+        parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
+    apart = len(parts) >= MANY and batch.reentrant
+    found = list((parallel.in_order if apart else map)(crossings_of, parts))
+    crossings = found[0]
+    if len(found) > 1:
+        events = Events(
+            np.concatenate([part.events.piece for part in found]),
+            np.concatenate([part.events.t for part in found]),
+            np.concatenate([part.events.voxels for part in found], axis=1),
+            np.concatenate([part.events.heading for part in found]),
+        )
+        better = np.concatenate([part.better for part in found], axis=1)
+        crossings = Crossings(events, better, np.concatenate([part.gain for part in found]))
+    events = crossings.events
+    # Several crossings of one plane are found in any order.
+    if ((events.t[1:] < events.t[:-1]) & events.joined).any():
+        order = np.lexsort((events.t, events.piece))
+        better = crossings.better.take(order, axis=1)
+        return Crossings(events.take(order), better, crossings.gain[order])
+    return crossings
+
+
+@twin
+@np.errstate(all="ignore")
+def slopes_at(knots: Samples) -> Floats:
+    """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
+    joined = knots.joined
+    h = np.where(joined, knots.t[1:] - knots.t[:-1], 1.0)
+    slopes = np.zeros_like(knots.points)
+    velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
+    slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
+    inner = np.zeros(knots.t.size, dtype=bool)
+    inner[1:-1] = joined[1:] & joined[:-1]
+    bounds = knots.bounds
+    first, last = bounds[:-1], bounds[1:] - 1
+    alone = first == last
+    if alone.any():
+        slopes[:, first[alone]] = 0.0
+        first, last = first[~alone], last[~alone]
+    end, other = np.concatenate((first, last)), np.concatenate((first + 1, last - 1))
+    step = velocity.take(np.concatenate((first, last - 1)), axis=1)
+    # On a parabola the slopes at both ends of a step average to its velocity.
+    slopes[:, end] = np.where(inner[other], 2 * step - slopes.take(other, axis=1), step)
+    return slopes
+
+
+@twin
+@np.errstate(all="ignore")
+def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
+    """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
+    stop = min(high + 1, knots.t.size)
+    points = knots.points[:, low:stop]
+    cells = np.floor(points - 0.5)
+    length = np.abs(points[:, 1:] - points[:, :-1])
+    length[0] *= 1 + NUDGE
+    length[2] *= 1 - NUDGE
+    axis = np.where(
+        (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
+    ).astype(np.int8)
+    passed = _of_axis(cells[:, 1:] - cells[:, :-1], axis)
+    step = ((passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])).nonzero()[
+        0
+    ]
+    axis, passed = axis[step], passed[step]
+    left = low + step
+    at = axis.astype(np.int64) * knots.t.size + left  # of flat rows
+    h = knots.t[left + 1] - knots.t[left]
+    begin = knots.points.take(at)
+    length = knots.points.take(at + 1) - begin
+    m_left = length / (slopes.take(at) * h)
+    m_right = length / (slopes.take(at + 1) * h)
+    # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
+    m_left[~((m_left > 0) & (m_left < 3))] = 1.0
+    m_right[~((m_right > 0) & (m_right < 3))] = 1.0
+
+    # Plane i is passed upwards on leaving the cell below it, downwards on reaching it.
+    first = np.floor(begin - 0.5) + np.where(passed > 0, 1.5, 0.5)
+    planes = np.abs(passed).astype(np.int64)
+    # From here on everything is per crossing.
+    of = np.repeat(np.arange(left.size), planes)
+    nth = spread(np.zeros_like(planes), planes)
+    level: Floats = first[of] + np.sign(passed)[of] * nth
+    u = (level - begin[of]) / length[of]
+    rest = 1.0 - u
+    tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
+    knot = left[of]
+    t_left = knots.t[knot]
+    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), knots.t[knot + 1])
+    return Aims(knot, axis[of], passed[of] < 0, level, tau, t)
+
+
+def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> Crossings:
+    aims, points = _corrected(batch, knots, aims)
+    piece, t = knots.piece[aims.knot], aims.t
+    curve = knots.curve[piece]
+    nearest, better, gain, foot = corners(knots, slopes, aims, points)
+    check = np.isfinite(foot).nonzero()[0]
+    if check.size:  # at the foot of the perpendicular the curve must be near enough
+        left = aims.knot[check]
+        t_foot = np.clip(
+            t[check] + foot[check] * (knots.t[left + 1] - knots.t[left]),
+            batch.first[curve[check]],
+            batch.last[curve[check]],
+        )
+        apart = better[:, check] + 0.5 - batch.evaluate(curve[check], t_foot)
+        far = check[(apart * apart).sum(axis=0) > 0.5]
+        gain[far] = np.inf
+
+    heading = (2 * aims.axis + aims.descends).astype(np.int8)
+    return Crossings(Events(piece.astype(np.int32), t, nearest, heading), better, gain)
+
+
+def _corrected(batch: Batch, knots: Samples, aims: Aims) -> tuple[Aims, Floats]:
+    """Find where planes are crossed, and the points there, but not those that are jumped over."""
+    curve = knots.curve[knots.piece[aims.knot]]
+    points = batch.evaluate(curve, aims.t)
+    miss = _of_axis(points, aims.axis) - aims.level
+    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
+    if not off.size:
+        return aims, points
+    bracket, ends = _brackets(knots, aims, miss, off)
+    axis = aims.axis[off].astype(np.int64)
+    aims.t[off], points[:, off], found = cross(
+        batch, curve[off], axis, aims.level[off], bracket, ends
+    )
+    hit = off[found]
+    left = aims.knot[hit]
+    aims.tau[hit] = (aims.t[hit] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
+    if found.all():
+        return aims, points
+    kept = np.ones(aims.t.size, dtype=bool)
+    kept[off] = found
+    return Aims._make(each[kept] for each in aims), points[:, kept]
+
+
+def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
+    """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
+    left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
+    begin = _of_axis(knots.points[:, left], axis)
+    length = _of_axis(knots.points[:, left + 1], axis) - begin
+    h = knots.t[left + 1] - knots.t[left]
+    low, high = knots.t[left], knots.t[left] + h
+    at_low, at_high = begin - level, begin + length - level
+    after = (miss[off] < 0) == (at_low < 0)  # the crossing comes after the guess
+    bracket = np.where(after, t, low), np.where(after, high, t)
+    return bracket, (np.where(after, miss[off], at_low), np.where(after, at_high, miss[off]))
+
+
+@twin
+@np.errstate(all="ignore")
+def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
+    """Look for the corners of the crossed faces that are nearest to the tangents.
+
+    For a line, and up to the second order for a curve, that is the best voxel among all with
+    this coordinate on the dominant axis.
+
+    Parameters
+    ----------
+    knots : Samples
+        Along the curves.
+    slopes : (3, K) float64 array
+        dP/dt at the knots.
+    aims : Aims
+        Which planes are crossed, where.
+    points : (3, n) float64 array
+        The crossings.
+
+    Returns
+    -------
+    nearest, better : (3, n) int32 arrays
+        The corner nearest to the crossing, and the one nearest to the tangent.
+    gain : (n,) float64 array
+        How much nearer to the tangent that is than ``nearest``, in square voxels; infinite where
+        ``nearest`` is the best.
+    foot : (n,) float64 array
+        Where the better corner is further than sqrt(1/2) from the crossing: the way to the foot of
+        the perpendicular along the tangent, in steps between knots. Infinite elsewhere.
+
+    """
+    left, axis, tau = aims.knot, aims.axis, aims.tau
+    nearest = np.floor(points + NUDGE)
+    plane = aims.level - 0.5
+    for row in range(3):
+        np.copyto(nearest[row], plane, where=axis == row)
+    h = knots.t[left + 1] - knots.t[left]
+    tangent = slopes.take(left, axis=1) * h  # per step, not per t
+    after = slopes.take(left + 1, axis=1) * h
+    tangent += tau * (after - tangent)
+
+    apart = nearest + 0.5 - points
+    length = np.maximum(np.sqrt((tangent * tangent).sum(axis=0)), np.finfo(float).tiny)
+    along = tangent / length
+    project = (apart * along).sum(axis=0)
+    # The other corner along axis b is a unit step e_b away, towards the crossing. With w the
+    # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
+    # with p = D.w and s = w.e_b. Two such steps change it by the sum of both minus 2 s s'.
+    changes, shifts = [], []
+    for off, way in zip(_across(apart, axis), _across(along, axis), strict=True):
+        shift = np.where(off > 0, -way, way)
+        shifts.append(shift)
+        changes.append(1.0 - 2.0 * np.abs(off) - (2.0 * project + shift) * shift)
+    best = np.where(changes[0] < -MARGIN, changes[0], 0.0)
+    other = changes[1] < best - MARGIN
+    best = np.where(other, changes[1], best)
+    total = changes[0] + changes[1] - 2.0 * shifts[0] * shifts[1]
+    both = total < best - MARGIN
+    best = np.where(both, total, best)
+
+    nearest = nearest.astype(np.int32)
+    better, gain, foot = nearest.copy(), np.full(axis.size, np.inf), np.full(axis.size, np.inf)
+    moved = (best < 0).nonzero()[0]
+    gain[moved] = -best[moved]
+    axis, both, other = axis[moved], both[moved], other[moved]
+    apart, along = apart.take(moved, axis=1), along.take(moved, axis=1)
+    each = np.arange(moved.size)
+    first, second = np.where(axis == 0, 1, 0), np.where(axis == 2, 1, 2)
+    for across, moves in ((first, both | ~other), (second, both | other)):
+        step = np.where(apart[across, each] > 0, -1, 1) * moves
+        better[across, moved] += step
+        apart[across, each] += step
+    far = ((apart * apart).sum(axis=0) > 0.5).nonzero()[0]
+    foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
+    return Corners(nearest, better, gain, foot)
+
+
+def _across(rows: Floats, axis: NDArray[np.int8]) -> tuple[Floats, Floats]:
+    """Pick from three rows, (3, n), the two that are not named by ``axis`` (n,), in order."""
+    return np.where(axis == 0, rows[1], rows[0]), np.where(axis == 2, rows[1], rows[2])
+
+
+def _of_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:
+    """Pick from three rows, (3, n), the one named by ``axis`` (n,)."""
+    return np.asarray(np.where(axis == 0, rows[0], np.where(axis == 1, rows[1], rows[2])))

@@ -1,0 +1,165 @@
+"""What comes out: an ordered list of voxels along a curve, and what can be said of it.
+
+A sequence is a value. It knows no colour and no display; ``clip`` is told a display's shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.curves.curve import Curve
+from voxdisplay.voxelization import measure
+from voxdisplay.voxelization.certify import END_ERROR, Certificate
+
+
+@dataclass(frozen=True)
+class Report:
+    """How good a sequence is.
+
+    Attributes
+    ----------
+    voxels : int
+        How many there are.
+    closed : bool
+        Whether the last is followed by the first.
+    pieces : int
+        Into how many connected pieces jumps of the curve split them.
+    e_max, e_av : float
+        Greatest and mean true distance of voxel centres from the curve, in voxels (paper,
+        equations 7 and 8, but to the nearest point).
+    gaps : int
+        Consecutive voxels of a piece that are not neighbours.
+    contacts : int
+        Pairs i < j, j - i > 1 (cyclically if closed), of equal or 26-adjacent voxels.
+    seconds : float
+        What it took to find the voxels (a share by voxels, where many curves were done at once).
+    certified : bool
+        Whether it is proven that voxels are within 0.7072 of the curve (the first and the last
+        within 0.8661), and all of the curve, however narrow a feature, within 2.5 in max norm of
+        a voxel's centre; and that they are connected, without a jump.
+
+    """
+
+    voxels: int
+    closed: bool
+    pieces: int
+    e_max: float
+    e_av: float
+    gaps: int
+    contacts: int
+    seconds: float
+    certified: bool
+
+
+@dataclass(eq=False, init=False)
+class Sequence:
+    """An ordered, 26-connected list of voxels along a curve.
+
+    Attributes
+    ----------
+    voxels : (N, 3) int32 array
+        Columns x, y, z; read-only. Voxel i of an axis covers [i, i + 1).
+    closed : bool
+        Whether the last voxel is followed by the first.
+    starts : (pieces,) int64 array
+        Index of the first voxel of every piece; the first is 0. The curve jumps before each other.
+    t : (N,) float64 array
+        A parameter at which the curve is near each voxel, ascending; read-only.
+    curve : Curve
+        What the voxels show.
+    seconds : float
+        What it took to find them.
+    proof : Certificate, str or None
+        What is proven of them; or why there is no proof, though one was asked for.
+
+    """
+
+    voxels: NDArray[np.int32]
+    closed: bool
+    starts: NDArray[np.int64]
+    t: NDArray[np.float64] = field(repr=False)
+    curve: Curve = field(repr=False)
+    seconds: float = field(default=0.0, repr=False)
+    proof: Certificate | str | None = field(default=None, repr=False)
+
+    def __init__(
+        self,
+        voxels: NDArray[np.int32],
+        closed: bool,
+        starts: NDArray[np.int64],
+        t: NDArray[np.float64],
+        curve: Curve,
+        seconds: float = 0.0,
+        proof: Certificate | str | None = None,
+    ) -> None:
+        self.voxels = voxels
+        self.closed = closed
+        self.starts = starts
+        self.t = t
+        self.curve = curve
+        self.seconds = seconds
+        self.proof = proof
+
+    def __len__(self) -> int:
+        return len(self.voxels)
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Distance of every voxel's centre from the curve, in voxels: (N,)."""
+        apart = measure.distances(self.voxels, self.curve)
+        lost = apart > END_ERROR
+        if lost.any():  # at features too narrow for who does not know where to look
+            hints = self.t[lost]
+            apart[lost] = measure.distances(self.voxels[lost], self.curve, hints=hints)
+        return apart
+
+    @cached_property
+    def contact_pairs(self) -> NDArray[np.int64]:
+        """Where the sequence touches itself, as index pairs: see `measure.contacts`."""
+        return measure.contacts(self.voxels, closed=self.closed)
+
+    @cached_property
+    def report(self) -> Report:
+        """How good the sequence is. Found when first asked for: it can take longer than drawing."""
+        return Report(
+            voxels=len(self),
+            closed=self.closed,
+            pieces=len(self.starts),
+            e_max=float(self.distances.max()),
+            e_av=float(self.distances.mean()),
+            gaps=len(measure.gaps(self.voxels, closed=self.closed, starts=self.starts)),
+            contacts=measure.count_contacts(self.voxels, closed=self.closed),
+            seconds=self.seconds,
+            certified=isinstance(self.proof, Certificate),
+        )
+
+
+def clip(sequence: Sequence, grid: tuple[int, int, int]) -> NDArray[np.int64]:
+    """Find the stretches of a sequence inside a grid.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        The voxels.
+    grid : (nx, ny, nz)
+        A display's shape; voxels 0 <= x < nx and so on are inside.
+
+    Returns
+    -------
+    (k, 2) int64 array
+        Bounds [start, stop) of maximal stretches of consecutive voxels that are all inside and
+        of one piece, ascending. A closed sequence is taken as open: a stretch may end with the
+        last voxel and go on at the first.
+
+    """
+    voxels = sequence.voxels
+    inside = np.asarray(((voxels >= 0) & (voxels < np.asarray(grid))).all(axis=1))
+    runs_on = inside[1:] & inside[:-1]
+    runs_on[sequence.starts[1:] - 1] = False
+    start = np.flatnonzero(inside & ~np.append(False, runs_on))
+    stop = np.flatnonzero(inside & ~np.append(runs_on, False)) + 1
+    return np.stack((start, stop), axis=1)

@@ -1,0 +1,82 @@
+"""The events of a curve: the voxels it is to be drawn with, in order, before and after thinning.
+
+Plain integer bookkeeping. This module must not know curves or where the voxels came from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.voxelization.index_ranges import insert
+
+Voxels = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Events:
+    """Voxels along pieces of curves, each with the parameter where the curve calls for it.
+
+    Attributes
+    ----------
+    piece : (M,) int32 array
+        The piece each belongs to, ascending.
+    t : (M,) float64 array
+        Parameters, ascending within a piece.
+    voxels : (3, M) int32 array
+        Rows x, y, z.
+    heading : (M,) int8 array
+        The axis along which the curve passes the voxel's mid-plane and the sense in which it does,
+        2 * axis + (1 if it descends). ``OTHER`` for what is not part of such a run. Two
+        neighbours of one heading are one apart on its axis.
+
+    """
+
+    piece: NDArray[np.int32]
+    t: NDArray[np.float64]
+    voxels: Voxels
+    heading: NDArray[np.int8]
+
+    def take(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Events:
+        """Give the events at an index array or under a mask."""
+        if index.dtype == bool:
+            (index,) = index.nonzero()
+        voxels = self.voxels.take(index, axis=1)
+        return Events(self.piece[index], self.t[index], voxels, self.heading[index])
+
+    def insert(self, at: NDArray[np.intp], other: Events) -> Events:
+        """Put other events before those at the indices ``at``, which ascend."""
+        mine, others = ((each.piece, each.t, each.voxels, each.heading) for each in (self, other))
+        return Events(*insert(at, mine, others))
+
+    def with_voxels(self, voxels: Voxels) -> Events:
+        """Give the same events with other voxels."""
+        return replace(self, voxels=voxels)
+
+    @property
+    def joined(self) -> NDArray[np.bool_]:
+        """Which of the M - 1 steps stay inside a piece."""
+        return np.asarray(self.piece[1:] == self.piece[:-1])
+
+    def gaps(self) -> NDArray[np.intp]:
+        """Find the steps within a piece between voxels that are not neighbours: k for k, k + 1."""
+        return torn(self.piece, self.voxels)
+
+
+OTHER = np.int8(-1)
+
+
+def near(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
+    """Tell which voxels, (3, n) each, are 26-adjacent or equal."""
+    close = np.abs(here - there) <= 1
+    return np.asarray(close[0] & close[1] & close[2])
+
+
+@twin
+def torn(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
+    """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
+    apart = (piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:])
+    return np.asarray(apart.nonzero()[0])

@@ -1,0 +1,127 @@
+"""The ops of a payload, one by one: what each is called and how many bytes it has (section 7).
+
+For whoever wants to know what a packet is made of. Ops are told apart and measured, not checked and
+not drawn; what is cut off or not known here is listed as it is, and ends the list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.wire import spec
+from voxdisplay.wire.op_encoding import SHORT_COUNT, Coding
+
+UNKNOWN: Final = "?"
+_CRUMBS_PER_BYTE: Final = 4
+
+
+def list_ops(payload: bytes, coding: Coding) -> Iterator[tuple[str, int]]:
+    """Give name and size of each op of a payload.
+
+    Parameters
+    ----------
+    payload : bytes
+        Of a DATA packet.
+    coding : Coding
+        What the bytes depend on.
+
+    Yields
+    ------
+    name : str
+        That of protocol.md's table, or ``"?"`` for what is not known, or cut off.
+    size : int
+        Bytes; the sizes add up to the payload's.
+
+    """
+    at = 0
+    while at < len(payload):
+        name, size = _op_at(payload, at, coding)
+        left = len(payload) - at
+        yield (name, size) if size <= left else (UNKNOWN, left)
+        at += size
+
+
+def _op_at(payload: bytes, at: int, coding: Coding) -> tuple[str, int]:
+    op = payload[at]
+    for name, (value, mask, measure) in _OPS.items():
+        if op & mask == value:
+            try:
+                return name, measure(payload, at, coding)
+            except IndexError:
+                break
+    return UNKNOWN, len(payload) - at
+
+
+def _rest(payload: bytes, at: int, _coding: Coding) -> int:
+    return len(payload) - at
+
+
+def _chain(payload: bytes, at: int, coding: Coding) -> int:
+    place = coding.move_bytes if payload[at] & 0xE0 == spec.OP_FROM else 0
+    steps = payload[at + 1 + place] + 1
+    return 2 + place + -(-steps // _CRUMBS_PER_BYTE)
+
+
+def _count(payload: bytes, at: int) -> tuple[int, int]:
+    """Read the count of an op; give it and how many bytes op and count have."""
+    low = payload[at] & SHORT_COUNT
+    if low < SHORT_COUNT:
+        return low + 1, 1
+    end = at + 1
+    while payload[end] & 0x80:
+        end += 1
+    rest = sum((byte & 0x7F) << 7 * place for place, byte in enumerate(payload[at + 1 : end + 1]))
+    return SHORT_COUNT + 1 + rest, end + 1 - at
+
+
+def _brick(payload: bytes, at: int, coding: Coding) -> int:
+    """Go through the masks of an OCT, level by level."""
+    size = 1 + coding.move_bytes
+    nodes = 1
+    for _ in range(payload[at] & 0x1F):
+        masks = payload[at + size : at + size + nodes]
+        size += nodes
+        nodes = sum(mask.bit_count() for mask in masks)
+    return size
+
+
+def _differences(payload: bytes, at: int, _coding: Coding) -> int:
+    count, size = _count(payload, at)
+    return size + (count + 1) // 2
+
+
+def _counted(payload: bytes, at: int, _coding: Coding) -> int:
+    return _count(payload, at)[1]
+
+
+def _literal(payload: bytes, at: int, coding: Coding) -> int:
+    count, size = _count(payload, at)
+    if coding.format is PixelFormat.MONO1:
+        return size + (count + 7) // 8
+    return size + count * coding.format.bytes
+
+
+# Value, the bits that tell it, and how long it is: by name, in the order of section 7.
+_OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, Coding], int]]]] = {
+    "END": (spec.OP_END, 0xFF, _rest),
+    "PEN": (spec.OP_PEN, 0xFF, lambda _payload, _at, coding: coding.pen_bytes),
+    "MOVE": (spec.OP_MOVE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "LINE": (spec.OP_LINE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "BOX": (spec.OP_BOX, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "DOTS": (
+        spec.OP_DOTS,
+        0xFF,
+        lambda payload, at, coding: 2 + (payload[at + 1] + 1) * coding.move_bytes,
+    ),
+    "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _coding: 3 + 3 * (payload[at + 2] + 1)),
+    "STEP": (spec.OP_STEP, 0xE0, _chain),
+    "ARC": (spec.OP_ARC, 0xFF, _rest),
+    "FROM": (spec.OP_FROM, 0xE0, _chain),
+    "OCT": (spec.OP_OCT, 0xE0, _brick),
+    "SKIP": (spec.OP_SKIP, 0xE0, _counted),
+    "RUN": (spec.OP_RUN, 0xE0, _counted),
+    "LIT": (spec.OP_LIT, 0xE0, _literal),
+    "DIFF": (spec.OP_DIFF, 0xE0, _differences),
+}

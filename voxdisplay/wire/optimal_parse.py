@@ -1,0 +1,164 @@
+"""Which op draws which run of equal pixels: the cheapest way through SKIP, RUN, LIT and DIFF.
+
+A shortest path over the runs, one state for each op that may go on: a LIT or a DIFF that is open
+costs no new op byte, and a DIFF needs the pen that the run before has left. The path is followed
+through many stretches of the page at once, so that numpy does the work. This module makes no bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.wire import spec
+from voxdisplay.wire.incremental import Steps
+from voxdisplay.wire.op_encoding import Bools, Coding, Ints, count_bytes
+
+# States: what the run before was drawn by.
+_LIT, _DIFF, _RUN, _SKIP = range(4)
+# Ways to draw a run, by their first and their second op; the second draws all but one pixel.
+LIT, DIFF, RUN, SKIP = spec.OP_LIT, spec.OP_DIFF, spec.OP_RUN, spec.OP_SKIP
+WAYS = np.array(
+    [(LIT, 0), (DIFF, 0), (LIT, RUN), (DIFF, RUN), (RUN, 0), (RUN, 0), (SKIP, 0), (LIT, DIFF)]
+)
+_ALL_LIT, _ALL_DIFF, _LIT_RUN, _DIFF_RUN, _PEN_RUN, _SAME_RUN, _SKIPPED, _LIT_DIFF = range(8)
+
+# Costs are bits; what is never done costs more than any path. Below a cost stands how it came
+# about: the state before in two bits, the row of `WAYS` in three. So one minimum finds both.
+_NEVER = 1 << 23
+_FROM_BITS, _CODE_BITS = 2, 5
+_CODE = (1 << _CODE_BITS) - 1
+_OP_BITS = 8
+# A DIFF of an odd number of pixels wastes half a byte, every other time.
+_DIFF_BITS = _OP_BITS + 2
+# Longer ones are never a LIT or DIFF.
+_LONG = 1 << 12
+# Runs of a stretch, where there are many, or few; the first of a stretch cannot be a DIFF.
+_STRETCH, _LEAST_STRETCH = 96, 24
+# Rows of all stretches that are looked at in one step.
+_STEP = 16
+
+Costs = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs of equal pixels in scan order; no two neighbours can be one.
+
+    Attributes
+    ----------
+    start, length, value : (n,) int64 arrays
+    may_skip : (n,) bool array
+        Whether the page has these pixels already; no two of these are neighbours.
+    may_write : (n,) bool array
+        Whether they are one value; otherwise they must be skipped.
+
+    """
+
+    start: Ints
+    length: Ints
+    value: Ints
+    may_skip: Bools
+    may_write: Bools
+
+
+def cheapest(runs: Runs, coding: Coding) -> Steps[Ints]:
+    """Find the row of `WAYS` by which each run is drawn in the fewest bytes, in steps."""
+    n = len(runs.start)
+    if n == 0:
+        return np.empty(0, dtype=np.int64)
+    height = max(_LEAST_STRETCH, min(_STRETCH, n // 64), int((n / 16) ** 0.5))
+    height = min(n, height)
+    width = -(-n // height)
+    yield
+    of = {name: _folded(cost, height, width) for name, cost in _costs(runs, coding).items()}
+    # At the top of a stretch the pen is not known, but for the first: a packet begins so.
+    for name in ("no_diff", "no_diff_behind_skip", "same_run"):
+        of[name][0, 1:] = _NEVER << _CODE_BITS
+
+    back = np.empty((height, 4, width), dtype=np.uint8)
+    states = np.arange(4, dtype=np.int32)[:, None]
+    cost = np.full((4, width), _NEVER << _CODE_BITS, dtype=np.int32) + states
+    cost[_RUN] = _RUN
+    cost[_SKIP, 0] = _SKIP
+    new = np.empty_like(cost)
+    into_lit, into_diff = _OP_BITS << _CODE_BITS, _DIFF_BITS << _CODE_BITS
+    for row in range(height):
+        if row % _STEP == 0:
+            yield
+        lit, diff, run, skip = cost
+        drawn = np.minimum(np.minimum(lit, diff), run)
+        any_ = np.minimum(drawn, skip)
+        by_lit = np.minimum(lit, any_ + into_lit)
+        by_diff = np.minimum(diff, np.minimum(lit, run) + into_diff) + of["no_diff"][row]
+        by_diff = np.minimum(by_diff, skip + into_diff + of["no_diff_behind_skip"][row])
+        np.add(by_lit, of["lit"][row], out=new[_LIT])
+        np.minimum(by_diff + of["diff"][row], by_lit + of["lit_diff"][row], out=new[_DIFF])
+        run = np.minimum(by_lit + of["lit_run"][row], by_diff + of["diff_run"][row])
+        run = np.minimum(run, any_ + of["pen_run"][row])
+        np.minimum(run, skip + of["same_run"][row], out=new[_RUN])
+        np.add(drawn, of["skip"][row], out=new[_SKIP])
+        back[row] = np.bitwise_and(new, _CODE, dtype=np.int32)
+        cost = (new & ~_CODE) + states
+    yield
+    return _traced(back, cost.argmin(axis=0)).T.reshape(-1)[:n]
+
+
+def _costs(runs: Runs, coding: Coding) -> dict[str, Costs]:
+    """Give the bits of each way to draw each run, without those of an op that is open already."""
+    value = runs.value.astype(np.int32)
+    length = np.minimum(runs.length, _LONG).astype(np.int32)
+    pixel = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
+    run = 8 * count_bytes(runs.length).astype(np.int32)
+    tail = 8 * count_bytes(np.maximum(runs.length - 1, 1)).astype(np.int32)
+    before, before_skip = np.full((2, len(value)), 1 << 30, dtype=np.int32)
+    before[1:] = value[:-1]
+    before_skip[:1] = coding.format.full
+    before_skip[2:] = np.where(runs.may_skip[1:-1], value[:-2], 1 << 30)
+    may_diff = coding.has(spec.FEATURE_DIFF)
+    writes, several = runs.may_write, runs.may_write & (length > 1)
+
+    def cost(way: int, bits: Costs | int, when: Bools) -> Costs:
+        costs = np.where(when, np.int32(bits), np.int32(_NEVER))
+        costs <<= _CODE_BITS
+        costs |= way << _FROM_BITS
+        return costs
+
+    return {
+        "lit": cost(_ALL_LIT, pixel * length, writes),
+        "diff": cost(_ALL_DIFF, 4 * length, writes),
+        "lit_run": cost(_LIT_RUN, pixel + tail, several),
+        "diff_run": cost(_DIFF_RUN, 4 + tail, several),
+        "pen_run": cost(_PEN_RUN, 8 * coding.pen_bytes + run, writes),
+        "same_run": cost(_SAME_RUN, run, value == before_skip),
+        "skip": cost(_SKIPPED, run, runs.may_skip),
+        "lit_diff": cost(_LIT_DIFF, pixel + _DIFF_BITS + 4 * (length - 1), several & may_diff),
+        "no_diff": cost(0, 0, near(value - before) & may_diff),
+        "no_diff_behind_skip": cost(0, 0, near(value - before_skip) & may_diff),
+    }
+
+
+def near(difference: Ints | Costs) -> Bools:
+    """Tell which differences of pixels of a byte a nibble holds: -8 to 7, modulo 256."""
+    return np.asarray((((difference + 8) & 255) < 16) & (np.abs(difference) < 256))
+
+
+def _folded(cost: Costs, height: int, width: int) -> Costs:
+    """Lay costs out in columns, one for each stretch; what is missing costs nothing at all."""
+    padded = np.zeros(height * width, dtype=np.int32)
+    padded[: len(cost)] = cost
+    return np.ascontiguousarray(padded.reshape(width, height).T)
+
+
+def _traced(back: NDArray[np.uint8], state: Ints) -> Ints:
+    """Follow each stretch from its cheapest end to its beginning."""
+    ways = np.empty((len(back), len(state)), dtype=np.int64)
+    column = np.arange(len(state))
+    for row in range(len(back) - 1, -1, -1):
+        code = back[row, state, column]
+        ways[row] = code >> _FROM_BITS
+        state = code & 3
+    return ways

@@ -1,0 +1,51 @@
+"""Entries of a palette -> COLORS (protocol.md, section 7.6). Knows no voxels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.wire import spec
+from voxdisplay.wire.op_encoding import Coding, Ints
+from voxdisplay.wire.payload_splitting import ANY, Pieces, no_pieces
+
+_OP_BYTES, _COLOR_BYTES = 3, 3
+
+
+def color_pieces(entries: Ints, palette: NDArray[np.uint8], coding: Coding) -> Pieces:
+    """Give the pieces that set some entries of a palette.
+
+    Parameters
+    ----------
+    entries : (n,) int64 array
+        Their numbers, ascending.
+    palette : (256, 3) uint8 array
+        Red, green and blue of all entries.
+    coding : Coding
+
+    """
+    most = min(spec.LIMIT_MAX_COLORS, (coding.room - _OP_BYTES) // _COLOR_BYTES)
+    ops = []
+    for run in _runs(entries.tolist()):
+        for first in range(run.start, run.stop, most):
+            stop = min(run.stop, first + most)
+            head = bytes((spec.OP_COLORS, first, stop - first - 1))
+            ops.append(head + palette[first:stop].tobytes())
+    if not ops:
+        return no_pieces()
+    anything = np.full(len(ops), ANY)
+    size = np.array([len(op) for op in ops], dtype=np.int64)
+    body = np.frombuffer(b"".join(ops), dtype=np.uint8)
+    no_chains = np.zeros(len(ops), dtype=np.bool_)
+    return Pieces(body, size, anything, anything, anything, anything, no_chains)
+
+
+def _runs(entries: list[int]) -> list[range]:
+    """Join entries that follow each other, and those with only one between: it costs no more."""
+    runs: list[range] = []
+    for entry in entries:
+        if runs and entry <= runs[-1].stop + 1:
+            runs[-1] = range(runs[-1].start, entry + 1)
+        else:
+            runs.append(range(entry, entry + 1))
+    return runs

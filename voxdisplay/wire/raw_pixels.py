@@ -1,0 +1,153 @@
+"""Pixels as they are, for lines that carry them faster than a shorter coding is found.
+
+What is lit is written by LIT straight from the display's memory, narrow dark gaps included, and
+wide gaps are skipped (protocol.md, section 7.2). This module must not know how fast a line is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, lit
+from voxdisplay.wire import spec
+from voxdisplay.wire.op_encoding import Bools, Coding, Ints, count_bytes, count_ops, ranges
+from voxdisplay.wire.payload_splitting import fill
+
+# Bytes of a gap that are written: to skip fewer saves nothing.
+_NARROW = 3
+# Coded at once: much less, and the last payload of each costs; more, and the line waits for it.
+_SLAB_VOXELS = 1 << 19
+# Of a large page each seventh block is looked at: the way from one to the next is no multiple of
+# the sides that displays have, so that they lie all over the page.
+_BLOCK, _EACH = 1000, 7
+# Of more colours hardly two voxels that follow each other are alike by chance.
+_MANY_COLORS = 16
+_SOME = 4096  # voxels, which show whether there are as many
+# Changes in each byte of eight pixels from which on runs are not shorter.
+_MANY_CHANGES = 3
+
+
+def is_noise(page: Pixels, coding: Coding) -> bool:
+    """Tell whether few voxels are like the next, so that there is little to be saved.
+
+    Parameters
+    ----------
+    page : ndarray
+        The display's memory in scan order: (V,), or (V, 3) for rgb888.
+    coding : Coding
+
+    """
+    if len(page) > _BLOCK * _EACH:
+        whole = len(page) // _BLOCK
+        blocks = page[: whole * _BLOCK].reshape(whole, _BLOCK, *page.shape[1:])[::_EACH]
+        page = blocks.reshape(-1, *page.shape[1:])
+    same = page[1:] == page[:-1]
+    if page.ndim == 2:
+        same = same[:, 0] & same[:, 1] & same[:, 2]
+    alike = int(np.count_nonzero(same))
+    if coding.format is PixelFormat.MONO1:
+        written = int(np.count_nonzero(np.packbits(page)))
+        return len(same) - alike > _MANY_CHANGES * written
+    on = lit(page)
+    if 2 * (alike - int(np.count_nonzero(same & ~on[1:]))) >= np.count_nonzero(on):
+        return False
+    places = np.flatnonzero(on)
+    some = page[places[:: -(-len(places) // _SOME)]]
+    return len(np.unique(some, axis=0)) > _MANY_COLORS
+
+
+def encode_plain(page: Pixels, coding: Coding) -> Iterator[list[bytes]]:
+    """Give the payloads that draw a page which is dark before, a few at a time.
+
+    Parameters
+    ----------
+    page, coding
+        As of `is_noise`.
+
+    Yields
+    ------
+    list of bytes
+        At most ``coding.max_payload`` bytes each, none of them empty.
+
+    """
+    units, per_unit = page, 1
+    if coding.format is PixelFormat.MONO1:  # a pixel run begins with a byte: so do all
+        units, per_unit = np.packbits(page, bitorder="little"), 8
+    elif coding.format is PixelFormat.RGB565:
+        units = page.astype("<u2", copy=False)
+    size = coding.format.bytes
+    memory = units.view(f"V{size}").reshape(-1) if units.ndim == 2 else units
+    for low in range(0, len(page), _SLAB_VOXELS):
+        at = low // per_unit
+        some = slice(at, at + _SLAB_VOXELS // per_unit)
+        yield _encode(lit(units[some]), memory[some], low, len(page) - low, per_unit, coding)
+
+
+def _encode(
+    on: Bools, memory: NDArray[np.generic], low: int, voxels: int, per_unit: int, coding: Coding
+) -> list[bytes]:
+    """Code a slab.
+
+    Parameters
+    ----------
+    on : (n,) bool array
+        Which units are lit.
+    memory : (n,) array
+        All of them, as they go over the wire.
+    low, voxels : int
+        The index of the first voxel, and how many there are from it on.
+    per_unit : int
+        Voxels of a unit; the last of a page may have fewer.
+    coding : Coding
+
+    """
+    if not on.any():
+        return []
+    size = memory.itemsize
+    edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
+    wide = np.flatnonzero(edges[2::2] - edges[1:-1:2] > _NARROW // size)
+    begin, end = edges[np.append(0, 2 * wide + 2)], edges[np.append(2 * wide + 1, -1)]
+    # No LIT is longer than a payload takes, wherever it begins.
+    way, op = count_bytes(np.array([low + voxels, 8 * coding.max_payload])).tolist()
+    most = (coding.max_payload - way - op) // size
+    parts = -(-(end - begin) // most)
+    done = ranges(np.zeros(len(parts), dtype=np.int64), parts) * most
+    start = np.repeat(begin, parts) + done
+    count = np.minimum(np.repeat(end - begin, parts) - done, most)
+
+    pixels = np.minimum(count * per_unit, voxels - start * per_unit)
+    place = low + start * per_unit
+    gap = place - np.append(0, (place + pixels)[:-1])
+    following = _op_bytes(gap) + count_bytes(pixels) + count * size
+    first = following + _op_bytes(place) - _op_bytes(gap)
+    heads = fill(first, following, coding.max_payload)
+    gap[heads], following[heads] = place[heads], first[heads]
+
+    out = np.empty(int(following.sum()), dtype=np.uint8)
+    here = np.cumsum(following) - following
+    offset = here[heads].tolist()
+    for op, counts in ((spec.OP_SKIP, gap), (spec.OP_LIT, pixels)):
+        ops, op_bytes = count_ops(op, counts)
+        op_bytes[counts == 0] = 0
+        out[ranges(here, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
+        here += op_bytes
+    written = memory[_mask(begin, end, len(on))]
+    out[_mask(here, here + count * size, len(out))] = written.view(np.uint8)
+    data = out.tobytes()
+    return [data[a:b] for a, b in pairwise([*offset, len(data)])]
+
+
+def _op_bytes(counts: Ints) -> Ints:
+    """Give the bytes of ops that carry counts; none where there is nothing to count."""
+    return np.where(counts > 0, count_bytes(counts), 0)
+
+
+def _mask(begin: Ints, end: Ints, size: int) -> Bools:
+    """Give a mask, (size,), that is set in ranges, which ascend."""
+    edges = np.stack((begin, end), axis=1).reshape(-1)
+    lengths = np.diff(edges, prepend=0, append=size)
+    return np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
