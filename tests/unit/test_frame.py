@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawing import page_after, values_of
 
-from voxdisplay import Segment
+from voxdisplay import Segment, voxelize
 from voxdisplay.frame import Frame
 from voxdisplay.raster.pixel_format import PixelFormat
 
