@@ -1,66 +1,143 @@
-"""The JSON Schema of scene files, derived from `objects`.
+"""JSON Schema of scene files, generated from the Structs of `objects`.
 
 It is published as ``voxdisplay/scene.schema.json``, for editors; reading a scene does not use it.
 ``python -m voxdisplay.scene.schema > voxdisplay/scene.schema.json`` renews it.
+
+msgspec can generate a schema too, but its text depends on its version. Here each part is made
+from the annotations alone, so that every version of every dependency gives the same file.
 """
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from voxdisplay.scene.objects import Color, Formula, Number, Object, SceneFile, Vector
+from voxdisplay.scene.objects import TYPES, Color, Formula, Number, Object, SceneFile, Vector
 
 # Parts that recur, and are written once.
-_SHARED = {
-    f"#/$defs/{name}": msgspec.json.schema(kind)
-    for name, kind in (
-        ("Number", Number),
-        ("Vector", Vector),
-        ("Formula", Formula),
-        ("Color", Color),
-    )
+_SHARED = {"Number": Number, "Vector": Vector, "Formula": Formula, "Color": Color}
+_SCALARS = {
+    bool: {"type": "boolean"},
+    int: {"type": "integer"},
+    float: {"type": "number"},
+    str: {"type": "string"},
+    NoneType: {"type": "null"},
+}
+_LIMITS = {
+    "ge": {"*": "minimum"},
+    "le": {"*": "maximum"},
+    "min_length": {"string": "minLength", "array": "minItems", "object": "minProperties"},
+    "max_length": {"string": "maxLength", "array": "maxItems", "object": "maxProperties"},
 }
 
 
 def schema() -> dict[str, Any]:
-    """Give the JSON Schema: a scene, if there is the key ``objects``, or else one object."""
-    (scene, thing), things = msgspec.json.schema_components((SceneFile, Object))
-    shared = {name.rpartition("/")[2]: part for name, part in _SHARED.items()}
+    """Return the JSON Schema: of a scene if there is a key ``objects``, else of one object."""
+    structs = {"SceneFile": SceneFile} | {kind.__name__: kind for kind in TYPES.values()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "voxdisplay scene",
         "type": "object",
         # Not anyOf, which would answer a mistake with the complaints of every type.
         "if": {"required": ["objects"]},
-        "then": scene,
-        "else": thing,
-        "$defs": {
-            name: {key: _referring(value) for key, value in part.items()}
-            for name, part in (shared | things).items()
-        },
+        "then": _reference("SceneFile"),
+        "else": _part(Object),
+        "$defs": {name: _part(kind, named=False) for name, kind in _SHARED.items()}
+        | {name: _struct(kind) for name, kind in structs.items()},
     }
 
 
-def _referring(part: Any) -> Any:
-    """Replace shared parts by references to them."""
-    if isinstance(part, list):
-        return [_referring(each) for each in part]
-    if not isinstance(part, dict):
-        return part
-    bare = {key: value for key, value in part.items() if key != "default"}
-    for name, shared in _SHARED.items():
-        if bare == shared:
-            kept = {"default": part["default"]} if "default" in part else {}
-            return {"$ref": name} | kept
-    return {key: _referring(value) for key, value in part.items()}
+def _reference(name: str) -> dict[str, Any]:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _struct(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the schema of the objects that a Struct is made of."""
+    hints = get_type_hints(kind, include_extras=True)
+    fields = msgspec.structs.fields(kind)
+    tag = kind.__struct_config__.tag
+    properties = {"type": {"enum": [tag]}} if tag else {}
+    required = ["type"] if tag else []
+    for field in fields:
+        part = _part(hints[field.name])
+        if field.required:
+            required.append(field.encode_name)
+        else:
+            made = field.default is msgspec.NODEFAULT
+            part["default"] = field.default_factory() if made else field.default
+        properties[field.encode_name] = part
+    return {
+        "title": kind.__name__,
+        "description": inspect.cleandoc(kind.__doc__ or ""),
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+def _part(kind: Any, *, named: bool = True) -> dict[str, Any]:
+    """Return the schema of the values that an annotation allows."""
+    if named:
+        for name, shared in _SHARED.items():
+            if kind == shared:
+                return _reference(name)
+    if kind in _SCALARS:
+        return dict(_SCALARS[kind])
+    arguments = get_args(kind)
+    origin = get_origin(kind)
+    if origin is None:
+        return _reference(kind.__name__)
+    if origin is Annotated:
+        return _limited(_part(arguments[0]), kind.__metadata__)
+    if origin in {Union, UnionType}:
+        return _union(arguments)
+    return _container(origin, arguments)
+
+
+def _container(origin: Any, arguments: tuple[Any, ...]) -> dict[str, Any]:
+    if origin is list:
+        return {"type": "array", "items": _part(arguments[0])}
+    if origin is tuple:
+        return {
+            "type": "array",
+            "minItems": len(arguments),
+            "maxItems": len(arguments),
+            "prefixItems": [_part(each) for each in arguments],
+            "items": False,
+        }
+    if origin is dict:
+        return {"type": "object", "additionalProperties": _part(arguments[1])}
+    raise TypeError(f"no schema for {origin}")
+
+
+def _union(kinds: tuple[Any, ...]) -> dict[str, Any]:
+    parts: dict[str, Any] = {"anyOf": [_part(kind) for kind in kinds]}
+    if set(kinds) <= set(TYPES.values()):
+        mapping = {tag: _reference(kind.__name__)["$ref"] for tag, kind in TYPES.items()}
+        parts["discriminator"] = {"propertyName": "type", "mapping": mapping}
+    return parts
+
+
+def _limited(part: dict[str, Any], metadata: tuple[msgspec.Meta, ...]) -> dict[str, Any]:
+    """Add the limits and the text of annotations."""
+    for meta in metadata:
+        if meta.description:
+            part["description"] = meta.description
+        for limit, keywords in _LIMITS.items():
+            value = getattr(meta, limit)
+            if value is not None:
+                part[keywords.get("*") or keywords[part["type"]]] = value
+    return part
 
 
 def text() -> str:
-    """Give the text of the published schema."""
+    """Return the text of the published schema."""
     return json.dumps(schema(), indent=1) + "\n"
 
 
