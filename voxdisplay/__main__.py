@@ -1,8 +1,33 @@
-"""``python -m voxdisplay``: the command line."""
+"""Entry point of the command ``voxdisplay`` and of ``python -m voxdisplay``.
 
+Importing the commands takes longer than a user needs for Ctrl-C. Nothing is open yet that would
+have to be closed, so until the command line handles signals itself, SIGINT ends the process at
+once, without a traceback. This module imports nothing else before its handler is installed.
+"""
+
+import _signal  # signal itself imports enum, and could be interrupted there
+import os
 import sys
 
-from voxdisplay.cli import main
+_EXIT_INTERRUPT = 130
+
+
+def _exit_interrupted(*_signal_and_frame: object) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(_EXIT_INTERRUPT)
+
+
+def main() -> int:
+    """Run the command line and return its exit code."""
+    handled = _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
+    if handled:  # it is ignored in a background job of a script, and stays so
+        _signal.signal(_signal.SIGINT, _exit_interrupted)
+    from voxdisplay.cli import main as run_command  # noqa: PLC0415 - behind the handler
+
+    if handled:
+        _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+    return run_command()
+
 
 if __name__ == "__main__":
     sys.exit(main())

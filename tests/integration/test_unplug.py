@@ -287,7 +287,7 @@ def test_a_display_that_cannot_be_made_dark(plug):
 
 def test_interrupted_while_it_is_being_imported():
     """Nothing is open yet; there is a word and the exit code, and no traceback."""
-    command = [sys.executable, "-X", "importtime", "-m", "voxdisplay_command", "push", SCENE]
+    command = [sys.executable, "-X", "importtime", "-m", "voxdisplay", "push", SCENE]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as push:
         assert any("numpy" in line for line in iter(push.stderr.readline, ""))
         push.send_signal(signal.SIGINT)

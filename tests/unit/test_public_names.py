@@ -1,0 +1,112 @@
+"""Public names of the package: loaded lazily, complete, and plain for tools that inspect them."""
+
+import ast
+import inspect
+import pydoc
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import voxdisplay as vd
+
+SOURCE = Path(vd.__file__)
+
+
+def imports_for_type_checkers():
+    """Public names by module, as imported under ``if TYPE_CHECKING``."""
+    (block,) = (
+        node
+        for node in ast.parse(SOURCE.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.If)
+        and isinstance(node.test, ast.Name)
+        and node.test.id == "TYPE_CHECKING"
+    )
+    return {
+        node.module: [alias.name for alias in node.names]
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+    }
+
+
+def run(script, *options):
+    """Standard output of a script that runs in a fresh interpreter."""
+    command = [sys.executable, *options, "-c", script]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_table_imports_and_all_agree():
+    assert imports_for_type_checkers() == vd._MODULES
+    assert sorted(vd._MODULE_OF) == sorted(vd.__all__)
+    assert len(set(vd.__all__)) == len(vd.__all__)
+
+
+@pytest.mark.parametrize("name", vd.__all__)
+def test_a_name_is_that_of_its_module(name):
+    value = getattr(vd, name)
+    assert value is getattr(sys.modules[vd._MODULE_OF[name]], name)
+    assert value.__name__ == name
+    assert not isinstance(value, types.ModuleType)
+
+
+def test_the_package_imports_nothing_heavy():
+    loaded = run("import sys; before = set(sys.modules); import voxdisplay;"
+                 "print(*set(sys.modules) - before)").split()  # fmt: skip
+    assert loaded == ["voxdisplay"]
+
+
+def test_the_entry_point_imports_only_what_has_loaded():
+    loaded = run("import sys; before = set(sys.modules); import voxdisplay.__main__;"
+                 "print(*set(sys.modules) - before)").split()  # fmt: skip
+    assert set(loaded) == {"voxdisplay", "voxdisplay.__main__"}
+
+
+def test_star_import_brings_all_names():
+    names = run("from voxdisplay import *; import voxdisplay; print(*set(dir()) - {'voxdisplay'})")
+    assert set(vd.__all__) <= set(names.split())
+
+
+def test_dir_lists_names_before_their_first_use():
+    names = run("import voxdisplay; print(*dir(voxdisplay))").split()
+    assert {*vd.__all__, "__version__"} <= set(names)
+
+
+def test_submodules_are_attributes_without_an_import():
+    assert run("import voxdisplay as vd; print(vd.errors.SceneError is vd.SceneError)") == "True\n"
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="module 'voxdisplay' has no attribute 'Cirle'"):
+        _ = vd.Cirle
+    with pytest.raises(ImportError, match="cannot import name 'Cirle'"):
+        exec("from voxdisplay import Cirle")  # noqa: S102
+
+
+def test_version_is_that_of_the_distribution():
+    from importlib.metadata import version  # noqa: PLC0415
+
+    assert vd.__version__ == version("voxdisplay")
+
+
+def test_no_module_is_callable():
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] == "voxdisplay":
+            assert not callable(module), name
+
+
+def test_voxelize_has_its_own_signature_and_documentation():
+    assert inspect.isfunction(vd.voxelize)
+    parameters = inspect.signature(vd.voxelize).parameters
+    assert list(parameters) == [
+        "curve", "method", "variant", "tangent", "pitch", "reach", "certified",
+    ]  # fmt: skip
+    assert "voxelize(curve: 'Curve', *," in pydoc.plain(pydoc.render_doc(vd.voxelize))
+
+
+def test_help_lists_every_name():
+    text = pydoc.plain(pydoc.render_doc(vd))
+    for name in vd.__all__:
+        kind = "class " if inspect.isclass(getattr(vd, name)) else ""
+        assert f"    {kind}{name}(" in text, name
