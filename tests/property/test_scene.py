@@ -16,7 +16,10 @@ from voxdisplay.scene.objects import TYPES
 
 FOLDER = Path(__file__).parents[2] / "examples"
 EXAMPLES = [json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))]
-KEYS = sorted({key for thing in TYPES.values() for key in thing.__struct_fields__} | {"from", "to"})
+KEYS = sorted(
+    {key for scene_object in TYPES.values() for key in scene_object.__struct_fields__}
+    | {"from", "to"}
+)
 
 values = st.recursive(
     st.none()

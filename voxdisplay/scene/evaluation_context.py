@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def blaming(path: str) -> Iterator[None]:
+def as_scene_error(path: str) -> Iterator[None]:
     """Turn a CurveError into a SceneError that says where."""
     try:
         yield
@@ -32,7 +32,7 @@ def blaming(path: str) -> Iterator[None]:
         raise SceneError(str(error), path=path, hint=error.hint) from error
 
 
-class Place:
+class EvaluationContext:
     """The place of one object.
 
     Parameters
@@ -53,25 +53,25 @@ class Place:
 
     def formula(self, key: str, source: str | float) -> Expression:
         """Parse an expression of t."""
-        with blaming(f"{self.path}.{key}"):
+        with as_scene_error(f"{self.path}.{key}"):
             return parse(source, self.names)
 
     def number(self, key: str, source: str | float) -> float:
         """Compute a number."""
-        with blaming(f"{self.path}.{key}"):
+        with as_scene_error(f"{self.path}.{key}"):
             return constant(source, self.names)
 
-    def row(self, key: str, sources: Sequence[str | float]) -> Floats:
+    def numbers(self, key: str, sources: Sequence[str | float]) -> Floats:
         """Compute a list of n numbers: (n,) float64."""
         # Long lists are of plain numbers, which need no parser and no path each.
         row = [
             source if isinstance(source, float) else self.number(f"{key}[{i}]", source)
             for i, source in enumerate(sources)
         ]
-        with blaming(self.path):
+        with as_scene_error(self.path):
             return arguments.array(key, row, (None,))
 
-    def table(self, key: str, rows: Sequence[Sequence[str | float]]) -> Floats:
+    def points(self, key: str, rows: Sequence[Sequence[str | float]]) -> Floats:
         """Compute n rows of three numbers: (n, 3) float64."""
         table = [
             [
@@ -80,12 +80,12 @@ class Place:
             ]
             for i, row in enumerate(rows)
         ]
-        with blaming(self.path):
+        with as_scene_error(self.path):
             return arguments.points(key, table, least=0)
 
-    def file(self, key: str, name: str) -> Floats:
+    def points_from_file(self, key: str, name: str) -> Floats:
         """Read a file of points beside the scene: (n, 3) float64."""
-        with blaming(f"{self.path}.{key}"):
+        with as_scene_error(f"{self.path}.{key}"):
             if self.folder is None:
                 raise CurveError("this scene has no folder, and may name no file")
             return read_points(self.folder, name)

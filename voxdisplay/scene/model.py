@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Item:
+class SceneItem:
     """One object of a scene.
 
     Attributes
@@ -55,7 +55,7 @@ class Scene:
     """
 
     size: Grid | None
-    items: tuple[Item, ...]
+    items: tuple[SceneItem, ...]
 
     def fitted(
         self, grid: Grid, mode: Literal["contain", "none"] = "contain"

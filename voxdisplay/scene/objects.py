@@ -13,7 +13,7 @@ from voxdisplay import curves
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.params import MAX_PARAMS
 from voxdisplay.expressions.parse import MAX_LENGTH
-from voxdisplay.scene.evaluation_context import Place
+from voxdisplay.scene.evaluation_context import EvaluationContext
 
 MAX_SIDE = 65535
 
@@ -35,18 +35,18 @@ Color = Annotated[
 ]
 
 
-class Thing(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=True, frozen=True):
+class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=True, frozen=True):
     """What all objects can say."""
 
     color: Color = "white"
     closed: bool | None = None
 
     @abstractmethod
-    def curve(self, place: Place) -> curves.Curve:
+    def curve(self, context: EvaluationContext) -> curves.Curve:
         """Make the curve; raise SceneError or CurveError."""
 
 
-class Parametric(Thing, tag="parametric", frozen=True):
+class Parametric(SceneObject, tag="parametric", frozen=True):
     """A curve given by three expressions of t, a <= t <= b, and optionally their derivatives."""
 
     x: Formula
@@ -57,41 +57,41 @@ class Parametric(Thing, tag="parametric", frozen=True):
     dy: Formula | None = None
     dz: Formula | None = None
 
-    def curve(self, place: Place) -> curves.Parametric:
+    def curve(self, context: EvaluationContext) -> curves.Parametric:
         """Make the curve."""
-        x, y, z = (place.formula(key, getattr(self, key)) for key in ("x", "y", "z"))
+        x, y, z = (context.formula(key, getattr(self, key)) for key in ("x", "y", "z"))
         dx, dy, dz = (
-            None if source is None else place.formula(key, source)
+            None if source is None else context.formula(key, source)
             for key, source in (("dx", self.dx), ("dy", self.dy), ("dz", self.dz))
         )
-        a, b = place.row("t", self.t).tolist()
+        a, b = context.numbers("t", self.t).tolist()
         return curves.Parametric(x, y, z, t=(a, b), closed=self.closed, dx=dx, dy=dy, dz=dz)
 
 
-class Segment(Thing, tag="segment", frozen=True):
+class Segment(SceneObject, tag="segment", frozen=True):
     """A straight line."""
 
     start: Vector = field(name="from")
     end: Vector = field(name="to")
 
-    def curve(self, place: Place) -> curves.Segment:
+    def curve(self, context: EvaluationContext) -> curves.Segment:
         """Make the curve."""
         return curves.Segment(
-            place.row("from", self.start), place.row("to", self.end), closed=self.closed
+            context.numbers("from", self.start), context.numbers("to", self.end), closed=self.closed
         )
 
 
-class Polyline(Thing, tag="polyline", frozen=True):
+class Polyline(SceneObject, tag="polyline", frozen=True):
     """Straight lines from point to point, and back to the first if closed is true."""
 
     points: list[Vector]
 
-    def curve(self, place: Place) -> curves.Polyline:
+    def curve(self, context: EvaluationContext) -> curves.Polyline:
         """Make the curve."""
-        return curves.Polyline(place.table("points", self.points), closed=self.closed)
+        return curves.Polyline(context.points("points", self.points), closed=self.closed)
 
 
-class Arc(Thing, tag="arc", frozen=True):
+class Arc(SceneObject, tag="arc", frozen=True):
     """A part of a circle, from the angle start to the angle end, in radians.
 
     With the normal [0, 0, 1], angle 0 is +x and "90*deg" is +y.
@@ -103,51 +103,51 @@ class Arc(Thing, tag="arc", frozen=True):
     end: Number
     normal: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, place: Place) -> curves.Arc:
+    def curve(self, context: EvaluationContext) -> curves.Arc:
         """Make the curve."""
         return curves.Arc(
-            place.row("center", self.center),
-            place.number("radius", self.radius),
-            place.number("start", self.start),
-            place.number("end", self.end),
-            place.row("normal", self.normal),
+            context.numbers("center", self.center),
+            context.number("radius", self.radius),
+            context.number("start", self.start),
+            context.number("end", self.end),
+            context.numbers("normal", self.normal),
             closed=self.closed,
         )
 
 
-class Circle(Thing, tag="circle", frozen=True):
+class Circle(SceneObject, tag="circle", frozen=True):
     """A circle in the plane across normal."""
 
     center: Vector
     radius: Number
     normal: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, place: Place) -> curves.Circle:
+    def curve(self, context: EvaluationContext) -> curves.Circle:
         """Make the curve."""
         return curves.Circle(
-            place.row("center", self.center),
-            place.number("radius", self.radius),
-            place.row("normal", self.normal),
+            context.numbers("center", self.center),
+            context.number("radius", self.radius),
+            context.numbers("normal", self.normal),
             closed=self.closed is not False,
         )
 
 
-class Ellipse(Thing, tag="ellipse", frozen=True):
+class Ellipse(SceneObject, tag="ellipse", frozen=True):
     """An ellipse, of two half axes: vectors from its center."""
 
     center: Vector
     axes: tuple[Vector, Vector]
 
-    def curve(self, place: Place) -> curves.Ellipse:
+    def curve(self, context: EvaluationContext) -> curves.Ellipse:
         """Make the curve."""
         return curves.Ellipse(
-            place.row("center", self.center),
-            place.table("axes", self.axes),
+            context.numbers("center", self.center),
+            context.points("axes", self.axes),
             closed=self.closed is not False,
         )
 
 
-class Helix(Thing, tag="helix", frozen=True):
+class Helix(SceneObject, tag="helix", frozen=True):
     """A helix: begins beside center at the angle start, and advances by pitch in each turn."""
 
     center: Vector
@@ -157,20 +157,20 @@ class Helix(Thing, tag="helix", frozen=True):
     axis: Vector = (0.0, 0.0, 1.0)
     start: Number = 0.0
 
-    def curve(self, place: Place) -> curves.Helix:
+    def curve(self, context: EvaluationContext) -> curves.Helix:
         """Make the curve."""
         return curves.Helix(
-            place.row("center", self.center),
-            place.number("radius", self.radius),
-            place.number("pitch", self.pitch),
-            place.number("turns", self.turns),
-            place.row("axis", self.axis),
-            start=place.number("start", self.start),
+            context.numbers("center", self.center),
+            context.number("radius", self.radius),
+            context.number("pitch", self.pitch),
+            context.number("turns", self.turns),
+            context.numbers("axis", self.axis),
+            start=context.number("start", self.start),
             closed=self.closed,
         )
 
 
-class Lissajous(Thing, tag="lissajous", frozen=True):
+class Lissajous(SceneObject, tag="lissajous", frozen=True):
     """center + amplitude * sin(frequency * t + phase), 0 <= t <= tau, for x, y and z."""
 
     center: Vector
@@ -178,18 +178,18 @@ class Lissajous(Thing, tag="lissajous", frozen=True):
     frequency: Vector
     phase: Vector = (0.0, 0.0, 0.0)
 
-    def curve(self, place: Place) -> curves.Lissajous:
+    def curve(self, context: EvaluationContext) -> curves.Lissajous:
         """Make the curve."""
         return curves.Lissajous(
-            place.row("center", self.center),
-            place.row("amplitude", self.amplitude),
-            place.row("frequency", self.frequency),
-            place.row("phase", self.phase),
+            context.numbers("center", self.center),
+            context.numbers("amplitude", self.amplitude),
+            context.numbers("frequency", self.frequency),
+            context.numbers("phase", self.phase),
             closed=self.closed,
         )
 
 
-class TorusKnot(Thing, tag="torus_knot", frozen=True):
+class TorusKnot(SceneObject, tag="torus_knot", frozen=True):
     """p times around the axis while q times around the tube; p = 2, q = 3 is the trefoil.
 
     major is the radius of the middle circle of the torus, minor that of its tube.
@@ -202,30 +202,30 @@ class TorusKnot(Thing, tag="torus_knot", frozen=True):
     minor: Number
     axis: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, place: Place) -> curves.TorusKnot:
+    def curve(self, context: EvaluationContext) -> curves.TorusKnot:
         """Make the curve."""
         return curves.TorusKnot(
-            place.number("p", self.p),
-            place.number("q", self.q),
-            place.row("center", self.center),
-            place.number("major", self.major),
-            place.number("minor", self.minor),
-            place.row("axis", self.axis),
+            context.number("p", self.p),
+            context.number("q", self.q),
+            context.numbers("center", self.center),
+            context.number("major", self.major),
+            context.number("minor", self.minor),
+            context.numbers("axis", self.axis),
             closed=self.closed is not False,
         )
 
 
-class Bezier(Thing, tag="bezier", frozen=True):
+class Bezier(SceneObject, tag="bezier", frozen=True):
     """A Bezier curve; its degree is one less than its control points."""
 
     points: list[Vector]
 
-    def curve(self, place: Place) -> curves.Bezier:
+    def curve(self, context: EvaluationContext) -> curves.Bezier:
         """Make the curve."""
-        return curves.Bezier(place.table("points", self.points), closed=self.closed)
+        return curves.Bezier(context.points("points", self.points), closed=self.closed)
 
 
-class BSpline(Thing, tag="bspline", frozen=True):
+class BSpline(SceneObject, tag="bspline", frozen=True):
     """A B-spline; with weights, a NURBS curve. There is one knot for each point, and degree + 1."""
 
     points: list[Vector]
@@ -233,28 +233,28 @@ class BSpline(Thing, tag="bspline", frozen=True):
     knots: list[Number] | None = None
     weights: list[Number] | None = None
 
-    def curve(self, place: Place) -> curves.BSpline:
+    def curve(self, context: EvaluationContext) -> curves.BSpline:
         """Make the curve."""
         return curves.BSpline(
-            place.table("points", self.points),
-            place.number("degree", self.degree),
-            None if self.knots is None else place.row("knots", self.knots),
-            None if self.weights is None else place.row("weights", self.weights),
+            context.points("points", self.points),
+            context.number("degree", self.degree),
+            None if self.knots is None else context.numbers("knots", self.knots),
+            None if self.weights is None else context.numbers("weights", self.weights),
             closed=self.closed,
         )
 
 
-class CatmullRom(Thing, tag="catmull_rom", frozen=True):
+class CatmullRom(SceneObject, tag="catmull_rom", frozen=True):
     """A smooth curve through points, and on to the first if closed is true."""
 
     points: list[Vector]
 
-    def curve(self, place: Place) -> curves.CatmullRom:
+    def curve(self, context: EvaluationContext) -> curves.CatmullRom:
         """Make the curve."""
-        return curves.CatmullRom(place.table("points", self.points), closed=self.closed)
+        return curves.CatmullRom(context.points("points", self.points), closed=self.closed)
 
 
-class Points(Thing, tag="points", frozen=True):
+class Points(SceneObject, tag="points", frozen=True):
     """Ordered points, joined by straight lines: either inline or in a file beside the scene.
 
     The file is a .csv of three columns x, y, z, or a .npy array of shape (n, 3).
@@ -263,12 +263,12 @@ class Points(Thing, tag="points", frozen=True):
     points: list[Vector] | None = None
     file: str | None = None
 
-    def curve(self, place: Place) -> curves.Points:
+    def curve(self, context: EvaluationContext) -> curves.Points:
         """Make the curve."""
         if self.points is not None and self.file is None:
-            points = place.table("points", self.points)
+            points = context.points("points", self.points)
         elif self.file is not None and self.points is None:
-            points = place.file("file", self.file)
+            points = context.points_from_file("file", self.file)
         else:
             raise CurveError("points needs either the key 'points' or the key 'file'")
         return curves.Points(points, closed=self.closed)
@@ -289,7 +289,7 @@ Object = (
     | CatmullRom
     | Points
 )
-TYPES = {str(thing.__struct_config__.tag): thing for thing in get_args(Object)}
+TYPES = {str(scene_object.__struct_config__.tag): scene_object for scene_object in get_args(Object)}
 
 
 class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):

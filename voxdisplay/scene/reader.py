@@ -21,9 +21,9 @@ from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import MAX_LENGTH, constant, excerpt
 from voxdisplay.raster.color import parse_color, parse_colors
 from voxdisplay.raster.grid import Grid
-from voxdisplay.scene.evaluation_context import Place, blaming
-from voxdisplay.scene.model import Item, Scene
-from voxdisplay.scene.objects import TYPES, Object, SceneFile, Thing
+from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
+from voxdisplay.scene.model import Scene, SceneItem
+from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
 
 MAX_BYTES = 16 << 20
 """Largest scene file. Long lists of points fit better in a file of their own."""
@@ -87,8 +87,8 @@ def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
     raw = _parse(data)
     alone = isinstance(raw, dict) and "type" in raw and "objects" not in raw
     if alone:
-        thing: Thing = _convert(raw, Object)
-        return Scene(None, (_item(thing, Place("$", {}, folder)),))
+        scene_object: SceneObject = _convert(raw, Object)
+        return Scene(None, (_item(scene_object, EvaluationContext("$", {}, folder)),))
     file: SceneFile = _convert(raw, SceneFile)
     size = Grid(*file.size) if file.size else None
     if size and size.voxels > MAX_VOXELS:
@@ -97,33 +97,38 @@ def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
     return Scene(
         size,
         tuple(
-            _item(thing, Place(f"$.objects[{i}]", names, folder))
-            for i, thing in enumerate(file.objects)
+            _item(scene_object, EvaluationContext(f"$.objects[{i}]", names, folder))
+            for i, scene_object in enumerate(file.objects)
         ),
     )
 
 
 def _params(params: dict[str, str | float]) -> dict[str, float]:
     values: dict[str, float] = {}
-    with blaming("$.params"):
+    with as_scene_error("$.params"):
         order = param_order(params)
     for name in order:
-        with blaming(f"$.params.{name}"):
+        with as_scene_error(f"$.params.{name}"):
             values[name] = constant(params[name], values)
     return values
 
 
-def _item(thing: Thing, place: Place) -> Item:
-    with blaming(place.path):
-        curve = thing.curve(place)
-    names = [thing.color] if isinstance(thing.color, str) else thing.color
+def _item(scene_object: SceneObject, context: EvaluationContext) -> SceneItem:
+    with as_scene_error(context.path):
+        curve = scene_object.curve(context)
+    names = [scene_object.color] if isinstance(scene_object.color, str) else scene_object.color
     for i, name in enumerate(names):
         try:
             parse_color(name)
         except ValueError as error:
-            index = "" if isinstance(thing.color, str) else f"[{i}]"
-            raise SceneError(str(error), path=f"{place.path}.color{index}") from None
-    return Item(str(thing.__struct_config__.tag), curve, parse_colors(thing.color), place.path)
+            index = "" if isinstance(scene_object.color, str) else f"[{i}]"
+            raise SceneError(str(error), path=f"{context.path}.color{index}") from None
+    return SceneItem(
+        str(scene_object.__struct_config__.tag),
+        curve,
+        parse_colors(scene_object.color),
+        context.path,
+    )
 
 
 def _parse(data: bytes | str) -> Any:

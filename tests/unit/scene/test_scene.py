@@ -45,8 +45,8 @@ ONE_OF_EACH: list[dict[str, Any]] = [
 ]
 
 
-def scene_of(*things: dict[str, Any], **more: Any) -> Scene:
-    return read_scene(json.dumps({"objects": things} | more))
+def scene_of(*objects: dict[str, Any], **more: Any) -> Scene:
+    return read_scene(json.dumps({"objects": objects} | more))
 
 
 def refused(data: object, **options: Any) -> SceneError:
@@ -79,27 +79,31 @@ class TestMeaning:
         slope = np.stack((-40 * np.sin(t), 40 * np.cos(t), 160 * np.sin(4 * t)))
         np.testing.assert_allclose(item.curve.derivative(t), slope, atol=1e-12)
 
-    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
-    def test_every_type(self, thing: dict[str, Any]) -> None:
-        (item,) = scene_of(thing).items
-        assert item.type == thing["type"]
-        assert type(item.curve).__name__.lower() == thing["type"].replace("_", "")
+    @pytest.mark.parametrize(
+        "scene_object", ONE_OF_EACH, ids=lambda scene_object: scene_object["type"]
+    )
+    def test_every_type(self, scene_object: dict[str, Any]) -> None:
+        (item,) = scene_of(scene_object).items
+        assert item.type == scene_object["type"]
+        assert type(item.curve).__name__.lower() == scene_object["type"].replace("_", "")
         assert item.color.tolist() == [[255, 255, 255]]
         assert np.isfinite(item.curve.position(np.array(item.curve.t_range))).all()
 
     def test_every_type_is_tried(self) -> None:
-        assert {thing["type"] for thing in ONE_OF_EACH} == set(reader.TYPES)
+        assert {scene_object["type"] for scene_object in ONE_OF_EACH} == set(reader.TYPES)
 
-    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
-    def test_every_number_may_be_an_expression(self, thing: dict[str, Any]) -> None:
+    @pytest.mark.parametrize(
+        "scene_object", ONE_OF_EACH, ids=lambda scene_object: scene_object["type"]
+    )
+    def test_every_number_may_be_an_expression(self, scene_object: dict[str, Any]) -> None:
         def expressed(value: Any) -> Any:
             if isinstance(value, list):
                 return [expressed(each) for each in value]
             number = isinstance(value, int) and not isinstance(value, bool)
             return f"one*{value}" if number else value
 
-        written = {key: expressed(value) for key, value in thing.items()}
-        (plain,) = scene_of(thing).items
+        written = {key: expressed(value) for key, value in scene_object.items()}
+        (plain,) = scene_of(scene_object).items
         (item,) = scene_of(written, params={"one": "2 - 1"}).items
         t = np.linspace(*plain.curve.t_range, 7)
         np.testing.assert_array_equal(item.curve.position(t), plain.curve.position(t))
@@ -336,10 +340,12 @@ class TestSchema:
             # The paper's own curve sticks out of the top, by two voxels.
             assert (points < np.array(scene.size)[:, None] + 2 * ("paper" in path.name)).all()
 
-    @pytest.mark.parametrize("thing", ONE_OF_EACH, ids=lambda thing: thing["type"])
-    def test_every_type_is_valid(self, thing: dict[str, Any]) -> None:
-        self.VALIDATOR.validate(thing)
-        self.VALIDATOR.validate({"objects": [thing], "params": {"a": 1, "b": "a"}})
+    @pytest.mark.parametrize(
+        "scene_object", ONE_OF_EACH, ids=lambda scene_object: scene_object["type"]
+    )
+    def test_every_type_is_valid(self, scene_object: dict[str, Any]) -> None:
+        self.VALIDATOR.validate(scene_object)
+        self.VALIDATOR.validate({"objects": [scene_object], "params": {"a": 1, "b": "a"}})
 
     @pytest.mark.parametrize(
         "data",
@@ -360,7 +366,7 @@ class TestSchema:
         refused(data)
 
     def test_every_curve_has_a_type(self) -> None:
-        kinds = {type(scene_of(thing).items[0].curve) for thing in ONE_OF_EACH}
+        kinds = {type(scene_of(scene_object).items[0].curve) for scene_object in ONE_OF_EACH}
         public = {getattr(curves, name) for name in curves.__all__}
         assert public - kinds == {curves.Curve, curves.Transformed}
 
