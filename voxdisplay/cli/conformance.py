@@ -11,11 +11,13 @@ from voxdisplay.cli.options import (
     SecondsType,
     baud_option,
     json_option,
-    note,
     port_option,
+    timeout_option,
+)
+from voxdisplay.cli.output import (
+    note,
     print_json,
     progress_bar,
-    timeout_option,
 )
 from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
 

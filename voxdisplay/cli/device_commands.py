@@ -8,12 +8,14 @@ import click
 import numpy as np
 
 from voxdisplay.cli.options import (
-    device_json,
     json_option,
-    note,
     open_display,
-    plural,
     port_options,
+)
+from voxdisplay.cli.output import (
+    device_json,
+    note,
+    plural,
     print_json,
 )
 from voxdisplay.display.baud import Baud

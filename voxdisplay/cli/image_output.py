@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import note, plural
+from voxdisplay.cli.output import (
+    note,
+    plural,
+)
 from voxdisplay.raster.pixel_format import Pixels
 
 if TYPE_CHECKING:

@@ -11,11 +11,19 @@ import click
 from voxdisplay import __version__
 from voxdisplay.cli.conformance import conformance
 from voxdisplay.cli.device_commands import clear, info, read
+from voxdisplay.cli.output import (
+    note,
+    open_missing_streams,
+)
 from voxdisplay.cli.plan import plan_command
 from voxdisplay.cli.ports import ports
 from voxdisplay.cli.preview import preview
 from voxdisplay.cli.push import push
-from voxdisplay.cli.signals import EndedError, ended_by_signals, have_streams, say, told_to_end
+from voxdisplay.cli.signals import (
+    TerminationSignal,
+    raise_termination_signals,
+    report_termination,
+)
 from voxdisplay.cli.test_pattern import test_pattern
 from voxdisplay.cli.view import view
 from voxdisplay.cli.voxelize import voxelize
@@ -75,27 +83,27 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command line; give its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
-    have_streams()
+    open_missing_streams()
     try:
-        with ended_by_signals():
+        with raise_termination_signals():
             # A command that ends by click's Exit gives its code; all others give nothing.
             ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return EXIT_USAGE
-    except (click.Abort, KeyboardInterrupt, EndedError) as why:
-        return told_to_end(why)
+    except (click.Abort, KeyboardInterrupt, TerminationSignal) as why:
+        return report_termination(why)
     except SystemExit as left:  # click's answer to a reader that has left, and to completion
         return EXIT_USAGE if left.code else 0
     except VoxDisplayError as error:
         if debug:
             traceback.print_exc()
-        say(f"voxdisplay: {error}")
+        note(f"voxdisplay: {error}")
         if error.hint:
-            say(f"  {error.hint}")
+            note(f"  {error.hint}")
         return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
     except OSError as error:  # a pipe's are TransportErrors: what is left is our own output
-        say(f"voxdisplay: the output cannot be written: {error.strerror}")
+        note(f"voxdisplay: the output cannot be written: {error.strerror}")
         return EXIT_USAGE
     except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
         if debug:
@@ -107,11 +115,11 @@ def main(arguments: list[str] | None = None) -> int:
 def _unforeseen(error: Exception) -> int:
     """Say what nobody has foreseen; give the exit code."""
     if isinstance(error, MemoryError):
-        say(f"voxdisplay: there is not enough memory: {error}")
-        say("  take a smaller size, or draw less")
+        note(f"voxdisplay: there is not enough memory: {error}")
+        note("  take a smaller size, or draw less")
         return EXIT_USAGE
-    say(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
-    say("  please report it with what voxdisplay --debug ... prints")
+    note(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
+    note("  please report it with what voxdisplay --debug ... prints")
     return EXIT_INTERNAL
 
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.signals import say
+from voxdisplay.cli.output import note
 from voxdisplay.display.baud import DEFAULT_BAUD, RATES, Baud
 from voxdisplay.transport.discovery import all_ports
 
@@ -171,31 +168,6 @@ def open_display(
     )
 
 
-def note(text: str) -> None:
-    """Tell a person something on stderr."""
-    say(text)
-
-
-def print_json(result: dict[str, Any]) -> None:
-    """Print the result for a script."""
-    click.echo(json.dumps(result, allow_nan=False))
-
-
-def device_json(info: vd.DeviceInfo) -> dict[str, Any]:
-    """Give what a script wants to know of a device."""
-    return {
-        "size": list(info.grid),
-        "format": info.format.value,
-        "protocol": info.protocol,
-        "firmware": info.firmware,
-    }
-
-
-def plural(count: int, thing: str) -> str:
-    """Write a count: "1 voxel", "2 voxels"."""
-    return f"{count:,} {thing}{'' if count == 1 else 's'}".replace(",", " ")
-
-
 class SizeType(click.ParamType[vd.Grid]):
     """A size such as 128x128x128 or 128,128,128."""
 
@@ -209,20 +181,3 @@ class SizeType(click.ParamType[vd.Grid]):
             return vd.Grid.parse(str(value).replace(",", "x"))
         except ValueError as error:
             self.fail(str(error), param, ctx)
-
-
-@contextlib.contextmanager
-def progress_bar(what: str, *, hidden: bool = False) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a bar on a terminal, once there is more than one step to wait for."""
-    stream = sys.stderr
-    if hidden or not stream.isatty():
-        yield None
-        return
-    with click.progressbar(length=1, label=what, file=stream) as bar:
-        bar.hidden = True
-
-        def update(done: int, total: int) -> None:
-            bar.length, bar.hidden = total, total <= 1
-            bar.update(done - bar.pos)
-
-        yield update

@@ -14,6 +14,8 @@ from voxdisplay.cli.options import (
     complete_port,
     fit_option,
     json_option,
+)
+from voxdisplay.cli.output import (
     note,
     plural,
     print_json,

@@ -11,12 +11,14 @@ import click
 import voxdisplay as vd
 from voxdisplay.cli.options import (
     baud_option,
-    device_json,
     json_option,
+    timeout_option,
+)
+from voxdisplay.cli.output import (
+    device_json,
     note,
     plural,
     print_json,
-    timeout_option,
 )
 from voxdisplay.display.baud import Baud
 from voxdisplay.display.scan import Answer, probe_all

@@ -14,7 +14,15 @@ from voxdisplay.cli.image_output import (
     save_picture,
     view_angle_option,
 )
-from voxdisplay.cli.options import SizeType, fit_option, note, plural, progress_bar
+from voxdisplay.cli.options import (
+    SizeType,
+    fit_option,
+)
+from voxdisplay.cli.output import (
+    note,
+    plural,
+    progress_bar,
+)
 from voxdisplay.cli.scene_drawing import draw
 
 _DEFAULT_GRID = vd.Grid(128, 128, 128)

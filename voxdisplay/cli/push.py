@@ -11,20 +11,26 @@ import voxdisplay as vd
 from voxdisplay.cli.image_output import PictureFileType, save_page
 from voxdisplay.cli.options import (
     capture_option,
-    device_json,
     fit_option,
     json_option,
-    note,
     open_display,
-    plural,
     port_options,
-    print_json,
-    progress_bar,
     reconnect_option,
 )
+from voxdisplay.cli.output import (
+    device_json,
+    note,
+    plural,
+    print_json,
+    progress_bar,
+)
 from voxdisplay.cli.scene_drawing import draw
-from voxdisplay.cli.signals import OnExit, leaving, on_exit_option
-from voxdisplay.cli.thumbnail import glimpse
+from voxdisplay.cli.signals import (
+    OnExit,
+    close_on_exit,
+    on_exit_option,
+)
+from voxdisplay.cli.thumbnail import print_thumbnail
 from voxdisplay.display.baud import Baud
 
 
@@ -75,7 +81,7 @@ def push(
         import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
     loaded = vd.load_scene(scene)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
-    with leaving(display, on_exit):
+    with close_on_exit(display, on_exit):
         fitted, remark = loaded.fitted(display.info.grid, fit)
         if remark:
             note(remark)
@@ -116,7 +122,7 @@ def push(
         if preview and page is not None:  # what was shown has been said, if this fails
             save_page(preview, page, display.info, frame.palette)
         if not quiet and not as_json:
-            glimpse(display, frame, page, baud)
+            print_thumbnail(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import voxdisplay as vd
-from voxdisplay.cli.options import note
+from voxdisplay.cli.output import (
+    note,
+)
 
 
 def voxelize_scene(scene: vd.Scene, **how: Any) -> list[vd.Sequence]:

@@ -6,10 +6,7 @@ Whatever it does then, it unwinds: the port is closed, and the picture is what `
 from __future__ import annotations
 
 import contextlib
-import errno
-import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
@@ -18,6 +15,7 @@ from typing import Any, Final, Literal
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.output import note
 
 OnExit = Literal["keep", "blank"]
 EXIT_INTERRUPT: Final = 130
@@ -33,7 +31,7 @@ on_exit_option = click.option(
 )
 
 
-class EndedError(BaseException):
+class TerminationSignal(BaseException):
     """A signal asked the program to end. Like `KeyboardInterrupt`, it is nobody's error."""
 
     def __init__(self, number: int) -> None:
@@ -43,11 +41,11 @@ class EndedError(BaseException):
 
 
 @contextlib.contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """Have signals raise `EndedError`, but those that are ignored, as under nohup."""
+def raise_termination_signals() -> Iterator[None]:
+    """Have signals raise `TerminationSignal`, but those that are ignored, as under nohup."""
 
     def end(number: int, _frame: FrameType | None) -> None:
-        raise EndedError(number)
+        raise TerminationSignal(number)
 
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
@@ -63,18 +61,18 @@ def ended_by_signals() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def leaving(display: vd.Display, on_exit: OnExit) -> Iterator[None]:
+def close_on_exit(display: vd.Display, on_exit: OnExit) -> Iterator[None]:
     """Close the display, as ``--on-exit`` says if the program is told to end."""
     try:
         yield
-    except (KeyboardInterrupt, EndedError):
-        say(_leave(display, on_exit))
+    except (KeyboardInterrupt, TerminationSignal):
+        note(_close_as_chosen(display, on_exit))
         raise
     finally:
         display.close()
 
 
-def _leave(display: vd.Display, on_exit: OnExit) -> str:
+def _close_as_chosen(display: vd.Display, on_exit: OnExit) -> str:
     if on_exit == "keep":
         return "the display keeps its last whole picture"
     try:
@@ -84,34 +82,10 @@ def _leave(display: vd.Display, on_exit: OnExit) -> str:
     return "the display is dark"
 
 
-def told_to_end(why: BaseException) -> int:
+def report_termination(why: BaseException) -> int:
     """Say why a command has ended before it was done; give the exit code."""
-    if isinstance(why, EndedError):
-        say(why.word)
+    if isinstance(why, TerminationSignal):
+        note(why.word)
         return why.exit_code
-    say("interrupted")
+    note("interrupted")
     return EXIT_INTERRUPT
-
-
-def say(text: str) -> None:
-    """Tell a person something, if there still is one."""
-    try:
-        click.echo(text, err=True)
-    except OSError as error:
-        # What Python would flush at its end goes nowhere, without complaint: with the terminal
-        # everything, but with a disk that is full only what was to be said.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        for stream in (sys.stdout, sys.stderr) if error.errno == errno.EIO else (sys.stderr,):
-            with contextlib.suppress(OSError, ValueError):
-                os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
-
-
-def have_streams() -> None:
-    """Open what the program was started without: a port must not get the number of stderr."""
-    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:  # the lowest that is free
-        continue
-    os.close(nowhere)
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115

@@ -9,15 +9,17 @@ import numpy as np
 
 import voxdisplay as vd
 from voxdisplay.cli.options import (
-    device_json,
     json_option,
-    note,
     open_display,
     port_options,
+)
+from voxdisplay.cli.output import (
+    device_json,
+    note,
     print_json,
     progress_bar,
 )
-from voxdisplay.cli.thumbnail import glimpse
+from voxdisplay.cli.thumbnail import print_thumbnail
 from voxdisplay.display import test_patterns
 from voxdisplay.display.baud import Baud
 from voxdisplay.raster.pixel_format import Pixels
@@ -100,7 +102,7 @@ def test_pattern(
             if check:
                 click.echo(judged.text())
             if not quiet and page is not None:
-                glimpse(display, page[0], page[1], baud)
+                print_thumbnail(display, page[0], page[1], baud)
     if check and not judged.right:
         raise click.exceptions.Exit(1)
 

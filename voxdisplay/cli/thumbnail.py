@@ -26,7 +26,7 @@ _BITS_A_VOXEL = 80
 _PATIENCE_S = 0.5
 
 
-def glimpse(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: Baud) -> None:
+def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, baud: Baud) -> None:
     """Draw what is on display, if stderr is a terminal that can show it and Pillow is installed.
 
     Parameters

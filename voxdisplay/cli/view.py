@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import SizeType, note, open_display, port_options
+from voxdisplay.cli.options import (
+    SizeType,
+    open_display,
+    port_options,
+)
+from voxdisplay.cli.output import (
+    note,
+)
 from voxdisplay.cli.scene_drawing import draw
 from voxdisplay.display.baud import Baud
 from voxdisplay.raster.pixel_format import Pixels

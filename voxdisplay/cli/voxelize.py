@@ -16,7 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import voxdisplay as vd
-from voxdisplay.cli.options import SizeType, json_option, note, plural, print_json
+from voxdisplay.cli.options import (
+    SizeType,
+    json_option,
+)
+from voxdisplay.cli.output import (
+    note,
+    plural,
+    print_json,
+)
 from voxdisplay.cli.scene_drawing import voxelize_scene
 from voxdisplay.voxelization import tangent_march
 
