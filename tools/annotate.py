@@ -135,7 +135,7 @@ def explain(capture: Iterator[Portion]) -> Iterator[Explained]:
             monitor.delimiter(segment.to)
             continue
         ended = segment.seconds != float("inf")
-        body = packets.unwire(segment.data) if ended and len(segment.data) >= 8 else None
+        body = packets.decode_segment(segment.data) if ended and len(segment.data) >= 8 else None
         if body is not None:
             notes = monitor.packet(segment.to, body, len(segment.data) + 1)
             yield Explained(segment, packets.describe(body), body, notes)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.reference_decoder import Decoder
+from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.reference_decoder import ReferenceDecoder
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
@@ -45,11 +45,11 @@ def op_name(op: int) -> str:
     return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
 
 
-class Reader(Decoder):
+class Reader(ReferenceDecoder):
     """The plain decoder, which notes each op as it draws."""
 
-    def __init__(self, said: Said) -> None:
-        super().__init__(said, _Watched(self))
+    def __init__(self, device: AnnouncedDevice) -> None:
+        super().__init__(device, _Watched(self))
         self.notes: list[Note] = []
         self.written: dict[int, int] = {}
         self.used: set[int] = set()
@@ -81,9 +81,9 @@ class Reader(Decoder):
         return " ".join(words)
 
     def _cursor_place(self) -> str:
-        if self.cursor >= self.said.voxels:
+        if self.cursor >= self.device.voxel_count:
             return "behind the end"
-        return "({}, {}, {})".format(*self.said.place(self.cursor))
+        return "({}, {}, {})".format(*self.device.voxel_at(self.cursor))
 
     def count(self, index: int, value: int) -> None:
         """Note a voxel that is written."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from annotate_ops import Note, Reader, op_name
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
@@ -55,7 +55,7 @@ class Monitor:
     """Both ends of one line."""
 
     def __init__(self) -> None:
-        self.said: Said | None = None
+        self.device: AnnouncedDevice | None = None
         self._session: _Session | None = None
         self._greeting: int | None = None
         self._delimited = {HOST: False, DEVICE: False}
@@ -103,11 +103,11 @@ class Monitor:
             self._hello(body)
             return
         session = self._session
-        if session is None or self.said is None:
+        if session is None or self.device is None:
             self._note("no session is open", "5")
             return
-        if len(body) - packets.HEADER_BYTES > self.said.max_payload:
-            self._note(f"a payload of more than {self.said.max_payload} bytes", "4")
+        if len(body) - packets.HEADER_BYTES > self.device.max_payload:
+            self._note(f"a payload of more than {self.device.max_payload} bytes", "4")
         room = session.credit_until - self._position
         reserve = 0 if kind == spec.TYPE_STATUS else spec.LIMIT_RESERVE
         if room < reserve:
@@ -143,22 +143,22 @@ class Monitor:
         session.ends["tag", seq] = self._position
 
     def _read(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
-        said = self._said
+        device = self._device
         start, count = (int.from_bytes(body[at : at + 4], "little") for at in (4, 8))
-        if not said.has("READ"):
+        if not device.has("READ"):
             self._note("the device has not announced READ", "5")
         if flags & ~spec.READ_FLAG_BACK or frame or body[3] or len(body) != 12:
             self._note("a READ with reserved bits, or of another length", "10")
-        if count == 0 or start + count > said.voxels:
+        if count == 0 or start + count > device.voxel_count:
             self._note("a READ of nothing, or beyond the last voxel", "10")
         session.reads[seq] = (start, count, bool(flags & spec.READ_FLAG_BACK))
         session.ends["tag", seq] = self._position
 
     @property
-    def _said(self) -> Said:
-        if self.said is None:
+    def _device(self) -> AnnouncedDevice:
+        if self.device is None:
             raise AssertionError("asked only in a session")
-        return self.said
+        return self.device
 
     def _data(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
         if flags & ~(spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT):
@@ -194,7 +194,7 @@ class Monitor:
         for index, value in self._ops(payload).items():
             before, by = current.written.setdefault(index, (value, seq))
             if before != value and by != seq:
-                place = self._said.place(index)
+                place = self._device.voxel_at(index)
                 self._note(f"voxel {place} has another pixel in packet {by}", "6")
                 break
             current.written[index] = (value, seq)
@@ -205,7 +205,7 @@ class Monitor:
 
     def _ops(self, payload: bytes) -> dict[int, int]:
         """Note what ops do; give what they write."""
-        reader = Reader(self._said)
+        reader = Reader(self._device)
         try:
             reader.draw(payload)
         except Refused as refused:
@@ -220,14 +220,14 @@ class Monitor:
     # -- what the device says
 
     def _heard(self, body: bytes) -> None:
-        answer = packets.Answer(body)
+        answer = packets.Response(body)
         if answer.kind not in packets.LAYOUTS:
             self._note(f"a device sends no packet of type {answer.kind}", "4")
-        elif not answer.whole:
+        elif not answer.is_complete:
             self._note("shorter than the fields of its type", "4")
         elif answer.kind == spec.TYPE_INFO:
             self._info(answer)
-        elif self._session is None or self.said is None:
+        elif self._session is None or self.device is None:
             self._note("no session is open: a host drops it")
         elif answer.kind == spec.TYPE_ACK:
             self._ack(self._session, answer)
@@ -236,22 +236,22 @@ class Monitor:
         else:
             self._error(self._session, answer)
 
-    def _info(self, info: packets.Answer) -> None:
-        said = Said.of(info)
-        self._note(str(said))
-        if self.said and self.said.boot != said.boot:
+    def _info(self, info: packets.Response) -> None:
+        device = AnnouncedDevice.from_info(info)
+        self._note(str(device))
+        if self.device and self.device.boot != device.boot:
             self._note("the device has restarted")
             self._front = None
-        self.said = said
+        self.device = device
         if info.session != self._greeting:
             self._note("not of the session that was asked for: a host drops it")
             return
         if self._session is None:
             # It may answer any of them: the first leaves least room.
-            self._session = _Session(info.session, credit_until=self._hellos[0] + said.rx_buffer)
+            self._session = _Session(info.session, credit_until=self._hellos[0] + device.rx_buffer)
 
-    def _ack(self, session: _Session, ack: packets.Answer) -> None:
-        if ack.session != session.number or ack.boot != self._said.boot:
+    def _ack(self, session: _Session, ack: packets.Response) -> None:
+        if ack.session != session.number or ack.boot != self._device.boot:
             self._note("of another session or start of the device: a host begins again")
             return
         if (ack.next - session.next) % 256 > (session.ahead - session.next) % 256:
@@ -269,7 +269,7 @@ class Monitor:
         elif ack.frame:
             self._note("frame is not 0 though SHOWN is clear", "9")
 
-    def _credit(self, session: _Session, ack: packets.Answer) -> None:
+    def _credit(self, session: _Session, ack: packets.Response) -> None:
         kind = "tag" if ack.flags & spec.ACK_FLAG_ASKED else "data"
         end = session.ends.get((kind, ack.last))
         if end is not None:
@@ -282,7 +282,7 @@ class Monitor:
             ):
                 self._note(f"received has number {seq}, which was never sent", "9")
 
-    def _shown(self, session: _Session, ack: packets.Answer) -> None:
+    def _shown(self, session: _Session, ack: packets.Response) -> None:
         shown = next((f for f in session.frames if f.number % 256 == ack.frame), None)
         if shown is None:
             if session.shown % 256 != ack.frame or session.shown < 0:
@@ -291,8 +291,8 @@ class Monitor:
             self._note(f"frame {ack.frame} is on display, but is not whole", "6")
         else:
             self._swap(session, shown)
-        if self._front is not None and self._said.has("DIGEST"):
-            meant = self._front.digest(self._said)
+        if self._front is not None and self._device.has("DIGEST"):
+            meant = self._front.digest(self._device)
             if ack.digest != meant:
                 self._note(f"the digest is {ack.digest:08X}h, that of the frame {meant:08X}h", "8")
 
@@ -303,7 +303,7 @@ class Monitor:
         else:
             page = None if self._front is None else self._front.copy()
         if page is not None:
-            decoder = Decoder(self._said, page)
+            decoder = ReferenceDecoder(self._device, page)
             for payload in shown.payloads.values():
                 try:
                     decoder.draw(payload)
@@ -315,7 +315,7 @@ class Monitor:
         session.shown = shown.number
         session.frames = [f for f in session.frames if f.number > shown.number]
 
-    def _page(self, session: _Session, answer: packets.Answer) -> None:
+    def _page(self, session: _Session, answer: packets.Response) -> None:
         asked = session.reads.get(answer.seq)
         if asked is None:
             self._note(f"answers a READ {answer.seq} that nobody asked", "10")
@@ -330,14 +330,14 @@ class Monitor:
         for place, value in enumerate(got):
             meant = self._front.pixels.get(start + place, 0)
             if value != meant:
-                where = self._said.place(start + place)
+                where = self._device.voxel_at(start + place)
                 self._note(f"voxel {where} is {value:X}h, shown was {meant:X}h", "10")
                 return
         self._note("the pixels are those of the frame on display")
 
-    def _pixels(self, answer: packets.Answer) -> list[int] | None:
+    def _pixels(self, answer: packets.Response) -> list[int] | None:
         """Read the ops of a PAGE: they draw from index 0 of a page that is long enough."""
-        reader = Reader(self._said)
+        reader = Reader(self._device)
         try:
             reader.draw(answer.tail)
         except Refused as refused:
@@ -350,7 +350,7 @@ class Monitor:
             return None
         return [reader.page.pixels.get(index, 0) for index in range(answer.count)]
 
-    def _error(self, session: _Session, error: packets.Answer) -> None:
+    def _error(self, session: _Session, error: packets.Response) -> None:
         if error.code == spec.CODE_NO_SESSION:
             self._note("the device has lost the session: a host begins again")
             self._session = None

@@ -48,7 +48,7 @@ def restarts_on_long_noise(patch):
     "9.2/does-not-lapse",
     "11/first-op-first",
     "11/order-of-op",
-    "11/flags-of-commit",
+    "11/refused-commit",
 )
 def dies_of_a_reserved_op(patch):
     def draw(old, self, packet, page):

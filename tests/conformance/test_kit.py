@@ -12,11 +12,11 @@ from bench_top import BenchTop
 
 from firmware_sim import crc
 from voxdisplay.conformance import CHECKS, ops, packets
-from voxdisplay.conformance.announced import FEATURES, Said
-from voxdisplay.conformance.device_bugs import MISTAKES
-from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.announced_device import FEATURES, AnnouncedDevice
+from voxdisplay.conformance.device_bugs import DEVICE_BUGS
+from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
-from voxdisplay.conformance.run import Verdict, chosen, examine
+from voxdisplay.conformance.run import Verdict, run_checks, select_checks
 from voxdisplay.errors import TransportClosed
 from voxdisplay.wire import spec
 
@@ -43,12 +43,12 @@ BYSTANDERS = (
 )  # fmt: skip
 
 
-def device(**config):
+def emulated_port(**config):
     return BenchTop(**{**SMALL, "rx_buffer": 2048, "boot": 7} | config)
 
 
 def examined(port, only=(), **how):
-    return examine(port, only, clock=port.clock, **how)
+    return run_checks(port, only, clock=port.clock, **how)
 
 
 def by_verdict(report, verdict):
@@ -66,28 +66,28 @@ def explain(report):
 # -- a third reading of the document
 
 
-def said_of(vector):
+def device_of(vector):
     pixel_format = getattr(spec, f"FORMAT_{vector['format']}")
     allowed = dict(vector.lines).get("features")
     names = allowed.split("|") if allowed else list(FEATURES)
     if pixel_format != spec.FORMAT_INDEX8:
         names = [name for name in names if name not in {"DIFF", "PALETTE"}]
     bits = sum(1 << FEATURES[name] for name in names)
-    return Said(pixel_format, *vector.grid, features=bits)
+    return AnnouncedDevice(pixel_format, *vector.grid, features=bits)
 
 
 @pytest.mark.parametrize("vector", document.vectors("ops"), ids=str)
 def test_what_ops_draw(vector):
-    said, page = said_of(vector), Page()
-    Decoder(said, page).draw(vector.hex("ops"))
+    device, page = device_of(vector), Page()
+    ReferenceDecoder(device, page).draw(vector.hex("ops"))
     lit = {place: int.from_bytes(pixel, "little") for place, pixel in vector.voxels().items()}
-    assert {said.place(index): value for index, value in page.pixels.items()} == lit
-    assert page.digest(said) == vector.integer("digest")
+    assert {device.voxel_at(index): value for index, value in page.pixels.items()} == lit
+    assert page.digest(device) == vector.integer("digest")
 
 
 @pytest.mark.parametrize("vector", document.vectors("refused"), ids=str)
 def test_what_is_refused(vector):
-    decoder = Decoder(said_of(vector), Page())
+    decoder = ReferenceDecoder(device_of(vector), Page())
     if vector["code"].startswith("FINE"):
         decoder.draw(vector.hex("ops"))
         return
@@ -99,15 +99,15 @@ def test_what_is_refused(vector):
 
 @pytest.mark.parametrize("vector", document.vectors("cobs"), ids=str)
 def test_cobs(vector):
-    assert packets.stuff(vector.hex("decoded")) == vector.hex("encoded")
-    assert packets.unstuff(vector.hex("encoded")) == vector.hex("decoded")
+    assert packets.cobs_encode(vector.hex("decoded")) == vector.hex("encoded")
+    assert packets.cobs_decode(vector.hex("encoded")) == vector.hex("decoded")
 
 
 @pytest.mark.parametrize("vector", document.vectors("packet"), ids=str)
 def test_packets(vector):
     whole = vector.hex("packet")
-    assert packets.wire(whole[:-4]) == vector.hex("wire")
-    assert packets.unwire(vector.hex("wire")[:-1]) == whole[:-4]
+    assert packets.encode(whole[:-4]) == vector.hex("wire")
+    assert packets.decode_segment(vector.hex("wire")[:-1]) == whole[:-4]
 
 
 # -- a device that keeps to the document
@@ -115,10 +115,12 @@ def test_packets(vector):
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_emulator_holds(name):
-    report = examined(device(**DEVICES[name]))
+    report = examined(emulated_port(**DEVICES[name]))
     assert report.holds, explain(report)
     assert len(report.results) == len(CHECKS)
-    assert report.left.startswith("dark" if name in {"bare", "digest-only"} else "as it was")
+    assert report.display_state.startswith(
+        "dark" if name in {"bare", "digest-only"} else "as it was"
+    )
 
 
 def test_over_a_real_tty(emulator, run):
@@ -138,30 +140,30 @@ def test_over_a_real_tty(emulator, run):
     ids="-".join,
 )
 def test_the_emulator_holds_on_a_slow_line(name, line):
-    report = examined(device(**line, **DEVICES.get(name, {})))
+    report = examined(emulated_port(**line, **DEVICES.get(name, {})))
     assert report.holds, explain(report)
 
 
 @pytest.mark.parametrize("name", ["at-once", "mono", "wide"])
 def test_the_picture_is_put_back(name):
-    port = device(**DEVICES[name])
-    said = Said.of(_info(port))
-    drawn = ops.literal(said, [1, 0, 1]) + ops.skip(said.voxels - 4) + ops.run()
-    port.write(packets.wire(packets.data(0, 0, drawn, packets.CLEAR | packets.COMMIT)), 1)
+    port = emulated_port(**DEVICES[name])
+    device = AnnouncedDevice.from_info(_info(port))
+    drawn = ops.literal(device, [1, 0, 1]) + ops.skip(device.voxel_count - 4) + ops.run()
+    port.write(packets.encode(packets.data(0, 0, drawn, packets.CLEAR | packets.COMMIT)), 1)
     while not port.bench.snapshot().pixels.strip(b"\0"):
-        port.read(said.period_s)
+        port.read(device.period_s)
     before = port.bench.snapshot().pixels
     report = examined(port, ["7/pen", "6/clear"])
     assert report.holds, explain(report)
-    assert report.left == "as it was"
+    assert report.display_state == "as it was"
     assert port.bench.snapshot().pixels == before
 
 
 def _info(port):
-    port.write(b"\0" + packets.wire(packets.hello(9)), 1)
+    port.write(b"\0" + packets.encode(packets.hello(9)), 1)
     (segment, rest) = port.read(1).split(b"\0")
     assert not rest
-    return packets.Answer(packets.unwire(segment))
+    return packets.Response(packets.decode_segment(segment))
 
 
 # -- devices that do not
@@ -171,20 +173,20 @@ def _info(port):
 def test_a_fault_is_found_where_it_is(fault, monkeypatch):
     fault.make(monkeypatch)
     bystanders = [] if fault.spreads else BYSTANDERS
-    report = examined(device(**fault.config), [*fault.fails, *bystanders])
+    report = examined(emulated_port(**fault.config), [*fault.fails, *bystanders])
     broken = by_verdict(report, Verdict.BROKEN)
     assert broken == set(fault.fails), explain(report)
-    said = " ".join(result.likely for result in report.results)
-    assert fault.likely in said, said
+    device = " ".join(result.likely_cause for result in report.results)
+    assert fault.likely in device, device
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", broken_devices.MUTANTS, ids=str)
 def test_a_fault_is_found_nowhere_else(fault, monkeypatch):
     fault.make(monkeypatch)
-    report = examined(device(**fault.config))
+    report = examined(emulated_port(**fault.config))
     broken = by_verdict(report, Verdict.BROKEN)
-    random_ones = {"7/anything", "11/anything", "12/mutated", "12/noise"}
+    random_ones = {"7/random-ops", "11/random-ops", "12/mutated", "12/noise"}
     assert set(fault.fails) <= broken
     assert fault.spreads or broken - random_ones <= set(fault.fails), explain(report)
 
@@ -197,9 +199,9 @@ def test_every_check_finds_a_fault():
 
 def test_a_wrong_check_value_is_named(monkeypatch):
     monkeypatch.setattr(crc, "_TABLE", _castagnoli())
-    report = examined(device(), ["3"])
-    assert report.said is None
-    assert "CRC-32C" in report.results[0].likely
+    report = examined(emulated_port(), ["3"])
+    assert report.device is None
+    assert "CRC-32C" in report.results[0].likely_cause
     assert {result.verdict for result in report.results[1:]} == {Verdict.NOT_RUN}
 
 
@@ -222,10 +224,10 @@ class Pipe:
         self.read_bytes = 0
 
     def read(self, timeout_s):
-        if not (said := self._say(self)):
+        if not (device := self._say(self)):
             time.sleep(min(timeout_s, 0.05))
-        self.read_bytes += len(said)
-        return said
+        self.read_bytes += len(device)
+        return device
 
     def write(self, data, timeout_s):
         pass
@@ -244,15 +246,15 @@ def gone(_pipe):
         lambda _pipe: b"",
         lambda _pipe: b"\x55" * 997,
         lambda _pipe: bytes(1000),
-        lambda _pipe: packets.wire(packets.body(8, payload=bytes(19))) * 50,
+        lambda _pipe: packets.encode(packets.body(8, payload=bytes(19))) * 50,
         gone,
     ],
     ids=["silent", "babbling", "zeros", "answering-unasked", "gone"],
 )
 def test_what_is_no_device_ends_soon(say):
-    report = examine(Pipe(say), timeout_s=0.05, opening_s=0.1)
+    report = run_checks(Pipe(say), timeout_s=0.05, opening_s=0.1)
     assert not report.holds
-    assert report.said is None
+    assert report.device is None
     assert len(report.results) == len(CHECKS) + 1
 
 
@@ -263,31 +265,31 @@ class Fickle(Pipe):
         super().__init__(lambda pipe: pipe.out.pop(0) if pipe.out else b"")
         self.rng = random.Random(seed)
         self.out = []
-        self.inner = device(refresh=0)
+        self.inner = emulated_port(refresh=0)
 
     def write(self, data, timeout_s):
         self.inner.write(data, timeout_s)
         self.out += filter(None, [self.inner.read(0)])
         for segment in data.split(b"\0"):
-            asked = packets.unwire(segment) if len(segment) >= 8 else None
+            asked = packets.decode_segment(segment) if len(segment) >= 8 else None
             if asked and asked[0] >> 4 != spec.TYPE_HELLO and self.rng.random() < 0.5:
                 kind = self.rng.choice([8, 8, 9, 10, 11, 3])
                 seq = self.rng.choice([asked[1], self.rng.randrange(256)])
                 rest = self.rng.randbytes(self.rng.randint(0, 40))
                 answer = bytes((kind << 4 | self.rng.randrange(16), seq, 0, asked[1])) + rest
-                self.out.append(packets.wire(answer) + self.rng.choice([b"", b"\0", b"noise\0"]))
+                self.out.append(packets.encode(answer) + self.rng.choice([b"", b"\0", b"noise\0"]))
         self.rng.shuffle(self.out)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_whatever_a_device_answers_the_kit_ends_well(seed):
-    report = examine(Fickle(seed), timeout_s=0.01, opening_s=1)
+    report = run_checks(Fickle(seed), timeout_s=0.01, opening_s=1)
     assert not report.holds
     assert len(report.results) >= len(CHECKS)
 
 
 def test_a_device_that_falls_silent_is_given_up():
-    port = device()
+    port = emulated_port()
     inner = port.write
     written = 0
 
@@ -301,7 +303,7 @@ def test_a_device_that_falls_silent_is_given_up():
     report = examined(port)
     assert by_verdict(report, Verdict.BROKEN)
     assert len(by_verdict(report, Verdict.NOT_RUN)) > 100
-    assert report.left.startswith("unknown")
+    assert report.display_state.startswith("unknown")
 
 
 @pytest.mark.parametrize(
@@ -319,24 +321,26 @@ def test_an_impossible_info_ends_it(changes):
 
     class Odd(Pipe):
         def write(self, data, _timeout_s):
-            session = packets.unwire(data.strip(b"\0"))
+            session = packets.decode_segment(data.strip(b"\0"))
             if session:
                 self.answer = body[:1] + session[4:6] + body[3:] + bytes(3)
 
-    pipe = Odd(lambda pipe: packets.wire(packets.body(9, payload=pipe.__dict__.pop("answer", b""))))
+    pipe = Odd(
+        lambda pipe: packets.encode(packets.body(9, payload=pipe.__dict__.pop("answer", b"")))
+    )
     pipe.answer = body + bytes(3)
-    report = examine(pipe, timeout_s=0.05, opening_s=0.3)
+    report = run_checks(pipe, timeout_s=0.05, opening_s=0.3)
     assert not report.holds
     assert report.results[0].check.id == "5/answers"
     assert by_verdict(report, Verdict.NOT_RUN)
 
 
 def test_an_interrupted_examination_puts_the_picture_back():
-    port = device(refresh=0)
-    said = Said.of(_info(port))
-    port.write(packets.wire(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
+    port = emulated_port(refresh=0)
+    device = AnnouncedDevice.from_info(_info(port))
+    port.write(packets.encode(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
     before = port.bench.snapshot().pixels
-    assert before.count(0xFF) == 3 < said.voxels
+    assert before.count(0xFF) == 3 < device.voxel_count
 
     def enough(_result):
         raise KeyboardInterrupt
@@ -351,20 +355,20 @@ def test_an_interrupted_examination_puts_the_picture_back():
 
 def test_checks_have_names_of_their_own():
     assert len({check.id for check in CHECKS}) == len(CHECKS)
-    assert all(check.demands and check.section for check in CHECKS)
+    assert all(check.requirement and check.section for check in CHECKS)
 
 
 def test_choosing():
-    assert {check.section for check in chosen(["7"])} >= {"7", "7.1", "7.8"}
-    assert [check.id for check in chosen(["7.3/line-ties"])] == ["7.3/line-ties"]
-    assert {check.name for check in chosen(["line-*"])} == {"line-ties", "line-of-one"}
-    assert "10/ranges" not in {check.id for check in chosen(["9"])}
+    assert {check.section for check in select_checks(["7"])} >= {"7", "7.1", "7.8"}
+    assert [check.id for check in select_checks(["7.3/line-ties"])] == ["7.3/line-ties"]
+    assert {check.name for check in select_checks(["line-*"])} == {"line-ties", "line-of-one"}
+    assert "10/ranges" not in {check.id for check in select_checks(["9"])}
     with pytest.raises(ValueError, match="no check is named by 'nothing'"):
-        chosen(["nothing"])
+        select_checks(["nothing"])
 
 
 def test_every_mistake_says_what_it_is():
-    assert all(mistake.__doc__ for mistake in MISTAKES)
+    assert all(mistake.__doc__ for mistake in DEVICE_BUGS)
 
 
 def test_the_command_lists_and_refuses(run):

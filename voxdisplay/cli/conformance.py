@@ -22,7 +22,7 @@ from voxdisplay.cli.output import (
 from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
 
 if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
-    from voxdisplay.conformance.announced import Said
+    from voxdisplay.conformance.announced_device import AnnouncedDevice
     from voxdisplay.conformance.catalogue import Check
     from voxdisplay.conformance.run import Result
 
@@ -82,7 +82,7 @@ def conformance(
     from voxdisplay.conformance import report, run  # noqa: PLC0415 - only what is needed
 
     try:
-        selected = run.chosen(only)
+        selected = run.select_checks(only)
     except ValueError as error:
         raise click.BadParameter(f"{error}; --list lists them", param_hint="--only") from error
     if as_list:
@@ -106,7 +106,7 @@ def conformance(
                     click.echo(report.clean(text))
                     click.echo("\n".join(report.transcript_lines(result.log)))
 
-            outcome = run.examine(
+            outcome = run.run_checks(
                 pipe,
                 only,
                 timeout_s=timeout_s,
@@ -121,13 +121,13 @@ def conformance(
     if as_json:
         print_json(report.as_json(port, outcome))
     else:
-        for line in report.lines(outcome, transcripts=not verbose):
+        for line in report.report_lines(outcome, transcripts=not verbose):
             click.secho(line, fg="red" if line.startswith("BROKEN") else None)
     if not outcome.holds:
         raise click.exceptions.Exit(_EXIT_BROKEN)
 
 
-def _announce(port: str, said: Said, *, kept: bool) -> None:
+def _announce(port: str, said: AnnouncedDevice, *, kept: bool) -> None:
     from voxdisplay.conformance.report import clean  # noqa: PLC0415 - only what is needed
 
     note(f"{port}  {clean(str(said))}")
@@ -137,9 +137,12 @@ def _announce(port: str, said: Said, *, kept: bool) -> None:
 
 def _list(checks: list[Check], *, as_json: bool) -> None:
     if as_json:
-        keys = ("section", "name", "demands")
-        print_json({"checks": [{key: getattr(check, key) for key in keys} for check in checks]})
+        rows = [
+            {"section": check.section, "name": check.name, "demands": check.requirement}
+            for check in checks
+        ]
+        print_json({"checks": rows})
         return
     width = max(len(check.id) for check in checks)
     for check in sorted(checks, key=lambda check: check.order):
-        click.echo(f"{check.id:<{width}}  {check.demands}")
+        click.echo(f"{check.id:<{width}}  {check.requirement}")

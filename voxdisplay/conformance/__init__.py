@@ -8,7 +8,7 @@ read by whoever has built a device and sees a check fail::
     probe       the hands that they have: show, look, read back
     dialogue    what the hands are made of: send, hear, ask, demand
     run         one after the other, and what came of each
-    packets  said  page  decoder  arc     packets, INFO, pages and ops, in their simplest form
+    packets  device  page  decoder  arc     packets, INFO, pages and ops, in their simplest form
     mistakes    decoders that misread one rule each, to name what is probably wrong
 
 The kit must be able to say wrong things, so it does not use ``voxdisplay.link``; and what it
@@ -17,6 +17,6 @@ expects must not come from what it judges, so it uses none of the driver's coder
 """
 
 from voxdisplay.conformance.catalogue import CHECKS, Check
-from voxdisplay.conformance.run import Result, Verdict, examine
+from voxdisplay.conformance.run import Result, Verdict, run_checks
 
-__all__ = ["CHECKS", "Check", "Result", "Verdict", "examine"]
+__all__ = ["CHECKS", "Check", "Result", "Verdict", "run_checks"]

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
-from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.announced_device import AnnouncedDevice
 
 if TYPE_CHECKING:
     from voxdisplay.conformance.probe import Probe
 
 Body = Callable[["Probe"], None]
-Need = Callable[[Said], str]
+Precondition = Callable[[AnnouncedDevice], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +28,18 @@ class Check:
     ----------
     section, name : str
         Together they are its ``id``, as ``7.3/line-ties``.
-    demands : str
+    requirement : str
         What the document says, in short.
-    needs : tuple of callable
-        Each takes a `Said` and gives why the check does not concern such a device, or ``""``.
+    preconditions : tuple of callable
+        Each takes an `AnnouncedDevice` and returns why the check does not apply to it, or ``""``.
     run : callable
-        Takes a `Probe`; raises `Broken` if the device does otherwise.
+        Takes a `Probe`; raises `Violation` if the device does otherwise.
     """
 
     section: str
     name: str
-    demands: str
-    needs: tuple[Need, ...]
+    requirement: str
+    preconditions: tuple[Precondition, ...]
     run: Body
 
     @property
@@ -57,9 +57,9 @@ class Check:
         inner = f"{self.section}/".startswith((f"{pattern}/", f"{pattern}."))
         return inner or fnmatchcase(self.id, pattern) or fnmatchcase(self.name, pattern)
 
-    def obstacle(self, said: Said) -> str:
+    def not_applicable_reason(self, device: AnnouncedDevice) -> str:
         """Say why it does not concern a device; ``""`` if it does."""
-        return next((reason for need in self.needs if (reason := need(said))), "")
+        return next((reason for need in self.preconditions if (reason := need(device))), "")
 
 
 CHECKS: list[Check] = []
@@ -89,7 +89,7 @@ SECTIONS = {
 }
 
 
-def check(section: str, name: str, demands: str, *needs: Need) -> Callable[[Body], Body]:
+def check(section: str, name: str, demands: str, *needs: Precondition) -> Callable[[Body], Body]:
     """Put a function on the list."""
 
     def enlist(run: Body) -> Body:
@@ -102,36 +102,42 @@ def check(section: str, name: str, demands: str, *needs: Need) -> Callable[[Body
 # -- what a check may need
 
 
-def feature(name: str) -> Need:
+def feature(name: str) -> Precondition:
     """Need a feature that is announced."""
-    return lambda said: "" if said.has(name) else f"{name} is not announced"
+    return lambda device: "" if device.has(name) else f"{name} is not announced"
 
 
-def without(name: str) -> Need:
+def without_feature(name: str) -> Precondition:
     """Need a feature that is not announced."""
-    return lambda said: f"{name} is announced" if said.has(name) else ""
+    return lambda device: f"{name} is announced" if device.has(name) else ""
 
 
-def formats(*values: int) -> Need:
+def pixel_formats(*values: int) -> Precondition:
     """Need one of some pixel formats."""
-    return lambda said: "" if said.format in values else "of another pixel format"
+    return lambda device: "" if device.format in values else "of another pixel format"
 
 
-def voxels(count: int) -> Need:
+def min_voxels(count: int) -> Precondition:
     """Need a grid of so many voxels."""
-    return lambda said: "" if said.voxels >= count else f"the grid has fewer than {count} voxels"
+    return lambda device: (
+        "" if device.voxel_count >= count else f"the grid has fewer than {count} voxels"
+    )
 
 
-def seen(said: Said) -> str:
+def readable_display(device: AnnouncedDevice) -> str:
     """Need to find out what is on display."""
-    return "" if said.is_seen else "neither READ nor DIGEST is announced: pictures cannot be seen"
+    return (
+        ""
+        if device.is_readable
+        else "neither READ nor DIGEST is announced: pictures cannot be seen"
+    )
 
 
-def ticking(said: Said) -> str:
+def refresh_tick(device: AnnouncedDevice) -> str:
     """Need a refresh tick."""
-    return "" if said.refresh else "swaps happen at once"
+    return "" if device.refresh else "swaps happen at once"
 
 
-def at_once(said: Said) -> str:
+def immediate_swap(device: AnnouncedDevice) -> str:
     """Need swaps that happen at once."""
-    return "swaps wait for a tick" if said.refresh else ""
+    return "swaps wait for a tick" if device.refresh else ""

@@ -9,55 +9,55 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.reference_decoder import Decoder, Place, Refused
+from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
+from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page, mix
 from voxdisplay.wire import spec
 
 
-class XandYSwapped(Decoder):
+class XandYSwapped(ReferenceDecoder):
     """The axes x and y are swapped."""
 
-    def place_of(self, a: int, b: int, c: int) -> Place:
+    def coordinates(self, a: int, b: int, c: int) -> Voxel:
         return b, a, c
 
 
-class YandZSwapped(Decoder):
+class YandZSwapped(ReferenceDecoder):
     """The axes y and z are swapped."""
 
-    def place_of(self, a: int, b: int, c: int) -> Place:
+    def coordinates(self, a: int, b: int, c: int) -> Voxel:
         return a, c, b
 
 
-class XandZSwapped(Decoder):
+class XandZSwapped(ReferenceDecoder):
     """The axes x and z are swapped."""
 
-    def place_of(self, a: int, b: int, c: int) -> Place:
+    def coordinates(self, a: int, b: int, c: int) -> Voxel:
         return c, b, a
 
 
-class PenKept(Decoder):
+class PenNotReset(ReferenceDecoder):
     """The pen is not reset to the full pixel at the start of a packet."""
 
     def begin_packet(self) -> None:
         self.cursor = 0
 
 
-class CursorKept(Decoder):
+class CursorNotReset(ReferenceDecoder):
     """The cursor is not reset to 0 at the start of a packet."""
 
     def begin_packet(self) -> None:
-        self.pen = self.said.full
+        self.pen = self.device.full_pixel
 
 
-class OctantSigns(Decoder):
+class OctantSigns(ReferenceDecoder):
     """The octant's bits 0..2 say that an axis falls: here they were taken for rising."""
 
     def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
         return super().axes_of(octant ^ 7)
 
 
-class OctantBitsReversed(Decoder):
+class OctantBitsReversed(ReferenceDecoder):
     """The octant's bit 0 is for x and bit 2 for z: here it was the other way round."""
 
     def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
@@ -65,7 +65,7 @@ class OctantBitsReversed(Decoder):
         return main, (z, y, x)
 
 
-class MainReversed(Decoder):
+class MainAxisReversed(ReferenceDecoder):
     """The main axis is octant div 8 = 0, 1, 2 for x, y, z: here it was z, y, x."""
 
     def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
@@ -73,14 +73,14 @@ class MainReversed(Decoder):
         return 2 - main, signs
 
 
-class CrumbBitsSwapped(Decoder):
+class CrumbBitsSwapped(ReferenceDecoder):
     """A crumb's bit 0 is for axis main + 1 and bit 1 for axis main + 2: here they were swapped."""
 
     def chain_axes(self, crumb: int, main: int) -> set[int]:
         return super().chain_axes(crumb >> 1 | (crumb & 1) << 1, main)
 
 
-class CrumbsNotCyclic(Decoder):
+class CrumbsNotCyclic(ReferenceDecoder):
     """A crumb's axes are main + 1 and main + 2 modulo 3, not the other two in the order x, y, z."""
 
     def chain_axes(self, crumb: int, main: int) -> set[int]:
@@ -88,47 +88,47 @@ class CrumbsNotCyclic(Decoder):
         return {main} | {others[bit] for bit in (0, 1) if crumb >> bit & 1}
 
 
-class HighPartsFirst(Decoder):
+class HighPartsFirst(ReferenceDecoder):
     """Crumbs, nibbles and MONO1 pixels begin in a byte's lowest bits: here in its highest."""
 
-    def parts(self, raw: bytes, count: int, bits: int) -> list[int]:
+    def unpack_bits(self, raw: bytes, count: int, bits: int) -> list[int]:
         per_byte = 8 // bits
-        whole = super().parts(raw, len(raw) * per_byte, bits)
+        whole = super().unpack_bits(raw, len(raw) * per_byte, bits)
         return [whole[i // per_byte * per_byte + per_byte - 1 - i % per_byte] for i in range(count)]
 
 
-class StepTooFew(Decoder):
+class StepTooFew(ReferenceDecoder):
     """A chain's byte is n - 1: here it was taken for n, and the last step is missing."""
 
     def steps_of(self, byte: int) -> int:
         return byte
 
 
-class ChainStartLeftOut(Decoder):
+class ChainStartLeftOut(ReferenceDecoder):
     """A chain writes the voxel at the cursor too, before its first step."""
 
-    def chain_start(self, at: Place) -> list[Place]:
+    def chain_start(self, at: Voxel) -> list[Voxel]:
         del at
         return []
 
 
-class ChainCursorStays(Decoder):
+class ChainCursorStays(ReferenceDecoder):
     """After a chain the cursor is at its last voxel: here it stayed at the first."""
 
-    def after_chain(self, begin: Place, end: Place) -> Place:
+    def after_chain(self, begin: Voxel, end: Voxel) -> Voxel:
         del end
         return begin
 
 
-class ShapeCursorStays(Decoder):
+class ShapeCursorStays(ReferenceDecoder):
     """After LINE, BOX and DOTS the cursor is at the voxel named last: here it stayed."""
 
-    def after_shape(self, begin: Place, end: Place) -> Place:
+    def after_shape(self, begin: Voxel, end: Voxel) -> Voxel:
         del end
         return begin
 
 
-class BrickMovesCursor(Decoder):
+class BrickMovesCursor(ReferenceDecoder):
     """OCT leaves the cursor where it is: here it moved to the brick."""
 
     def after_brick(self, cursor: int, corner: int) -> int:
@@ -136,21 +136,21 @@ class BrickMovesCursor(Decoder):
         return corner
 
 
-class CountTooSmall(Decoder):
+class CountTooSmall(ReferenceDecoder):
     """The count is n = c + 1 and n = 32 + k: here it was taken one too small."""
 
     def count_of(self, low: int) -> int:
         return super().count_of(low) - 1
 
 
-class LongCountFrom31(Decoder):
+class LongCountFrom31(ReferenceDecoder):
     """A count with LEB128 is n = 32 + k: here it was 31 + k."""
 
     def count_of(self, low: int) -> int:
         return super().count_of(low) - (low == 31)
 
 
-class LiteralLeavesPen(Decoder):
+class LiteralLeavesPen(ReferenceDecoder):
     """After LIT the pen is the last of its pixels: here it was left as it was."""
 
     def after_literal(self, before: int, last: int) -> int:
@@ -158,21 +158,21 @@ class LiteralLeavesPen(Decoder):
         return before
 
 
-class PixelsBigEndian(Decoder):
+class PixelsBigEndian(ReferenceDecoder):
     """A pixel's bytes come lowest first: here they were taken highest first."""
 
     def pixel_of(self, raw: bytes) -> int:
         return int.from_bytes(raw, "big")
 
 
-class TiesDown(Decoder):
+class LineTiesDown(ReferenceDecoder):
     """LINE rounds up from the middle: here it rounded down."""
 
     def rounded(self, k: int, d: int, length: int) -> int:
         return -super().rounded(k, -d, length)
 
 
-class TiesAway(Decoder):
+class LineTiesAwayFromZero(ReferenceDecoder):
     """LINE rounds up from the middle, also for a negative d: here it rounded away from 0."""
 
     def rounded(self, k: int, d: int, length: int) -> int:
@@ -180,7 +180,7 @@ class TiesAway(Decoder):
         return value if d > 0 else -value
 
 
-class Truncated(Decoder):
+class LineTruncates(ReferenceDecoder):
     """LINE divides by floor, towards minus infinity: here the division cut towards 0."""
 
     def rounded(self, k: int, d: int, length: int) -> int:
@@ -188,7 +188,7 @@ class Truncated(Decoder):
         return (abs(top) // (2 * length) * (1 if top > 0 else -1)) if length else 0
 
 
-class BoxOpen(Decoder):
+class BoxHalfOpen(ReferenceDecoder):
     """BOX includes the larger coordinate on each axis: here it was left out."""
 
     def span(self, a: int, b: int) -> range:
@@ -196,33 +196,35 @@ class BoxOpen(Decoder):
         return range(low, max(low + 1, high))
 
 
-class ChildrenReversed(Decoder):
+class ChildrenReversed(ReferenceDecoder):
     """A brick's child bit is c = cx + 2 cy + 4 cz: here x and z were swapped."""
 
-    def child(self, bit: int) -> Place:
+    def child(self, bit: int) -> Voxel:
         x, y, z = super().child(bit)
         return z, y, x
 
 
-class DifferenceUnsigned(Decoder):
+class DifferenceUnsigned(ReferenceDecoder):
     """A DIFF's nibble is -8 to 7, in two's complement: here it was 0 to 15."""
 
     def difference(self, nibble: int) -> int:
         return nibble
 
 
-MISTAKES: tuple[type[Decoder], ...] = tuple(
+DEVICE_BUGS: tuple[type[ReferenceDecoder], ...] = tuple(
     sorted(
-        (cls for cls in Decoder.__subclasses__() if cls.__module__ == __name__),
+        (cls for cls in ReferenceDecoder.__subclasses__() if cls.__module__ == __name__),
         key=lambda cls: list(globals()).index(cls.__name__),
     )
 )
 
 
-def pages_by_mistake(said: Said, base: Page, payloads: list[bytes]) -> Iterator[tuple[str, Page]]:
+def pages_by_bug(
+    device: AnnouncedDevice, base: Page, payloads: list[bytes]
+) -> Iterator[tuple[str, Page]]:
     """Draw payloads with each misreading; give what it says of itself, and its page."""
-    for mistake in MISTAKES:
-        decoder = mistake(said, base.copy())
+    for mistake in DEVICE_BUGS:
+        decoder = mistake(device, base.copy())
         try:
             for payload in payloads:
                 decoder.draw(payload)
@@ -231,18 +233,18 @@ def pages_by_mistake(said: Said, base: Page, payloads: list[bytes]) -> Iterator[
         yield (mistake.__doc__ or "").strip(), decoder.page
 
 
-def refusals_by_mistake(said: Said, payload: bytes) -> Iterator[tuple[str, int, int]]:
+def refusals_by_bug(device: AnnouncedDevice, payload: bytes) -> Iterator[tuple[str, int, int]]:
     """Give the misreadings that refuse a payload: what each says of itself, its code and where."""
-    for mistake in MISTAKES:
+    for mistake in DEVICE_BUGS:
         try:
-            mistake(said, Page()).draw(payload)
+            mistake(device, Page()).draw(payload)
         except Refused as refused:
             yield (mistake.__doc__ or "").strip(), refused.code, refused.at
         except Exception:  # noqa: BLE001, S112 - a misreading may stumble over anything
             continue
 
 
-def other_orders(said: Said, page: Page) -> Iterator[tuple[str, Page]]:
+def pages_by_scan_order(device: AnnouncedDevice, page: Page) -> Iterator[tuple[str, Page]]:
     """Give a picture as it is if scan order was mistaken."""
     names = "xyz"
     for order in itertools.permutations(range(3)):
@@ -251,26 +253,26 @@ def other_orders(said: Said, page: Page) -> Iterator[tuple[str, Page]]:
         a, b, c = order
         pixels = {}
         for index, value in page.pixels.items():
-            at = said.place(index)
-            pixels[at[a] + said.grid[a] * (at[b] + said.grid[b] * at[c])] = value
+            at = device.voxel_at(index)
+            pixels[at[a] + device.grid[a] * (at[b] + device.grid[b] * at[c])] = value
         runs = f"{names[a]} runs fastest, then {names[b]}, then {names[c]}"
         yield f"scan order is x fastest, then y, then z: here {runs}", Page(pixels)
 
 
-def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[int, str]]:
+def digests_by_bug(device: AnnouncedDevice, page: Page, before: Page) -> Iterator[tuple[int, str]]:
     """Give digests that are computed wrongly, and how."""
-    right = page.digest(said)
-    old = before.digest(said)
-    if said.has("PALETTE"):
+    right = page.digest(device)
+    old = before.digest(device)
+    if device.has("PALETTE"):
         without = Page(page.pixels)
-        yield without.digest(said), "the palette is not in the digest"
-        whole = sum(mix(said.voxels + i, 0x1000000 + c) for i, c in enumerate(page.palette))
+        yield without.digest(device), "the palette is not in the digest"
+        whole = sum(mix(device.voxel_count + i, 0x1000000 + c) for i, c in enumerate(page.palette))
         yield (
-            (without.digest(said) + whole) & 0xFFFFFFFF,
+            (without.digest(device) + whole) & 0xFFFFFFFF,
             "entries of the default palette count too",
         )
-    if said.voxels <= 1 << 20:
-        dark = sum(mix(i, 0) for i in range(said.voxels) if i not in page.pixels)
+    if device.voxel_count <= 1 << 20:
+        dark = sum(mix(i, 0) for i in range(device.voxel_count) if i not in page.pixels)
         yield (
             (right + dark) & 0xFFFFFFFF,
             "the digest adds dark voxels: only those that are lit count",
@@ -281,12 +283,12 @@ def digests_by_mistake(said: Said, page: Page, before: Page) -> Iterator[tuple[i
     )
     yield (right + old) & 0xFFFFFFFF, "the old pictures' terms are still in the digest"
     yield ~right & 0xFFFFFFFF, "the digest is inverted"
-    places = {i: said.place(i) for i in page.pixels}
-    _, ny, nz = said.grid
+    places = {i: device.voxel_at(i) for i in page.pixels}
+    _, ny, nz = device.grid
     zyx = sum(mix(z + nz * (y + ny * x), page.pixels[i]) for i, (x, y, z) in places.items())
     yield zyx & 0xFFFFFFFF, "the index counts z fastest: x runs fastest, then y, then z"
-    if said.pixel_bytes > 1:
-        size = said.pixel_bytes
+    if device.pixel_bytes > 1:
+        size = device.pixel_bytes
         big = sum(
             mix(i, int.from_bytes(v.to_bytes(size, "little"), "big"))
             for i, v in page.pixels.items()

@@ -16,22 +16,22 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.packets import SHOWN, Answer
-from voxdisplay.conformance.response_reader import Hearing
+from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.packets import SHOWN, Response
+from voxdisplay.conformance.response_reader import ResponseReader
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
 
 _TAGS = range(129, 223)  # never the number of a DATA packet that a check has just sent
 _HELLO_AGAIN_S = 0.25
-_MANY_ANSWERS = 10_000
-_KEPT_LINES = 2_000
+_MAX_RESPONSES = 10_000
+_MAX_LOG_ENTRIES = 2_000
 _BITS_PER_BYTE = 10  # of a serial line
-_SHOWN_BYTES = 48  # of a packet in a transcript
+_LOGGED_BYTES = 48  # of a packet in a transcript
 
 
-class Broken(Exception):  # noqa: N818 - a verdict
+class Violation(Exception):  # noqa: N818 - a verdict
     """The device does not do what the document demands.
 
     Parameters
@@ -46,10 +46,10 @@ class Broken(Exception):  # noqa: N818 - a verdict
 
     def __init__(self, must: str, came: str, likely: str = "") -> None:
         super().__init__(f"must be: {must}; was: {came}")
-        self.must, self.came, self.likely = must, came, likely
+        self.expected, self.actual, self.likely_cause = must, came, likely
 
 
-class Silent(Broken):
+class NoResponse(Violation):
     """Nothing came in time."""
 
 
@@ -58,7 +58,7 @@ class NotApplicable(Exception):  # noqa: N818 - no fault at all
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LogEntry:
     """One packet, or some raw bytes, that went or came."""
 
     sent: bool
@@ -66,8 +66,8 @@ class Line:
     text: str
 
     def __str__(self) -> str:
-        shown = self.data[:_SHOWN_BYTES].hex(" ").upper()
-        more = f" ... {len(self.data)} bytes" if len(self.data) > _SHOWN_BYTES else ""
+        shown = self.data[:_LOGGED_BYTES].hex(" ").upper()
+        more = f" ... {len(self.data)} bytes" if len(self.data) > _LOGGED_BYTES else ""
         return f"{'->' if self.sent else '<-'} {shown}{more}   {self.text}"
 
 
@@ -90,7 +90,7 @@ class Dialogue:
 
     Attributes
     ----------
-    said : Said
+    device : Said
         What the device announced.
     session : int
         Number of the session that the kit has opened last.
@@ -118,198 +118,200 @@ class Dialogue:
         self.clock = clock
         self.rng = random.Random(seed)
         self._seed = seed
-        self.hearing = Hearing()
+        self.reader = ResponseReader()
         self.session = 0
         self.seq = self.frame = 0
-        self.log: list[Line] = []
-        self.said = Said(0, 0, 0, 0)
-        self.info = self.state = Answer(b"\0\0\0")
+        self.log: list[LogEntry] = []
+        self.device = AnnouncedDevice(0, 0, 0, 0)
+        self.info = self.state = Response(b"\0\0\0")
         self._pipe = pipe
         self._timeout_s, self._opening_s, self._baud = timeout_s, opening_s, baud
-        self._heard: deque[Answer] = deque()
+        self._received: deque[Response] = deque()
         self._unanswered_bytes = 0
         self._tags: Iterator[int] = iter(())
 
-    def begin(self, name: str) -> None:
+    def start_check(self, name: str) -> None:
         """Forget what was before: a check goes the same way whichever others are made."""
         self.rng = random.Random(f"{self._seed} {name}")
         self.log = []
 
     # -- bytes
 
-    def raw(self, stream: bytes, text: str = "raw") -> None:
+    def send_raw(self, stream: bytes, text: str = "raw") -> None:
         """Send bytes as they are."""
-        self._note(sent=True, data=stream, text=text)
+        self._log(sent=True, data=stream, text=text)
         self._write(stream)
 
     def send(self, *bodies: bytes) -> None:
         """Send packets, all in one write."""
         for packet in bodies:
-            self._note(sent=True, data=packet, text=packets.describe(packet))
-        self._write(b"".join(map(packets.wire, bodies)))
+            self._log(sent=True, data=packet, text=packets.describe(packet))
+        self._write(b"".join(map(packets.encode, bodies)))
 
     def _write(self, stream: bytes) -> None:
         self._unanswered_bytes += len(stream)
         try:
-            self._pipe.write(stream, self.patience_s)
+            self._pipe.write(stream, self.response_timeout_s)
         except TransportTimeout as error:
-            raise Silent("the device reads what is sent to it", str(error)) from error
+            raise NoResponse("the device reads what is sent to it", str(error)) from error
 
     @property
-    def patience_s(self) -> float:
+    def response_timeout_s(self) -> float:
         """How long to wait for an answer."""
         line_s = self._unanswered_bytes * _BITS_PER_BYTE / self._baud
-        return self._timeout_s + 2 * self.said.period_s + line_s
+        return self._timeout_s + 2 * self.device.period_s + line_s
 
-    def hear(self, until_s: float) -> Answer | None:
+    def receive(self, until_s: float) -> Response | None:
         """Give the next answer; None if none comes until then, by `clock`."""
-        while not self._heard:
+        while not self._received:
             left_s = until_s - self.clock()
-            if not self._listen(left_s) and left_s <= 0:
+            if not self._read_pipe(left_s) and left_s <= 0:
                 return None
             if left_s < -self._timeout_s:  # it babbles
                 return None
         self._unanswered_bytes = 0
-        return self._heard.popleft()
+        return self._received.popleft()
 
-    def _listen(self, timeout_s: float) -> bool:
+    def _read_pipe(self, timeout_s: float) -> bool:
         """Hear what comes next; tell whether anything came. What is there is never missed."""
         come = self._pipe.read(max(timeout_s, 0.0))
-        for answer in self.hearing.feed(come):
-            self._note(sent=False, data=answer.body, text=str(answer))
-            self._heard.append(answer)
+        for answer in self.reader.feed(come):
+            self._log(sent=False, data=answer.body, text=str(answer))
+            self._received.append(answer)
         return bool(come)
 
-    def answers(self) -> Iterator[Answer]:
+    def responses(self) -> Iterator[Response]:
         """Give answers until none comes in time."""
-        until_s = self.clock() + self.patience_s
-        for _ in range(_MANY_ANSWERS):
-            answer = self.hear(until_s)
+        until_s = self.clock() + self.response_timeout_s
+        for _ in range(_MAX_RESPONSES):
+            answer = self.receive(until_s)
             if answer is None:
                 return
             yield answer
-        raise Silent("the device speaks when it is spoken to", f"{_MANY_ANSWERS} packets")
+        raise NoResponse("the device speaks when it is spoken to", f"{_MAX_RESPONSES} packets")
 
-    def let_ticks_pass(self) -> None:
+    def wait_two_ticks(self) -> None:
         """Wait for two refresh ticks, and a little."""
-        if self.said.refresh:
-            self.rest(2 * self.said.period_s + 0.01)
+        if self.device.refresh:
+            self.stay_silent(2 * self.device.period_s + 0.01)
 
-    def rest(self, seconds: float) -> None:
+    def stay_silent(self, seconds: float) -> None:
         """Send nothing for so long; what comes is heard."""
         until_s = self.clock() + seconds
         while (left_s := until_s - self.clock()) > 0:
-            self._listen(left_s)
+            self._read_pipe(left_s)
 
-    def _note(self, *, sent: bool, data: bytes, text: str) -> None:
-        if len(self.log) < _KEPT_LINES:
-            self.log.append(Line(sent, data, text))
+    def _log(self, *, sent: bool, data: bytes, text: str) -> None:
+        if len(self.log) < _MAX_LOG_ENTRIES:
+            self.log.append(LogEntry(sent, data, text))
 
     # -- questions
 
-    def open(self) -> None:
+    def open_session(self) -> None:
         """Open a new session, and see that it is still the same device that answers."""
         self.session = self.session % 65535 + 1
         self.seq = self.frame = 0
-        self.raw(b"\0", "00, which ends whatever was")
+        self.send_raw(b"\0", "00, which ends whatever was")
         self.send(packets.hello(self.session))
         info = self._await_info()
         if info is None:
-            raise Silent("INFO answers HELLO", "nothing", "did it stumble over what came before?")
-        if info.boot != self.said.boot:
-            self.info, self.said = info, Said.of(info)
-            self.hearing.said = self.said
-            raise Broken(
+            raise NoResponse(
+                "INFO answers HELLO", "nothing", "did it stumble over what came before?"
+            )
+        if info.boot != self.device.boot:
+            self.info, self.device = info, AnnouncedDevice.from_info(info)
+            self.reader.device = self.device
+            raise Violation(
                 "the device goes on",
                 f"it has restarted: its boot id is {info.boot:04X}h now",
                 "it crashed, or a watchdog bit, at what this check sent",
             )
 
-    def greet(self) -> bool:
+    def handshake(self) -> bool:
         """Open the first session; tell whether the device answered."""
         self.session = self.rng.randrange(1, 65536)
         until_s = self.clock() + self._opening_s
         info = None
         while info is None and self.clock() < until_s:
-            self.raw(b"\0")
+            self.send_raw(b"\0")
             self.send(packets.hello(self.session))
             info = self._await_info(min(until_s, self.clock() + _HELLO_AGAIN_S))
         if info is None:
             return False
-        self.info, self.said = info, Said.of(info)
-        self.hearing.said = self.said
+        self.info, self.device = info, AnnouncedDevice.from_info(info)
+        self.reader.device = self.device
         return True
 
-    def _await_info(self, until_s: float | None = None) -> Answer | None:
-        until_s = self.clock() + self.patience_s if until_s is None else until_s
-        while answer := self.hear(until_s):
+    def _await_info(self, until_s: float | None = None) -> Response | None:
+        until_s = self.clock() + self.response_timeout_s if until_s is None else until_s
+        while answer := self.receive(until_s):
             if answer.kind == spec.TYPE_INFO and answer.session == self.session:
                 return answer
         return None
 
-    def close(self) -> None:
+    def end_session(self) -> None:
         """End the session by a DATA packet with a reserved flag, number, frame and op."""
-        self.say(packets.data(self.seq + 99, self.frame + 99, b"\x1f", 2))
+        self.send_and_poll(packets.data(self.seq + 99, self.frame + 99, b"\x1f", 2))
         must = "NO_SESSION answers all, after a refused DATA"
-        self.demand(self.state.kind == spec.TYPE_ERROR, must, self.state)
+        self.require(self.state.kind == spec.TYPE_ERROR, must, self.state)
 
-    def sync(self) -> list[Answer]:
+    def poll_status(self) -> list[Response]:
         """Ask by STATUS; give all that came before its answer, which is `state` then."""
         tag = next(self._tags, 0)
         if not tag:
             self._tags = iter(_TAGS)
             tag = next(self._tags)
         self.send(packets.status(tag))
-        before: list[Answer] = []
-        for answer in self.answers():
+        before: list[Response] = []
+        for answer in self.responses():
             if (answer.kind == spec.TYPE_ACK and answer.last == tag) or (
                 answer.kind == spec.TYPE_ERROR and answer.seq == tag
             ):
                 self.state = answer
                 return before
             before.append(answer)
-        raise Silent("STATUS is answered", "nothing" if not before else f"only {before[-1]}")
+        raise NoResponse("STATUS is answered", "nothing" if not before else f"only {before[-1]}")
 
-    def say(self, *bodies: bytes) -> list[Answer]:
+    def send_and_poll(self, *bodies: bytes) -> list[Response]:
         """Send packets and a STATUS; give what came before the answer to that."""
         self.send(*bodies)
-        return self.sync()
+        return self.poll_status()
 
-    def ask(self, packet: bytes) -> Answer:
+    def request(self, packet: bytes) -> Response:
         """Send a packet; give its answer, which must be the only one."""
         self.send(packet)
-        answer = next(self.answers(), None)
+        answer = next(self.responses(), None)
         if answer is None:
-            raise Silent(f"{packets.describe(packet)} is answered", "nothing")
-        extra = self.sync()
+            raise NoResponse(f"{packets.describe(packet)} is answered", "nothing")
+        extra = self.poll_status()
         if extra:
-            raise Broken("one answer", " and ".join(map(str, [answer, *extra])))
+            raise Violation("one answer", " and ".join(map(str, [answer, *extra])))
         return answer
 
-    def ask_raw(self, stream: bytes, text: str = "raw") -> list[Answer]:
+    def send_raw_and_poll(self, stream: bytes, text: str = "raw") -> list[Response]:
         """Send bytes and a STATUS; give what came before the answer to that."""
-        self.raw(stream, text)
-        return self.sync()
+        self.send_raw(stream, text)
+        return self.poll_status()
 
     # -- verdicts
 
     def fail(self, must: str, came: object, likely: str = "") -> NoReturn:
         """Say that the device does otherwise."""
-        raise Broken(must, str(came), likely)
+        raise Violation(must, str(came), likely)
 
     def skip(self, reason: str) -> NoReturn:
         """Say that the check cannot be made here."""
         raise NotApplicable(reason)
 
-    def demand(self, holds: bool, must: str, came: object, likely: str = "") -> None:
+    def require(self, holds: bool, must: str, came: object, likely: str = "") -> None:
         """Demand something."""
         if not holds:
-            raise Broken(must, str(came), likely)
+            raise Violation(must, str(came), likely)
 
-    def demand_ack(self, answer: Answer, likely: str = "", /, **fields: int) -> None:
+    def require_ack(self, answer: Response, likely: str = "", /, **fields: int) -> None:
         """Demand an ACK with some fields; ``shown``, ``pending`` and ``asked`` are its flags."""
         if answer.kind != spec.TYPE_ACK:
-            raise Broken("ACK", str(answer), likely)
+            raise Violation("ACK", str(answer), likely)
         flags = {"shown": SHOWN, "pending": packets.PENDING, "asked": packets.ASKED}
         for name, value in fields.items():
             if name in flags:
@@ -321,25 +323,25 @@ class Dialogue:
                 form = "08X" if name in {"received", "digest"} else ""
                 must, was = f"{name} {value:{form}}", f"{name} {is_so:{form}}"
             if is_so != value:
-                raise Broken(f"ACK with {must}", f"{was} in {answer}", likely)
+                raise Violation(f"ACK with {must}", f"{was} in {answer}", likely)
 
-    def refuse(self, packet: bytes, code: int, offset: int) -> Answer:
+    def require_refused(self, packet: bytes, code: int, offset: int) -> Response:
         """Demand that a packet is refused: with this code, at this offset of the packet."""
-        answer = self.ask(packet)
+        answer = self.request(packet)
         must = f"ERROR {packets.CODE_NAMES[code]} at offset {offset}"
         if answer.kind != spec.TYPE_ERROR:
-            raise Broken(must, str(answer), "the device does not look at this")
+            raise Violation(must, str(answer), "the device does not look at this")
         if (answer.code, answer.offset) != (code, offset):
-            raise Broken(must, str(answer), _why_otherwise(answer, code, offset))
+            raise Violation(must, str(answer), _likely_cause(answer, code, offset))
         return answer
 
-    def refuse_ops(self, ops: bytes, code: int, at: int = 0) -> None:
+    def require_ops_refused(self, ops: bytes, code: int, at: int = 0) -> None:
         """Demand, in a new session, that ops are refused: at this offset of the payload."""
-        self.open()
-        self.refuse(packets.data(0, 0, ops), code, packets.HEADER_BYTES + at)
+        self.open_session()
+        self.require_refused(packets.data(0, 0, ops), code, packets.HEADER_BYTES + at)
 
 
-def _why_otherwise(error: Answer, code: int, offset: int) -> str:
+def _likely_cause(error: Response, code: int, offset: int) -> str:
     if error.code == code and error.offset == offset - packets.HEADER_BYTES:
         return "offsets count from the packet's first byte, its header included"
     if error.code == code:

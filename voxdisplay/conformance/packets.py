@@ -74,7 +74,7 @@ def read(start: int, count: int, tag: int = 0, flags: int = 0, reserved: int = 0
 # -- the wire
 
 
-def stuff(packet: bytes) -> bytes:
+def cobs_encode(packet: bytes) -> bytes:
     """Encode by COBS, without the 00 that ends a packet."""
     out, group = bytearray(), bytearray()
     for byte in packet:
@@ -89,7 +89,7 @@ def stuff(packet: bytes) -> bytes:
     return bytes(out) + bytes((len(group) + 1,)) + group
 
 
-def unstuff(segment: bytes) -> bytes | None:
+def cobs_decode(segment: bytes) -> bytes | None:
     """Decode COBS; None if a code byte asks for more bytes than there are."""
     out, at = bytearray(), 0
     while at < len(segment):
@@ -103,30 +103,30 @@ def unstuff(segment: bytes) -> bytes | None:
     return bytes(out)
 
 
-def wire(packet: bytes) -> bytes:
+def encode(packet: bytes) -> bytes:
     """Give what goes on the wire for a body: with its check value, COBS, and the 00."""
-    return stuff(packet + zlib.crc32(packet).to_bytes(CHECK_BYTES, "little")) + b"\0"
+    return cobs_encode(packet + zlib.crc32(packet).to_bytes(CHECK_BYTES, "little")) + b"\0"
 
 
-def wire_size(payload: int) -> int:
+def max_encoded_bytes(payload: int) -> int:
     """Give the most bytes that a payload of this size may have on the wire."""
     size = payload + spec.LIMIT_OVERHEAD
     return size + -(-size // 254) + 1
 
 
-def unwire(segment: bytes, longest: int = spec.LIMIT_MAX_PAYLOAD) -> bytes | None:
+def decode_segment(segment: bytes, longest: int = spec.LIMIT_MAX_PAYLOAD) -> bytes | None:
     """Give the body in a segment of at least 8 bytes; None if it is damaged."""
-    packet = unstuff(segment)
+    packet = cobs_decode(segment)
     if packet is None or not spec.LIMIT_OVERHEAD <= len(packet) <= longest + spec.LIMIT_OVERHEAD:
         return None
     inner = packet[:-CHECK_BYTES]
     return inner if zlib.crc32(inner) == int.from_bytes(packet[-CHECK_BYTES:], "little") else None
 
 
-def damage(stream: bytes, longest: int) -> int:
+def count_damaged(stream: bytes, longest: int) -> int:
     """Count the damaged segments of a stream that ends with 00, as section 3 defines them."""
     return sum(
-        len(segment) >= spec.LIMIT_MIN_SEGMENT and unwire(segment, longest) is None
+        len(segment) >= spec.LIMIT_MIN_SEGMENT and decode_segment(segment, longest) is None
         for segment in stream.split(b"\0")
     )
 
@@ -139,7 +139,7 @@ class NoSuchFieldError(AttributeError):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Response:
     """A packet of a device. The fields of its type's layout are attributes, too.
 
     Of an ACK, ``next`` is another name for ``seq``.
@@ -173,7 +173,7 @@ class Answer:
         return self.body[HEADER_BYTES + _STRUCTS[self.kind].size :]
 
     @property
-    def whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether it is of a device's type and long enough for that type's fields."""
         layout = _STRUCTS.get(self.kind)
         return layout is not None and len(self.body) >= HEADER_BYTES + layout.size
@@ -208,8 +208,8 @@ def describe(packet: bytes) -> str:
     if names or rest:
         words.append("|".join(names + ([f"flags {rest:X}"] if rest else [])))
     words.append(f"{'next' if kind == spec.TYPE_ACK else 'seq'} {packet[1]} frame {packet[2]}")
-    answer = Answer(packet)
-    if answer.whole:
+    answer = Response(packet)
+    if answer.is_complete:
         for (field, _, size), value in zip(LAYOUTS[kind], answer._values(), strict=True):  # noqa: SLF001
             if field == "code":
                 words.append(f"code {CODE_NAMES.get(value, value)}")

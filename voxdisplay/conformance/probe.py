@@ -10,14 +10,14 @@ from collections.abc import Iterable, Iterator
 from typing import NoReturn
 
 from voxdisplay.conformance import device_bugs, packets
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.dialogue import Broken, Dialogue, NotApplicable
-from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, Answer
-from voxdisplay.conformance.reference_decoder import Decoder, Refused
+from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.dialogue import Dialogue, NotApplicable, Violation
+from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, Response
+from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
-_MANY_PAGES = 10_000
+_MAX_PAGE_PACKETS = 10_000
 # A PAGE is made of these alone (section 10).
 _PAGE_OPS = (spec.OP_END, spec.OP_PEN)
 _PAGE_COUNTS = (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT)
@@ -34,35 +34,39 @@ class Probe(Dialogue):
 
     front: Page | None = None
 
-    def begin(self, name: str) -> None:
-        """See `Dialogue.begin`."""
-        super().begin(name)
+    def start_check(self, name: str) -> None:
+        """See `Dialogue.start_check`."""
+        super().start_check(name)
         self.front = None
 
     # -- pictures
 
-    def draw(self, payload: bytes, *, clear: bool = True, commit: bool = False) -> list[Answer]:
+    def draw(self, payload: bytes, *, clear: bool = True, commit: bool = False) -> list[Response]:
         """Send one packet of the frame at hand, and see that it is taken."""
         flags = (CLEAR if clear else 0) | (COMMIT if commit else 0)
         seq = self.seq % 256
-        come = self.say(packets.data(self.seq, self.frame, payload, flags))
+        come = self.send_and_poll(packets.data(self.seq, self.frame, payload, flags))
         for answer in come:
             if answer.kind == spec.TYPE_ERROR:
-                raise Broken("the packet is taken", str(answer), self._why_refused(answer, payload))
+                raise Violation(
+                    "the packet is taken", str(answer), self._why_refused(answer, payload)
+                )
         self.seq += 1
         if self.state.kind != spec.TYPE_ACK or self.state.next == seq:
-            raise Broken(f"the packet with sequence number {seq} is received", str(self.state))
+            raise Violation(f"the packet with sequence number {seq} is received", str(self.state))
         return come
 
-    def _why_refused(self, error: Answer, payload: bytes) -> str:
+    def _why_refused(self, error: Response, payload: bytes) -> str:
         at = error.offset - packets.HEADER_BYTES
-        found = device_bugs.refusals_by_mistake(self.said, payload)
-        likely = _either(why for why, code, where in found if (code, where) == (error.code, at))
+        found = device_bugs.refusals_by_bug(self.device, payload)
+        likely = _join_causes(
+            why for why, code, where in found if (code, where) == (error.code, at)
+        )
         if not likely and 0 <= at < len(payload):
             return f"look at how the op {payload[at]:02X} at byte {at} of the payload is read"
         return likely
 
-    def show(self, *payloads: bytes, clear: bool = True, exactly: bool = False) -> Answer:
+    def show(self, *payloads: bytes, clear: bool = True, exactly: bool = False) -> Response:
         """Draw a frame, wait until it is on display, and see that it is what the ops say.
 
         Parameters
@@ -81,42 +85,42 @@ class Probe(Dialogue):
         """
         before = self.front or Page()
         after = Page() if clear else before.copy()
-        decoder = Decoder(self.said, after)
+        decoder = ReferenceDecoder(self.device, after)
         for payload in payloads:
             decoder.draw(payload)
         self.front = None
-        come: list[Answer] = []
+        come: list[Response] = []
         for number, payload in enumerate(payloads):
             come += self.draw(payload, clear=clear, commit=number == len(payloads) - 1)
         ack = self.await_shown(self.frame, [*come, self.state])
-        self.look(ack, after, before, list(payloads), clear=clear, exactly=exactly)
+        self.require_displayed(ack, after, before, list(payloads), clear=clear, exactly=exactly)
         self.front = after
         self.frame = (self.frame + 1) % 256
         return ack
 
-    def await_shown(self, frame: int, come: list[Answer] | None = None) -> Answer:
+    def await_shown(self, frame: int, come: list[Response] | None = None) -> Response:
         """Wait for an ACK that says that a frame is on display; ask for it if none comes."""
         for answer in come or []:
-            if answer.kind == spec.TYPE_ACK and _shows(answer, frame):
+            if answer.kind == spec.TYPE_ACK and _is_shown(answer, frame):
                 return answer
-        until_s = self.clock() + self.patience_s
+        until_s = self.clock() + self.response_timeout_s
         while self.clock() < until_s:
-            hear_until_s = self.clock() + max(1.2 * self.said.period_s, 0.02)
-            while heard := self.hear(hear_until_s):
-                if heard.kind == spec.TYPE_ACK and _shows(heard, frame):
+            hear_until_s = self.clock() + max(1.2 * self.device.period_s, 0.02)
+            while heard := self.receive(hear_until_s):
+                if heard.kind == spec.TYPE_ACK and _is_shown(heard, frame):
                     return heard
-            self.sync()
-            if self.state.kind == spec.TYPE_ACK and _shows(self.state, frame):
+            self.poll_status()
+            if self.state.kind == spec.TYPE_ACK and _is_shown(self.state, frame):
                 return self.state
-        raise Broken(
+        raise Violation(
             f"frame {frame} is on display",
             str(self.state),
             "is a whole frame shown at the next tick, and is SHOWN set then?",
         )
 
-    def look(
+    def require_displayed(
         self,
-        ack: Answer,
+        ack: Response,
         must: Page,
         before: Page | None = None,
         payloads: list[bytes] | None = None,
@@ -125,69 +129,69 @@ class Probe(Dialogue):
         exactly: bool = False,
     ) -> None:
         """Demand that a page is on display; an ACK of now carries its digest."""
-        said, before = self.said, before or Page()
-        if said.has("DIGEST") and ack.digest == must.digest(said):
+        device, before = self.device, before or Page()
+        if device.has("DIGEST") and ack.digest == must.digest(device):
             return
-        pixels = self.read_page() if said.has("READ") else None
-        if pixels == must.pixels and not (exactly and said.has("DIGEST")):
+        pixels = self.read_page() if device.has("READ") else None
+        if pixels == must.pixels and not (exactly and device.has("DIGEST")):
             return
-        if pixels is None and not said.has("DIGEST"):
+        if pixels is None and not device.has("DIGEST"):
             return
         base = Page() if clear else before
-        self._disprove(ack, must, before, base, payloads or [], pixels)
+        self._raise_mismatch(ack, must, before, base, payloads or [], pixels)
 
-    def _disprove(
+    def _raise_mismatch(
         self,
-        ack: Answer,
+        ack: Response,
         must: Page,
         before: Page,
         base: Page,
         payloads: list[bytes],
         pixels: dict[int, int] | None,
     ) -> NoReturn:
-        said = self.said
-        right = must.digest(said)
+        device = self.device
+        right = must.digest(device)
         if pixels == must.pixels:
             likely = next(
                 (
                     why
-                    for d, why in device_bugs.digests_by_mistake(said, must, before)
+                    for d, why in device_bugs.digests_by_bug(device, must, before)
                     if d == ack.digest
                 ),
                 "the pixels read back are right: the digest is not kept as section 8 says",
             )
-            raise Broken(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
+            raise Violation(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
 
         def is_shown(page: Page) -> bool:
             if pixels is None:
-                return page.digest(said) == ack.digest
+                return page.digest(device) == ack.digest
             return page.pixels == pixels
 
-        suspects = self._suspects(must, before, base, payloads)
-        likely = _either(why for why, page in suspects if is_shown(page))
+        suspects = self._pages_by_cause(must, before, base, payloads)
+        likely = _join_causes(why for why, page in suspects if is_shown(page))
         if pixels is None:
-            raise Broken(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
+            raise Violation(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
         differ = sorted(
             i for i in {*pixels, *must.pixels} if pixels.get(i, 0) != must.pixels.get(i, 0)
         )
         first = differ[0]
-        raise Broken(
-            f"pixel {must.pixels.get(first, 0):X}h at {said.place(first)}",
-            f"{pixels.get(first, 0):X}h; {len(differ)} of {said.voxels} voxels are not as drawn",
+        raise Violation(
+            f"pixel {must.pixels.get(first, 0):X}h at {device.voxel_at(first)}",
+            f"{pixels.get(first, 0):X}h; {len(differ)} of {device.voxel_count} voxels differ",
             likely,
         )
 
-    def _suspects(
+    def _pages_by_cause(
         self, must: Page, before: Page, base: Page, payloads: list[bytes]
     ) -> Iterator[tuple[str, Page]]:
-        yield from device_bugs.pages_by_mistake(self.said, base, payloads)
-        yield from device_bugs.other_orders(self.said, must)
+        yield from device_bugs.pages_by_bug(self.device, base, payloads)
+        yield from device_bugs.pages_by_scan_order(self.device, must)
         for start, why in (
             (before, "CLEAR does not make the back page dark"),
             (Page(), "without CLEAR a frame starts as a copy of the front page: here it was dark"),
         ):
             page = start.copy()
-            decoder = Decoder(self.said, page)
+            decoder = ReferenceDecoder(self.device, page)
             for payload in payloads:
                 decoder.draw(payload)
             yield why, page
@@ -198,68 +202,68 @@ class Probe(Dialogue):
 
     def read_range(self, start: int, count: int, flags: int = 0) -> tuple[dict[int, int], int]:
         """READ once; give the pixels that are not dark, and how many voxels were covered."""
-        page = self.ask_page(packets.read(start, count, 77, flags))
-        return self.unpack(page, start, count), page.count
+        page = self.request_page(packets.read(start, count, 77, flags))
+        return self.decode_page(page, start, count), page.count
 
-    def unpack(self, page: Answer, start: int, count: int) -> dict[int, int]:
+    def decode_page(self, page: Response, start: int, count: int) -> dict[int, int]:
         """Give the pixels of a PAGE that are not dark; demand that it answers such a READ."""
-        decoder = PageReader(self.said, start)
+        decoder = PageOpsDecoder(self.device, start)
         try:
             decoder.draw(page.tail)
         except Refused as refused:
             name = packets.CODE_NAMES[refused.code]
-            raise Broken(
+            raise Violation(
                 "a PAGE of END, PEN, SKIP, RUN and LIT that stays in its range",
                 f"{page.tail.hex(' ').upper()}: {name} at byte {refused.at} of the ops",
             ) from refused
         if not 1 <= page.count <= count or decoder.cursor != start + page.count:
-            raise Broken(
+            raise Violation(
                 f"ops that cover `count` voxels, 1 to {count}",
                 f"count {page.count}, and ops for {decoder.cursor - start}",
                 "is `count` that of the ops, not that of the READ?",
             )
         return decoder.page.pixels
 
-    def ask_page(self, packet: bytes) -> Answer:
+    def request_page(self, packet: bytes) -> Response:
         """Send a READ that must be answered with PAGE."""
-        answer = self.ask(packet)
-        self.demand(answer.kind == spec.TYPE_PAGE, "PAGE", answer)
+        answer = self.request(packet)
+        self.require(answer.kind == spec.TYPE_PAGE, "PAGE", answer)
         return answer
 
     def read_page(self, flags: int = 0) -> dict[int, int]:
         """Read a whole page."""
         pixels: dict[int, int] = {}
         at = 0
-        for _ in range(_MANY_PAGES):
-            if at >= self.said.voxels:
+        for _ in range(_MAX_PAGE_PACKETS):
+            if at >= self.device.voxel_count:
                 return pixels
-            part, count = self.read_range(at, self.said.voxels - at, flags)
+            part, count = self.read_range(at, self.device.voxel_count - at, flags)
             pixels |= part
             at += count
         raise NotApplicable(f"the device covers so little with a PAGE that only {at} could be read")
 
 
-class PageReader(Decoder):
+class PageOpsDecoder(ReferenceDecoder):
     """Draws the ops of a PAGE: the cursor begins at its start, and few ops are allowed."""
 
-    def __init__(self, said: Said, start: int) -> None:
-        super().__init__(said, Page())
+    def __init__(self, device: AnnouncedDevice, start: int) -> None:
+        super().__init__(device, Page())
         self._start = start
 
     def begin_packet(self) -> None:
-        """See `Decoder.begin_packet`."""
-        self.cursor, self.pen = self._start, self.said.full
+        """See `ReferenceDecoder.begin_packet`."""
+        self.cursor, self.pen = self._start, self.device.full_pixel
 
     def _op(self, op: int) -> None:
         if op not in _PAGE_OPS and op & 0xE0 not in _PAGE_COUNTS:
-            raise self.refuse(spec.CODE_OP)
+            raise self.refusal(spec.CODE_OP)
         super()._op(op)
 
 
-def _either(reasons: Iterable[str]) -> str:
+def _join_causes(reasons: Iterable[str]) -> str:
     """Join the first few of several explanations."""
     return ", or: ".join(itertools.islice(dict.fromkeys(reasons), 3))
 
 
-def _shows(ack: Answer, frame: int) -> bool:
+def _is_shown(ack: Response, frame: int) -> bool:
     return bool(ack.flags & SHOWN) and ack.frame == frame

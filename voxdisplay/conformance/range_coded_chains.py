@@ -1,17 +1,17 @@
 """ARC, section 7.7 of protocol.md, in its simplest form: one text for both directions.
 
 A coder has ``bit`` and ``plain``; each takes the bit that is wanted and gives the one that is
-coded. The `Reader` does not care what is wanted, the `Writer` codes just that; so the pieces and
+coded. The `Decoder` does not care what is wanted, the `Encoder` codes just that; so the pieces and
 steps below are written once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.reference_decoder import Decoder, Place
+from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
 from voxdisplay.wire import spec
 
 _TOP = 1 << 24
@@ -64,13 +64,13 @@ class _RangeCoder:
         raise NotImplementedError
 
 
-class Reader(_RangeCoder):
+class Decoder(_RangeCoder):
     """Decodes; the want of whoever asks is nothing to it."""
 
-    def __init__(self, data: bytes, decoder: Decoder) -> None:
+    def __init__(self, data: bytes, refusal: Callable[[int], Exception]) -> None:
         super().__init__()
         self._data = data
-        self._decoder = decoder
+        self._refusal = refusal
         self._at = 0
         self._value = 0
         for _ in range(3):
@@ -79,7 +79,7 @@ class Reader(_RangeCoder):
     def _next(self) -> int:
         self._at += 1
         if self._at > len(self._data) + spec.ARC_BEHIND:
-            raise self._decoder.refuse(spec.CODE_TRUNCATED)
+            raise self._refusal(spec.CODE_TRUNCATED)
         return self._data[self._at - 1] if self._at <= len(self._data) else 0
 
     def _code(self, bound: int, want: int) -> int:
@@ -98,10 +98,10 @@ class Reader(_RangeCoder):
     def end(self) -> None:
         """Demand that exactly three bytes behind the payload have been read."""
         if self._at < len(self._data) + spec.ARC_BEHIND:
-            raise self._decoder.refuse(spec.CODE_PADDING)
+            raise self._refusal(spec.CODE_PADDING)
 
 
-class Writer(_RangeCoder):
+class Encoder(_RangeCoder):
     """Encodes what is wanted."""
 
     def __init__(self) -> None:
@@ -136,13 +136,13 @@ class _Axis:
     prev: int = 0
     prev2: int = 0
     past: int = 0
-    way: int = 0
+    direction: int = 0
 
     @property
     def streak(self) -> int:
         return self.run if self.last else 0
 
-    def note(self, moved: int) -> None:
+    def record(self, moved: int) -> None:
         self.past = (self.past << 1 | moved) % 128
         if moved == self.last:
             self.run = min(self.run + 1, spec.ARC_MAX_RUN)
@@ -151,12 +151,12 @@ class _Axis:
 
 
 @dataclass(slots=True)
-class _Walk:
+class _AxisMemory:
     """The memory of the three axes."""
 
     axes: list[_Axis] = field(default_factory=lambda: [_Axis(), _Axis(), _Axis()])
 
-    def step(self, coder: Coder, want: Place = (0, 0, 0)) -> Place:
+    def step(self, coder: Coder, want: Voxel = (0, 0, 0)) -> Voxel:
         axes = self.axes
         streak = [axis.streak for axis in axes]
         m = streak.index(max(streak))
@@ -164,7 +164,7 @@ class _Walk:
         way = [0, 0, 0]
         model = spec.ARC_MAIN + 8 * min(streak[m], 3) + min(max(streak[b], streak[c]), 7)
         if coder.bit(model, want=int(want[m] != 0)):
-            way[m] = self._way(coder, axes[m], want[m])
+            way[m] = self._direction(coder, axes[m], want[m])
         for a in (b, c):
             axis, wanted = axes[a], int(want[a] != 0)
             if way[m]:
@@ -179,19 +179,19 @@ class _Walk:
             else:
                 bit = 1
             if bit:
-                way[a] = self._way(coder, axis, want[a])
+                way[a] = self._direction(coder, axis, want[a])
         for axis, moved in zip(axes, way, strict=True):
-            axis.note(int(moved != 0))
+            axis.record(int(moved != 0))
         return way[0], way[1], way[2]
 
-    def _way(self, coder: Coder, axis: _Axis, want: int) -> int:
-        if not axis.way:
-            axis.way = -1 if coder.plain(1, int(want < 0)) else 1
+    def _direction(self, coder: Coder, axis: _Axis, want: int) -> int:
+        if not axis.direction:
+            axis.direction = -1 if coder.plain(1, int(want < 0)) else 1
         else:
             t = 0 if axis.last else min(axis.run, 15)
-            if coder.bit(spec.ARC_TURN + t, want=int(want != axis.way)):
-                axis.way = -axis.way
-        return axis.way
+            if coder.bit(spec.ARC_TURN + t, want=int(want != axis.direction)):
+                axis.direction = -axis.direction
+        return axis.direction
 
 
 def _number(coder: Coder, want: int = 0) -> int:
@@ -203,30 +203,49 @@ def _number(coder: Coder, want: int = 0) -> int:
     return (1 << k) - 1 + coder.plain(k, want - (1 << k) + 1)
 
 
-def _pen_bits(said: Said) -> int:
-    return 1 if said.format == spec.FORMAT_MONO1 else 8 * said.pixel_bytes
+def _pen_bits(device: AnnouncedDevice) -> int:
+    return 1 if device.format == spec.FORMAT_MONO1 else 8 * device.pixel_bytes
 
 
-def draw(decoder: Decoder) -> None:
-    """Draw the ARC of which a decoder has just read the op byte."""
-    coder = Reader(decoder.rest(), decoder)
-    walk, at, jump = _Walk(), (0, 0, 0), 1
+def decode(
+    data: bytes, device: AnnouncedDevice, refusal: Callable[[int], Exception]
+) -> Iterator[tuple[int | None, Voxel]]:
+    """Yield the voxels of an ARC, each with its pen.
+
+    Parameters
+    ----------
+    data : bytes
+        The bytes behind the op byte.
+    device : AnnouncedDevice
+    refusal : callable
+        Takes a code of section 11 and returns the exception to raise.
+
+    Yields
+    ------
+    pen : int or None
+        Pixel value; None for the pen from before the op.
+    voxel : tuple of int
+        x, y, z. It may lie off the grid: the caller must not go on then.
+    """
+    coder = Decoder(data, refusal)
+    memory, at, jump = _AxisMemory(), (0, 0, 0), 1
+    pen: int | None = None
     first = True
     while coder.bit(spec.ARC_MORE):
         jump = 1 if first else coder.bit(spec.ARC_JUMP)
         first = False
         if coder.bit(spec.ARC_INK):
-            decoder.pen = coder.plain(_pen_bits(decoder.said))
+            pen = coder.plain(_pen_bits(device))
         if jump:
-            x, y, z = (coder.plain((side - 1).bit_length()) for side in decoder.said.grid)
-            at, walk = (x, y, z), _Walk()
+            x, y, z = (coder.plain((side - 1).bit_length()) for side in device.grid)
+            at, memory = (x, y, z), _AxisMemory()
         steps = _number(coder)
         if jump:
-            decoder.ink([at])
+            yield pen, at
         for _ in range(steps):
-            dx, dy, dz = walk.step(coder)
-            at = decoder.inside((at[0] + dx, at[1] + dy, at[2] + dz))
-            decoder.ink([at])
+            dx, dy, dz = memory.step(coder)
+            at = (at[0] + dx, at[1] + dy, at[2] + dz)
+            yield pen, at
     coder.end()
 
 
@@ -234,29 +253,29 @@ def draw(decoder: Decoder) -> None:
 class Piece:
     """Some of a curve: places side by side, from where it jumps to or where the last one ended."""
 
-    places: tuple[Place, ...]
+    voxels: tuple[Voxel, ...]
     pen: int | None = None
     jump: bool = True
 
 
-def encode(said: Said, pieces: list[Piece]) -> bytes:
+def encode(device: AnnouncedDevice, pieces: list[Piece]) -> bytes:
     """Give the op ARC that draws pieces."""
-    coder = Writer()
-    walk, at = _Walk(), (0, 0, 0)
+    coder = Encoder()
+    memory, at = _AxisMemory(), (0, 0, 0)
     for number, piece in enumerate(pieces):
         coder.bit(spec.ARC_MORE, want=1)
-        places = list(piece.places)
+        places = list(piece.voxels)
         if number:
             coder.bit(spec.ARC_JUMP, want=int(piece.jump))
         if coder.bit(spec.ARC_INK, want=int(piece.pen is not None)):
-            coder.plain(_pen_bits(said), piece.pen or 0)
+            coder.plain(_pen_bits(device), piece.pen or 0)
         if piece.jump:
-            at, walk = places.pop(0), _Walk()
-            for a, side in zip(at, said.grid, strict=True):
+            at, memory = places.pop(0), _AxisMemory()
+            for a, side in zip(at, device.grid, strict=True):
                 coder.plain((side - 1).bit_length(), a)
         _number(coder, len(places))
         for place in places:
-            walk.step(coder, (place[0] - at[0], place[1] - at[1], place[2] - at[2]))
+            memory.step(coder, (place[0] - at[0], place[1] - at[1], place[2] - at[2]))
             at = place
     coder.bit(spec.ARC_MORE)
     return bytes((spec.OP_ARC,)) + coder.end()

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance import range_coded_chains
+from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
 from voxdisplay.conformance.reference_page import Page, rgb
 from voxdisplay.wire import spec
-
-Place = tuple[int, int, int]
 
 
 class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the kit
@@ -24,14 +23,14 @@ class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the k
         self.at = at
 
 
-class Decoder:
+class ReferenceDecoder:
     """Draws the payloads of DATA packets on a page."""
 
-    def __init__(self, said: Said, page: Page) -> None:
-        self.said = said
+    def __init__(self, device: AnnouncedDevice, page: Page) -> None:
+        self.device = device
         self.page = page
         self.cursor = 0
-        self.pen = said.full
+        self.pen = device.full_pixel
         self._payload = b""
         self._at = 0
         self._op_at = 0
@@ -39,9 +38,9 @@ class Decoder:
     def draw(self, payload: bytes) -> None:
         """Draw the ops of one packet, or raise `Refused`."""
         self.begin_packet()
-        self.go_on(payload)
+        self.draw_more(payload)
 
-    def go_on(self, payload: bytes) -> None:
+    def draw_more(self, payload: bytes) -> None:
         """Draw ops that follow others in the same packet."""
         self._payload, self._at = payload, 0
         while self._at < len(payload):
@@ -52,9 +51,9 @@ class Decoder:
 
     def begin_packet(self) -> None:
         """At the start of each packet the cursor is 0 and the pen is the full pixel."""
-        self.cursor, self.pen = 0, self.said.full
+        self.cursor, self.pen = 0, self.device.full_pixel
 
-    def place_of(self, a: int, b: int, c: int) -> Place:
+    def coordinates(self, a: int, b: int, c: int) -> Voxel:
         """Coordinates come in the order x, y, z."""
         return a, b, c
 
@@ -67,7 +66,7 @@ class Decoder:
         """Bit 0 is for axis main + 1, bit 1 for axis main + 2."""
         return {main} | {(main + 1 + bit) % 3 for bit in (0, 1) if crumb >> bit & 1}
 
-    def parts(self, raw: bytes, count: int, bits: int) -> list[int]:
+    def unpack_bits(self, raw: bytes, count: int, bits: int) -> list[int]:
         """Crumbs, nibbles and MONO1 pixels: the first is in the lowest bits of the first byte."""
         per_byte = 8 // bits
         return [raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)]
@@ -76,7 +75,7 @@ class Decoder:
         """Give the steps of a chain: the byte is n - 1."""
         return byte + 1
 
-    def chain_start(self, at: Place) -> list[Place]:
+    def chain_start(self, at: Voxel) -> list[Voxel]:
         """Begin a chain by writing the voxel at the cursor."""
         return [at]
 
@@ -92,7 +91,7 @@ class Decoder:
         """Include both ends of a BOX, whichever is the larger."""
         return range(min(a, b), max(a, b) + 1)
 
-    def child(self, bit: int) -> Place:
+    def child(self, bit: int) -> Voxel:
         """Bit c = cx + 2 · cy + 4 · cz."""
         return bit & 1, bit >> 1 & 1, bit >> 2 & 1
 
@@ -100,12 +99,12 @@ class Decoder:
         """Four bits in two's complement."""
         return nibble - 16 if nibble > 7 else nibble
 
-    def after_chain(self, begin: Place, end: Place) -> Place:
+    def after_chain(self, begin: Voxel, end: Voxel) -> Voxel:
         """After a chain the cursor is at the last voxel."""
         del begin
         return end
 
-    def after_shape(self, begin: Place, end: Place) -> Place:
+    def after_shape(self, begin: Voxel, end: Voxel) -> Voxel:
         """After LINE, BOX and DOTS the cursor is at the voxel named last."""
         del begin
         return end
@@ -126,13 +125,13 @@ class Decoder:
 
     # -- reading
 
-    def refuse(self, code: int) -> Refused:
+    def refusal(self, code: int) -> Refused:
         """Give the refusal of the op at hand."""
         return Refused(code, self._op_at)
 
     def _take(self, count: int) -> bytes:
         if self._at + count > len(self._payload):
-            raise self.refuse(spec.CODE_TRUNCATED)
+            raise self.refusal(spec.CODE_TRUNCATED)
         self._at += count
         return self._payload[self._at - count : self._at]
 
@@ -143,10 +142,10 @@ class Decoder:
         """Give all that is left of the payload, and be at its end."""
         return self._take(len(self._payload) - self._at)
 
-    def _place(self) -> Place:
-        size = self.said.coordinate_bytes
+    def _read_voxel(self) -> Voxel:
+        size = self.device.coordinate_bytes
         a, b, c = (int.from_bytes(self._take(size), "little") for _ in range(3))
-        return self.place_of(a, b, c)
+        return self.coordinates(a, b, c)
 
     def _leb128(self) -> int:
         k = 0
@@ -155,44 +154,44 @@ class Decoder:
             k |= (byte & 127) << 7 * place
             if byte < 128:
                 if (place and not byte) or 32 + k >= 1 << 32:
-                    raise self.refuse(spec.CODE_COUNT)
+                    raise self.refusal(spec.CODE_COUNT)
                 return k
-        raise self.refuse(spec.CODE_COUNT)
+        raise self.refusal(spec.CODE_COUNT)
 
-    def _parts(self, count: int, bits: int) -> list[int]:
+    def _padded_bits(self, count: int, bits: int) -> list[int]:
         raw = self._take(-(-count * bits // 8))
         if count * bits % 8 and raw[-1] >> count * bits % 8:
-            raise self.refuse(spec.CODE_PADDING)
-        return self.parts(raw, count, bits)
+            raise self.refusal(spec.CODE_PADDING)
+        return self.unpack_bits(raw, count, bits)
 
     def _pixels(self, count: int) -> list[int]:
-        if self.said.format == spec.FORMAT_MONO1:
-            return self._parts(count, 1)
-        size = self.said.pixel_bytes
+        if self.device.format == spec.FORMAT_MONO1:
+            return self._padded_bits(count, 1)
+        size = self.device.pixel_bytes
         raw = self._take(count * size)
         return [self.pixel_of(raw[at : at + size]) for at in range(0, len(raw), size)]
 
     # -- drawing
 
-    def inside(self, place: Place) -> Place:
+    def require_on_grid(self, place: Voxel) -> Voxel:
         """Give a place back that is on the grid."""
-        if not all(0 <= at < side for at, side in zip(place, self.said.grid, strict=True)):
-            raise self.refuse(spec.CODE_OUTSIDE)
+        if not all(0 <= at < side for at, side in zip(place, self.device.grid, strict=True)):
+            raise self.refusal(spec.CODE_OUTSIDE)
         return place
 
-    def _here(self) -> Place:
-        if self.cursor >= self.said.voxels:
-            raise self.refuse(spec.CODE_OUTSIDE)
-        return self.said.place(self.cursor)
+    def _cursor_voxel(self) -> Voxel:
+        if self.cursor >= self.device.voxel_count:
+            raise self.refusal(spec.CODE_OUTSIDE)
+        return self.device.voxel_at(self.cursor)
 
-    def ink(self, places: Iterable[Place]) -> None:
+    def write_voxels(self, places: Iterable[Voxel]) -> None:
         """Write the pen to places."""
-        for index in [self.said.index(*self.inside(place)) for place in places]:
+        for index in [self.device.index(*self.require_on_grid(place)) for place in places]:
             self.page.write(index, self.pen)
 
-    def _along(self, values: list[int]) -> None:
-        if self.cursor + len(values) > self.said.voxels:
-            raise self.refuse(spec.CODE_OUTSIDE)
+    def _write_scan_order(self, values: list[int]) -> None:
+        if self.cursor + len(values) > self.device.voxel_count:
+            raise self.refusal(spec.CODE_OUTSIDE)
         for value in values:
             self.page.write(self.cursor, value)
             self.cursor += 1
@@ -201,60 +200,60 @@ class Decoder:
 
     def _op(self, op: int) -> None:
         for first, more, feature, draw in _OPS:
-            if first <= op <= first + more and (not feature or self.said.has(feature)):
+            if first <= op <= first + more and (not feature or self.device.has(feature)):
                 draw(self, op - first)
                 return
-        raise self.refuse(spec.CODE_OP)
+        raise self.refusal(spec.CODE_OP)
 
     def op_end(self, _: int) -> None:
         """Demand that nothing follows END but 00."""
         if any(self.rest()):
-            raise self.refuse(spec.CODE_PADDING)
+            raise self.refusal(spec.CODE_PADDING)
 
     def op_move(self, _: int) -> None:
         """Set the cursor by MOVE."""
-        self.cursor = self.said.index(*self.inside(self._place()))
+        self.cursor = self.device.index(*self.require_on_grid(self._read_voxel()))
 
     def op_arc(self, _: int) -> None:
         """Draw an ARC."""
-        from voxdisplay.conformance import range_coded_chains  # noqa: PLC0415 - it draws with this decoder
-
-        range_coded_chains.draw(self)
+        for pen, voxel in range_coded_chains.decode(self.rest(), self.device, self.refusal):
+            self.pen = self.pen if pen is None else pen
+            self.write_voxels([voxel])
 
     def op_pen(self, _: int) -> None:
         """Set the pen by PEN."""
-        pen = self.pixel_of(self._take(self.said.pixel_bytes))
-        if self.said.format == spec.FORMAT_MONO1 and pen > 1:
-            raise self.refuse(spec.CODE_PIXEL)
+        pen = self.pixel_of(self._take(self.device.pixel_bytes))
+        if self.device.format == spec.FORMAT_MONO1 and pen > 1:
+            raise self.refusal(spec.CODE_PIXEL)
         self.pen = pen
 
     def op_skip(self, low: int) -> None:
         """Move the cursor on by SKIP."""
         count = self.count_of(low)
-        if self.cursor + count > self.said.voxels:
-            raise self.refuse(spec.CODE_OUTSIDE)
+        if self.cursor + count > self.device.voxel_count:
+            raise self.refusal(spec.CODE_OUTSIDE)
         self.cursor += count
 
     def op_run(self, low: int) -> None:
         """Draw a RUN."""
         count = self.count_of(low)
-        if self.cursor + count > self.said.voxels:
-            raise self.refuse(spec.CODE_OUTSIDE)
-        self._along([self.pen] * count)
+        if self.cursor + count > self.device.voxel_count:
+            raise self.refusal(spec.CODE_OUTSIDE)
+        self._write_scan_order([self.pen] * count)
 
     def op_literal(self, low: int) -> None:
         """Draw a LIT."""
         values = self._pixels(self.count_of(low))
-        self._along(values)
+        self._write_scan_order(values)
         self.pen = self.after_literal(self.pen, values[-1])
 
     def op_differences(self, low: int) -> None:
         """Draw a DIFF."""
         values, pen = [], self.pen
-        for nibble in self._parts(self.count_of(low), 4):
+        for nibble in self._padded_bits(self.count_of(low), 4):
             pen = (pen + self.difference(nibble)) % 256
             values.append(pen)
-        self._along(values)
+        self._write_scan_order(values)
         self.pen = pen
 
     def op_step(self, octant: int) -> None:
@@ -263,62 +262,62 @@ class Decoder:
 
     def op_from(self, octant: int) -> None:
         """Draw a FROM."""
-        self._chain(octant, self._place())
+        self._chain(octant, self._read_voxel())
 
-    def _chain(self, octant: int, named: Place | None) -> None:
+    def _chain(self, octant: int, named: Voxel | None) -> None:
         steps = self.steps_of(self._byte())
-        crumbs = self._parts(steps, 2)
-        at = begin = self.inside(named) if named else self._here()
+        crumbs = self._padded_bits(steps, 2)
+        at = begin = self.require_on_grid(named) if named else self._cursor_voxel()
         main, signs = self.axes_of(octant)
         places = self.chain_start(begin)
         for crumb in crumbs:
             moved = list(at)
             for axis in self.chain_axes(crumb, main):
                 moved[axis] += signs[axis]
-            at = self.inside((moved[0], moved[1], moved[2]))
+            at = self.require_on_grid((moved[0], moved[1], moved[2]))
             places.append(at)
-        self.ink(places)
-        self.cursor = self.said.index(*self.after_chain(begin, at))
+        self.write_voxels(places)
+        self.cursor = self.device.index(*self.after_chain(begin, at))
 
     def op_line(self, _: int) -> None:
         """Draw a LINE."""
-        end = self._place()
-        begin = self._here()
-        self.inside(end)
+        end = self._read_voxel()
+        begin = self._cursor_voxel()
+        self.require_on_grid(end)
         d = [b - a for a, b in zip(begin, end, strict=True)]
         length = max(map(abs, d))
         x, y, z = (
             [a + self.rounded(k, da, length) for k in range(length + 1)]
             for a, da in zip(begin, d, strict=True)
         )
-        self.ink(zip(x, y, z, strict=True))
-        self.cursor = self.said.index(*self.after_shape(begin, end))
+        self.write_voxels(zip(x, y, z, strict=True))
+        self.cursor = self.device.index(*self.after_shape(begin, end))
 
     def op_box(self, _: int) -> None:
         """Draw a BOX."""
-        end = self._place()
-        begin = self._here()
-        self.inside(end)
+        end = self._read_voxel()
+        begin = self._cursor_voxel()
+        self.require_on_grid(end)
         xs, ys, zs = (self.span(a, b) for a, b in zip(begin, end, strict=True))
-        self.ink((x, y, z) for z in zs for y in ys for x in xs)
-        self.cursor = self.said.index(*self.after_shape(begin, end))
+        self.write_voxels((x, y, z) for z in zs for y in ys for x in xs)
+        self.cursor = self.device.index(*self.after_shape(begin, end))
 
     def op_dots(self, _: int) -> None:
         """Draw DOTS."""
-        places = [self._place() for _ in range(self.steps_of(self._byte()))]
-        self.ink(places)
-        begin = self.said.place(min(self.cursor, self.said.voxels - 1))
-        self.cursor = self.said.index(*self.after_shape(begin, places[-1]))
+        places = [self._read_voxel() for _ in range(self.steps_of(self._byte()))]
+        self.write_voxels(places)
+        begin = self.device.voxel_at(min(self.cursor, self.device.voxel_count - 1))
+        self.cursor = self.device.index(*self.after_shape(begin, places[-1]))
 
     def op_brick(self, level: int) -> None:
         """Draw an OCT."""
-        x, y, z = self._place()
+        x, y, z = self._read_voxel()
         side = 1 << level
         corner = (x * side, y * side, z * side)
         nodes = [corner]
-        places: list[Place] = []
+        places: list[Voxel] = []
         while side > 1:
-            children: list[Place] = []
+            children: list[Voxel] = []
             side //= 2
             for node in nodes:
                 mask = self._byte()
@@ -331,10 +330,10 @@ class Decoder:
                     elif mask >> bit & 1:
                         children.append(at)
             nodes = children
-        self.ink(places + nodes)
-        self.cursor = self.after_brick(self.cursor, self.said.index(*corner))
+        self.write_voxels(places + nodes)
+        self.cursor = self.after_brick(self.cursor, self.device.index(*corner))
 
-    def _cube(self, at: Place, side: int) -> list[Place]:
+    def _cube(self, at: Voxel, side: int) -> list[Voxel]:
         x, y, z = at
         part = range(side)
         return [(x + i, y + j, z + k) for k in part for j in part for i in part]
@@ -345,26 +344,26 @@ class Decoder:
         count = self._byte() + 1
         raw = self._take(3 * count)
         if first + count > spec.LIMIT_MAX_COLORS:
-            raise self.refuse(spec.CODE_OUTSIDE)
+            raise self.refusal(spec.CODE_OUTSIDE)
         for i in range(count):
             self.page.palette[first + i] = rgb(*raw[3 * i : 3 * i + 3])
 
 
 # First op byte, how many more, the feature that they need, and what draws them.
-_OPS: tuple[tuple[int, int, str, Callable[[Decoder, int], None]], ...] = (
-    (spec.OP_END, 0, "", Decoder.op_end),
-    (spec.OP_PEN, 0, "", Decoder.op_pen),
-    (spec.OP_MOVE, 0, "", Decoder.op_move),
-    (spec.OP_LINE, 0, "LINE", Decoder.op_line),
-    (spec.OP_BOX, 0, "BOX", Decoder.op_box),
-    (spec.OP_DOTS, 0, "DOTS", Decoder.op_dots),
-    (spec.OP_COLORS, 0, "PALETTE", Decoder.op_colors),
-    (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", Decoder.op_step),
-    (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", Decoder.op_from),
-    (spec.OP_ARC, 0, "ARC", Decoder.op_arc),
-    (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", Decoder.op_brick),
-    (spec.OP_SKIP, 31, "", Decoder.op_skip),
-    (spec.OP_RUN, 31, "", Decoder.op_run),
-    (spec.OP_LIT, 31, "", Decoder.op_literal),
-    (spec.OP_DIFF, 31, "DIFF", Decoder.op_differences),
+_OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] = (
+    (spec.OP_END, 0, "", ReferenceDecoder.op_end),
+    (spec.OP_PEN, 0, "", ReferenceDecoder.op_pen),
+    (spec.OP_MOVE, 0, "", ReferenceDecoder.op_move),
+    (spec.OP_LINE, 0, "LINE", ReferenceDecoder.op_line),
+    (spec.OP_BOX, 0, "BOX", ReferenceDecoder.op_box),
+    (spec.OP_DOTS, 0, "DOTS", ReferenceDecoder.op_dots),
+    (spec.OP_COLORS, 0, "PALETTE", ReferenceDecoder.op_colors),
+    (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_step),
+    (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_from),
+    (spec.OP_ARC, 0, "ARC", ReferenceDecoder.op_arc),
+    (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", ReferenceDecoder.op_brick),
+    (spec.OP_SKIP, 31, "", ReferenceDecoder.op_skip),
+    (spec.OP_RUN, 31, "", ReferenceDecoder.op_run),
+    (spec.OP_LIT, 31, "", ReferenceDecoder.op_literal),
+    (spec.OP_DIFF, 31, "DIFF", ReferenceDecoder.op_differences),
 )

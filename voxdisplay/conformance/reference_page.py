@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from voxdisplay.conformance.announced import Said
+from voxdisplay.conformance.announced_device import AnnouncedDevice
 from voxdisplay.wire import spec
 
 _U32 = 0xFFFFFFFF
@@ -53,11 +53,11 @@ class Page:
         else:
             self.pixels.pop(index, None)
 
-    def digest(self, said: Said) -> int:
+    def digest(self, device: AnnouncedDevice) -> int:
         """Give the digest of section 8."""
         total = sum(mix(index, value) for index, value in self.pixels.items())
-        if said.has("PALETTE"):
+        if device.has("PALETTE"):
             for i, (color, default) in enumerate(zip(self.palette, DEFAULT_PALETTE, strict=True)):
                 if color != default:
-                    total += mix(said.voxels + i & _U32, 0x1000000 + color)
+                    total += mix(device.voxel_count + i & _U32, 0x1000000 + color)
         return total & _U32

@@ -7,15 +7,15 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Any
 
-from voxdisplay.conformance.announced import FEATURES, FORMATS
+from voxdisplay.conformance.announced_device import FEATURES, FORMATS
 from voxdisplay.conformance.catalogue import SECTIONS
-from voxdisplay.conformance.dialogue import Line
+from voxdisplay.conformance.dialogue import LogEntry
 from voxdisplay.conformance.run import Report, Result, Verdict
 
 _LAST_LINES = 8  # of a transcript, unless all is shown
 
 
-def lines(report: Report, *, transcripts: bool) -> Iterator[str]:
+def report_lines(report: Report, *, transcripts: bool) -> Iterator[str]:
     """Say what is broken, what came of each section, and how it stands as a whole.
 
     Parameters
@@ -26,7 +26,7 @@ def lines(report: Report, *, transcripts: bool) -> Iterator[str]:
     """
     for result in report.results:
         if result.verdict is Verdict.BROKEN:
-            yield from broken(result, transcript=transcripts)
+            yield from violation_lines(result, transcript=transcripts)
     ordered = sorted(report.results, key=lambda result: result.check.order)
     for section, group in groupby(ordered, key=lambda result: result.check.section):
         counts = _counts([result.verdict for result in group])
@@ -35,7 +35,7 @@ def lines(report: Report, *, transcripts: bool) -> Iterator[str]:
     for reason, group in groupby(sorted(skipped, key=attrgetter("reason")), attrgetter("reason")):
         yield clean(f"not applicable, {reason}: {', '.join(result.check.id for result in group)}")
     yield _conclusion(report)
-    yield f"on display now: {report.left}"
+    yield f"on display now: {report.display_state}"
 
 
 def _counts(verdicts: list[Verdict]) -> str:
@@ -57,17 +57,17 @@ def _conclusion(report: Report) -> str:
     return f"{report.count(Verdict.BROKEN)} broken, {held} hold{missed}"
 
 
-def broken(result: Result, *, transcript: bool) -> Iterator[str]:
+def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
     """Say what is wrong: what must be, what was, and what went over the wire."""
     check = result.check
     yield f"BROKEN {check.id}"
-    yield f"  section {check.section}: {check.demands}"
-    if result.sent:
-        yield clean(f"  sent:    {str(result.sent).removeprefix('-> ')}")
-    yield clean(f"  must be: {result.must}")
-    yield clean(f"  was:     {result.came}")
-    if result.likely:
-        yield clean(f"  likely:  {result.likely}")
+    yield f"  section {check.section}: {check.requirement}"
+    if result.last_sent:
+        yield clean(f"  sent:    {str(result.last_sent).removeprefix('-> ')}")
+    yield clean(f"  must be: {result.expected}")
+    yield clean(f"  was:     {result.actual}")
+    if result.likely_cause:
+        yield clean(f"  likely:  {result.likely_cause}")
     if transcript:
         if len(result.log) > _LAST_LINES:
             yield f"    ... {len(result.log) - _LAST_LINES} before; -v shows all"
@@ -75,7 +75,7 @@ def broken(result: Result, *, transcript: bool) -> Iterator[str]:
     yield ""
 
 
-def transcript_lines(log: tuple[Line, ...]) -> Iterator[str]:
+def transcript_lines(log: tuple[LogEntry, ...]) -> Iterator[str]:
     """Show what went (->) and came (<-): packets without COBS and check value, as section 17.5."""
     for line in log:
         yield clean(f"    {line}")
@@ -88,24 +88,24 @@ def clean(text: str) -> str:
 
 def as_json(port: str, report: Report) -> dict[str, Any]:
     """Give all of it for a script; transcripts of what is broken."""
-    said = report.said
+    device = report.device
     return {
         "port": port,
-        "device": said
+        "device": device
         and {
-            "name": said.name,
-            "firmware": said.firmware,
-            "serial": said.serial,
-            "size": list(said.grid),
-            "format": FORMATS.get(said.format, str(said.format)).lower(),
-            "refresh_hz": said.refresh / 1000,
-            "max_payload_bytes": said.max_payload,
-            "rx_buffer_bytes": said.rx_buffer,
-            "features": [name.lower() for name in FEATURES if said.has(name)],
+            "name": device.name,
+            "firmware": device.firmware,
+            "serial": device.serial,
+            "size": list(device.grid),
+            "format": FORMATS.get(device.format, str(device.format)).lower(),
+            "refresh_hz": device.refresh / 1000,
+            "max_payload_bytes": device.max_payload,
+            "rx_buffer_bytes": device.rx_buffer,
+            "features": [name.lower() for name in FEATURES if device.has(name)],
         },
         "conforms": report.holds,
         "counts": {_key(verdict): report.count(verdict) for verdict in Verdict},
-        "on_display": report.left,
+        "on_display": report.display_state,
         "checks": [_result_json(result) for result in report.results],
     }
 
@@ -119,12 +119,14 @@ def _result_json(result: Result) -> dict[str, Any]:
     return {
         "section": result.check.section,
         "name": result.check.name,
-        "demands": result.check.demands,
+        "demands": result.check.requirement,
         "verdict": _key(result.verdict),
-        "sent_hex": result.sent.data.hex(" ").upper() if is_broken and result.sent else None,
-        "must": result.must or None,
-        "was": result.came or None,
-        "likely": result.likely or None,
+        "sent_hex": result.last_sent.data.hex(" ").upper()
+        if is_broken and result.last_sent
+        else None,
+        "must": result.expected or None,
+        "was": result.actual or None,
+        "likely": result.likely_cause or None,
         "reason": result.reason or None,
         "transcript": [
             {"sent": line.sent, "hex": line.data.hex(" ").upper(), "text": line.text}

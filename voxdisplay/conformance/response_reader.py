@@ -9,21 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.packets import Answer
+from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.packets import Response
 from voxdisplay.wire import spec
 
-_LONGEST_SEGMENT = packets.wire_size(spec.LIMIT_MAX_PAYLOAD)
+_LONGEST_SEGMENT = packets.max_encoded_bytes(spec.LIMIT_MAX_PAYLOAD)
 _ACK_WINDOW = (1 << spec.LIMIT_WINDOW - 1) - 1
-_KEPT = 5
+_MAX_PER_RULE = 5
 
 
-class Hearing:
+class ResponseReader:
     """An incremental reader of answers.
 
     Attributes
     ----------
-    said : Said or None
+    device : Said or None
         What the device announced; before that, anything may come (a boot text, say).
     faults : dict of str to list of str
         What was wrong, by the name of the rule; of each rule the first few.
@@ -34,77 +34,79 @@ class Hearing:
     """
 
     def __init__(self) -> None:
-        self.said: Said | None = None
-        self.faults: dict[str, list[str]] = {}
-        self.heard = self.segments = 0
+        self.device: AnnouncedDevice | None = None
+        self.violations: dict[str, list[str]] = {}
+        self.byte_count = self.segment_count = 0
         self._segment = bytearray()
 
-    def feed(self, come: bytes) -> Iterator[Answer]:
+    def feed(self, come: bytes) -> Iterator[Response]:
         """Take bytes; give the answers that they complete."""
-        self.heard += len(come)
+        self.byte_count += len(come)
         *ended, rest = (bytes(self._segment) + come).split(b"\0")
         self._segment[:] = rest[-_LONGEST_SEGMENT:]
         for segment in ended:
-            if answer := self._answer(segment):
+            if answer := self._response(segment):
                 yield answer
 
-    def _answer(self, segment: bytes) -> Answer | None:
+    def _response(self, segment: bytes) -> Response | None:
         if not segment:
             return None
-        self.segments += len(segment) >= spec.LIMIT_MIN_SEGMENT
-        packet = packets.unstuff(segment)
+        self.segment_count += len(segment) >= spec.LIMIT_MIN_SEGMENT
+        packet = packets.cobs_decode(segment)
         if len(segment) < spec.LIMIT_MIN_SEGMENT or packet is None:
-            self._note("delimited", f"{_hex(segment)} is no COBS of a packet")
+            self._record("delimited", f"{_hex(segment)} is no COBS of a packet")
             return None
-        if packets.stuff(packet) != segment:
-            self._note("delimited", f"{_hex(segment)} is not how section 3 encodes {_hex(packet)}")
-        inner = packets.unwire(segment)
+        if packets.cobs_encode(packet) != segment:
+            self._record(
+                "delimited", f"{_hex(segment)} is not how section 3 encodes {_hex(packet)}"
+            )
+        inner = packets.decode_segment(segment)
         if inner is None:
-            self._note("checked", f"{_hex(packet)} has a wrong check value")
+            self._record("checked", f"{_hex(packet)} has a wrong check value")
             return None
-        answer = Answer(inner)
-        if not answer.whole:
-            self._note("whole", f"{_hex(inner)} is of no type of a device, or too short for it")
+        answer = Response(inner)
+        if not answer.is_complete:
+            self._record("whole", f"{_hex(inner)} is of no type of a device, or too short for it")
             return None
-        self._judge(answer)
+        self._check_response(answer)
         return answer
 
-    def _judge(self, answer: Answer) -> None:
-        said = self.said
-        if said is None:
+    def _check_response(self, answer: Response) -> None:
+        device = self.device
+        if device is None:
             return
-        if len(answer.body) - packets.HEADER_BYTES > said.max_payload:
-            self._note("length", f"{answer.kind} of {len(answer.body)} bytes and check value")
-        for what in _reserved(answer):
-            self._note("reserved", f"{what} in {answer}")
+        if len(answer.body) - packets.HEADER_BYTES > device.max_payload:
+            self._record("length", f"{answer.kind} of {len(answer.body)} bytes and check value")
+        for what in _nonzero_reserved(answer):
+            self._record("reserved", f"{what} in {answer}")
         if answer.kind == spec.TYPE_ACK:
-            self._judge_ack(answer, said)
+            self._check_ack(answer, device)
         elif answer.kind == spec.TYPE_ERROR:
             try:
                 answer.tail.decode()
             except UnicodeDecodeError:
-                self._note("text", f"text {_hex(answer.tail)} of an ERROR is no UTF-8")
+                self._record("text", f"text {_hex(answer.tail)} of an ERROR is no UTF-8")
 
-    def _judge_ack(self, ack: Answer, said: Said) -> None:
-        if ack.boot != said.boot:
-            self._note("boot", f"boot id {ack.boot:04X}h in {ack}, {said.boot:04X}h in INFO")
+    def _check_ack(self, ack: Response, device: AnnouncedDevice) -> None:
+        if ack.boot != device.boot:
+            self._record("boot", f"boot id {ack.boot:04X}h in {ack}, {device.boot:04X}h in INFO")
         if ack.frame and not ack.flags & packets.SHOWN:
-            self._note("frame", f"frame {ack.frame} without SHOWN in {ack}")
-        if ack.digest and not said.has("DIGEST"):
-            self._note("digest", f"a digest without DIGEST in {ack}")
+            self._record("frame", f"frame {ack.frame} without SHOWN in {ack}")
+        if ack.digest and not device.has("DIGEST"):
+            self._record("digest", f"a digest without DIGEST in {ack}")
         if ack.received & ~_ACK_WINDOW:
-            self._note("received", f"a bit for a packet outside the window in {ack}")
-        if ack.flags & packets.PENDING and not said.refresh:
-            self._note("pending", f"PENDING although swaps happen at once in {ack}")
+            self._record("received", f"a bit for a packet outside the window in {ack}")
+        if ack.flags & packets.PENDING and not device.refresh:
+            self._record("pending", f"PENDING although swaps happen at once in {ack}")
 
-    def _note(self, rule: str, text: str) -> None:
-        if self.said is not None:
-            kept = self.faults.setdefault(rule, [])
-            if len(kept) < _KEPT and text not in kept:
+    def _record(self, rule: str, text: str) -> None:
+        if self.device is not None:
+            kept = self.violations.setdefault(rule, [])
+            if len(kept) < _MAX_PER_RULE and text not in kept:
                 kept.append(text)
 
 
-def _reserved(answer: Answer) -> Iterator[str]:
+def _nonzero_reserved(answer: Response) -> Iterator[str]:
     allowed = {
         spec.TYPE_ACK: packets.SHOWN | packets.PENDING | packets.ASKED,
         spec.TYPE_PAGE: packets.BACK,

@@ -9,19 +9,19 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
-from voxdisplay.conformance import handshake
-from voxdisplay.conformance.announced import FORMATS, Said
+from voxdisplay.conformance import handshake_diagnosis
+from voxdisplay.conformance.announced_device import FORMATS, AnnouncedDevice
 from voxdisplay.conformance.catalogue import CHECKS, Check
-from voxdisplay.conformance.dialogue import Broken, Line, NotApplicable, Silent
+from voxdisplay.conformance.dialogue import LogEntry, NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.packets import NoSuchFieldError
 from voxdisplay.conformance.probe import Probe
-from voxdisplay.conformance.saved_page import keep, put_back
+from voxdisplay.conformance.saved_page import restore_page, save_page
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
 
 _T = TypeVar("_T")
-_DEAF = 3  # checks in a row without any answer, and the device is given up
+_MAX_SILENT_CHECKS = 3  # checks in a row without any answer, and the device is given up
 
 
 class Verdict(enum.Enum):
@@ -51,14 +51,14 @@ class Result:
 
     check: Check
     verdict: Verdict
-    must: str = ""
-    came: str = ""
-    likely: str = ""
+    expected: str = ""
+    actual: str = ""
+    likely_cause: str = ""
     reason: str = ""
-    log: tuple[Line, ...] = ()
+    log: tuple[LogEntry, ...] = ()
 
     @property
-    def sent(self) -> Line | None:
+    def last_sent(self) -> LogEntry | None:
         """The latest packet that was sent and did not only ask."""
         asking = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
         lines = [line for line in self.log if line.sent]
@@ -72,7 +72,7 @@ class Report:
 
     Attributes
     ----------
-    said : Said or None
+    device : Said or None
         What the device announced, None if it did not answer.
     results : list of Result
         In the order of the checks.
@@ -80,9 +80,9 @@ class Report:
         What is on display now.
     """
 
-    said: Said | None = None
+    device: AnnouncedDevice | None = None
     results: list[Result] = field(default_factory=list)
-    left: str = "unknown"
+    display_state: str = "unknown"
 
     def count(self, verdict: Verdict) -> int:
         """Count the checks of which this came."""
@@ -94,7 +94,7 @@ class Report:
         return not self.count(Verdict.BROKEN) and not self.count(Verdict.NOT_RUN)
 
 
-def chosen(patterns: Iterable[str]) -> list[Check]:
+def select_checks(patterns: Iterable[str]) -> list[Check]:
     """Give the checks that any of the patterns names; all, if there is no pattern.
 
     Raises
@@ -113,7 +113,7 @@ def chosen(patterns: Iterable[str]) -> list[Check]:
     ]
 
 
-def examine(
+def run_checks(
     pipe: Transport,
     only: Iterable[str] = (),
     *,
@@ -122,7 +122,7 @@ def examine(
     baud: int = 115200,
     seed: int = 0,
     clock: Callable[[], float] = time.monotonic,
-    greeted: Callable[[Said, bool], object] | None = None,
+    greeted: Callable[[AnnouncedDevice, bool], object] | None = None,
     ended: Callable[[Result], object] | None = None,
 ) -> Report:
     """Examine the device at the other end of a pipe.
@@ -149,55 +149,63 @@ def examine(
     ValueError
         If ``only`` names no check.
     """
-    selected = chosen(only)
+    selected = select_checks(only)
     probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed, clock=clock)
     report = Report()
-    stranger = _meet(probe)
+    stranger = _handshake(probe)
     if stranger:
-        report.results += _none(stranger, selected)
+        report.results += _all_not_run(stranger, selected)
         if ended:
             for result in report.results:
                 ended(result)
         return report
-    report.said = probe.said
-    kept = _quietly(lambda: keep(probe))
+    report.device = probe.device
+    kept = _none_if_port_lost(lambda: save_page(probe))
     if greeted:
-        greeted(probe.said, kept is not None)
+        greeted(probe.device, kept is not None)
     try:
-        for result in _each(probe, selected):
+        for result in _run_selected(probe, selected):
             report.results.append(result)
             if ended:
                 ended(result)
     finally:  # also when somebody has seen enough
-        report.left = _quietly(lambda: put_back(probe, kept)) or "unknown: the port is gone"
+        report.display_state = (
+            _none_if_port_lost(lambda: restore_page(probe, kept)) or "unknown: the port is gone"
+        )
     return report
 
 
-def _meet(probe: Probe) -> Result | None:
+def _handshake(probe: Probe) -> Result | None:
     """Say hello; give what is wrong if the device cannot be talked to at all."""
     likely = ""
     try:
-        met = probe.greet()
+        met = probe.handshake()
         if not met:
-            likely = handshake.why_silent(probe)
+            likely = handshake_diagnosis.diagnose_silence(probe)
     except TransportError as error:
         met, likely = False, str(error)
-    said = probe.said
-    is_sound = said.format in FORMATS and said.voxels and said.max_payload >= spec.LIMIT_MIN_PAYLOAD
+    device = probe.device
+    is_sound = (
+        device.format in FORMATS
+        and device.voxel_count
+        and device.max_payload >= spec.LIMIT_MIN_PAYLOAD
+    )
     if met and is_sound:
         return None
     came = str(probe.info) if met else "nothing that could be read"
     must = "an INFO that says what the device is"
-    return Result(handshake.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
+    return Result(
+        handshake_diagnosis.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log)
+    )
 
 
-def _none(stranger: Result, selected: list[Check]) -> Iterator[Result]:
+def _all_not_run(stranger: Result, selected: list[Check]) -> Iterator[Result]:
     yield stranger
     for check in selected:
         yield Result(check, Verdict.NOT_RUN, reason="the device cannot be talked to")
 
 
-def _each(probe: Probe, selected: list[Check]) -> Iterator[Result]:
+def _run_selected(probe: Probe, selected: list[Check]) -> Iterator[Result]:
     """Make the checks, until the device or the port is gone."""
     deaf, gone = 0, ""
     for check in selected:
@@ -205,19 +213,19 @@ def _each(probe: Probe, selected: list[Check]) -> Iterator[Result]:
             yield Result(check, Verdict.NOT_RUN, reason=gone)
             continue
         try:
-            result = _make(probe, check)
+            result = _run_check(probe, check)
             deaf = 0
-        except _Unheard as unheard:
+        except _DeviceLost as unheard:
             result = unheard.result
             deaf += 1
-            gone = "the device does not answer any more" if deaf == _DEAF else ""
+            gone = "the device does not answer any more" if deaf == _MAX_SILENT_CHECKS else ""
         except TransportError as error:
             gone = str(error)
-            result = _broken(probe, check, Broken("the port stays open", gone))
+            result = _violation(probe, check, Violation("the port stays open", gone))
         yield result
 
 
-class _Unheard(Exception):  # noqa: N818
+class _DeviceLost(Exception):  # noqa: N818
     """The device does not even answer HELLO."""
 
     def __init__(self, result: Result) -> None:
@@ -225,42 +233,47 @@ class _Unheard(Exception):  # noqa: N818
         self.result = result
 
 
-def _make(probe: Probe, check: Check) -> Result:
+def _run_check(probe: Probe, check: Check) -> Result:
     """Make one check, in a session of its own; afterwards the device must answer HELLO."""
-    obstacle = check.obstacle(probe.said)
+    obstacle = check.not_applicable_reason(probe.device)
     if obstacle:
         return Result(check, Verdict.NOT_APPLICABLE, reason=obstacle)
-    probe.begin(check.id)
+    probe.start_check(check.id)
     result = Result(check, Verdict.HOLDS)
     try:
-        probe.open()
+        probe.open_session()
         check.run(probe)
     except NotApplicable as reason:
         result = Result(check, Verdict.NOT_APPLICABLE, reason=str(reason))
-    except Broken as broken:
-        result = _broken(probe, check, broken)
+    except Violation as broken:
+        result = _violation(probe, check, broken)
     except NoSuchFieldError as field:
-        result = _broken(probe, check, Broken("an answer of another type", str(field)))
+        result = _violation(probe, check, Violation("an answer of another type", str(field)))
     made = tuple(probe.log)
     try:
-        probe.open()
-    except Silent as silent:
-        worse = _broken(probe, check, silent)
-        raise _Unheard(result if result.verdict is Verdict.BROKEN else worse) from silent
-    except Broken as restarted:
+        probe.open_session()
+    except NoResponse as silent:
+        worse = _violation(probe, check, silent)
+        raise _DeviceLost(result if result.verdict is Verdict.BROKEN else worse) from silent
+    except Violation as restarted:
         if result.verdict is not Verdict.BROKEN:
-            return _broken(probe, check, restarted)
-        result = replace(result, likely=restarted.likely)
+            return _violation(probe, check, restarted)
+        result = replace(result, likely_cause=restarted.likely_cause)
     return replace(result, log=made)
 
 
-def _broken(probe: Probe, check: Check, broken: Broken) -> Result:
+def _violation(probe: Probe, check: Check, broken: Violation) -> Result:
     return Result(
-        check, Verdict.BROKEN, broken.must, broken.came, broken.likely, log=tuple(probe.log)
+        check,
+        Verdict.BROKEN,
+        broken.expected,
+        broken.actual,
+        broken.likely_cause,
+        log=tuple(probe.log),
     )
 
 
-def _quietly(do: Callable[[], _T]) -> _T | None:
+def _none_if_port_lost(do: Callable[[], _T]) -> _T | None:
     """Do something that a lost port may end."""
     try:
         return do()

@@ -9,59 +9,59 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.dialogue import Broken
+from voxdisplay.conformance.dialogue import Violation
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
-_MOST_S = 20.0
+_TIMEOUT_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class SavedPage:
     """A picture as the device told it: payloads that draw it, and its digest."""
 
     payloads: tuple[bytes, ...]
     digest: int
 
 
-def keep(probe: Probe) -> Kept | None:
+def save_page(probe: Probe) -> SavedPage | None:
     """Read what is on display; None if that cannot be, or takes too long."""
-    said = probe.said
-    until_s = probe.clock() + _MOST_S
+    device = probe.device
+    until_s = probe.clock() + _TIMEOUT_S
     payloads, at = [], 0
     try:
-        probe.sync()
-        if not said.has("READ") or probe.state.kind != spec.TYPE_ACK:
+        probe.poll_status()
+        if not device.has("READ") or probe.state.kind != spec.TYPE_ACK:
             return None
         digest = probe.state.digest
-        while at < said.voxels:
-            page = probe.ask_page(packets.read(at, said.voxels - at))
-            probe.unpack(page, at, said.voxels - at)  # is it a picture at all?
+        while at < device.voxel_count:
+            page = probe.request_page(packets.read(at, device.voxel_count - at))
+            probe.decode_page(page, at, device.voxel_count - at)  # is it a picture at all?
             if probe.clock() > until_s:
                 return None
             payloads.append(ops.skip(at) + page.tail)
             at += page.count
-    except Broken:
+    except Violation:
         return None
-    return Kept(tuple(payloads), digest)
+    return SavedPage(tuple(payloads), digest)
 
 
-def put_back(probe: Probe, kept: Kept | None) -> str:
+def restore_page(probe: Probe, kept: SavedPage | None) -> str:
     """Show what was kept, or nothing; say what is on display now."""
     try:
-        probe.open()
+        probe.open_session()
         if kept:
             try:
                 for number, payload in enumerate(kept.payloads, 1):
                     probe.draw(payload, commit=number == len(kept.payloads))
                 ack = probe.await_shown(0, [probe.state])
-            except Broken:
-                probe.open()
+            except Violation:
+                probe.open_session()
             else:
                 same = ack.digest == kept.digest
                 return "as it was" if same else "as it was, but for the palette or the digest"
         probe.draw(b"", commit=True)
         probe.await_shown(0, [probe.state])
-    except Broken:
+    except Violation:
         return "unknown: the device did not answer any more"
     return "dark"

@@ -4,71 +4,75 @@ from __future__ import annotations
 
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.catalogue import check
-from voxdisplay.conformance.checks.readback import dense
+from voxdisplay.conformance.checks.readback import show_incompressible
 from voxdisplay.conformance.probe import Probe
 
 
-def demand_none(probe: Probe, rule: str, must: str, likely: str = "") -> None:
+def require_no_violation(probe: Probe, rule: str, must: str, likely: str = "") -> None:
     """Demand that no answer has broken a rule; one exchange, so that there is an answer."""
-    probe.sync()
-    faults = probe.hearing.faults.get(rule, [])
-    probe.demand(not faults, must, "; ".join(faults), likely)
+    probe.poll_status()
+    faults = probe.reader.violations.get(rule, [])
+    probe.require(not faults, must, "; ".join(faults), likely)
 
 
 @check("3", "answers-delimited", "all that the device sends is COBS, as section 3 encodes it")
 def answers_delimited(probe: Probe) -> None:
-    demand_none(probe, "delimited", "segments of COBS", "does debugging text go to the same port?")
+    require_no_violation(
+        probe, "delimited", "segments of COBS", "does debugging text go to the same port?"
+    )
 
 
 @check("4", "answers-checked", "all that the device sends has its check value")
 def answers_checked(probe: Probe) -> None:
-    demand_none(probe, "checked", "the CRC-32 of header and payload, lowest byte first")
+    require_no_violation(probe, "checked", "the CRC-32 of header and payload, lowest byte first")
 
 
 @check(
     "4", "answers-whole", "all that the device sends is ACK, INFO, PAGE or ERROR, with all fields"
 )
 def answers_whole(probe: Probe) -> None:
-    demand_none(probe, "whole", "a packet of a device's type, and long enough")
+    require_no_violation(probe, "whole", "a packet of a device's type, and long enough")
 
 
 @check("4", "answers-length", "nothing that the device sends is longer than max_payload allows")
 def answers_length(probe: Probe) -> None:
-    if probe.said.has("READ"):  # a longest answer at least
-        probe.ask_page(packets.read(0, dense(probe)))
-    demand_none(probe, "length", f"at most {probe.said.max_payload} bytes of payload")
+    if probe.device.has("READ"):  # a longest answer at least
+        probe.request_page(packets.read(0, show_incompressible(probe)))
+    require_no_violation(probe, "length", f"at most {probe.device.max_payload} bytes of payload")
 
 
 @check("4", "answers-reserved", "what is reserved in an answer is 0")
 def answers_reserved(probe: Probe) -> None:
-    demand_none(probe, "reserved", "0 in what is reserved")
+    require_no_violation(probe, "reserved", "0 in what is reserved")
 
 
 @check("9", "answers-boot", "the boot id in each ACK is that of INFO")
 def answers_boot(probe: Probe) -> None:
-    demand_none(probe, "boot", "one boot id as long as the device is on")
+    require_no_violation(probe, "boot", "one boot id as long as the device is on")
 
 
 @check("9", "answers-frame", "without SHOWN the frame of an ACK is 0")
 def answers_frame(probe: Probe) -> None:
-    demand_none(probe, "frame", "frame 0 without SHOWN")
+    require_no_violation(probe, "frame", "frame 0 without SHOWN")
 
 
 @check("9", "answers-received", "`received` has no bit for a packet outside the window")
 def answers_received(probe: Probe) -> None:
-    demand_none(probe, "received", "bits 0 to 30 alone", "bit i stands for number next + 1 + i")
+    require_no_violation(
+        probe, "received", "bits 0 to 30 alone", "bit i stands for number next + 1 + i"
+    )
 
 
 @check("9", "answers-pending", "if swaps happen at once, no frame is ever pending")
 def answers_pending(probe: Probe) -> None:
-    demand_none(probe, "pending", "no PENDING if refresh is 0")
+    require_no_violation(probe, "pending", "no PENDING if refresh is 0")
 
 
 @check("8", "answers-digest", "without the feature DIGEST the digest of an ACK is 0")
 def answers_digest(probe: Probe) -> None:
-    demand_none(probe, "digest", "digest 0 without the feature")
+    require_no_violation(probe, "digest", "digest 0 without the feature")
 
 
 @check("11", "answers-text", "the text of an ERROR is UTF-8")
 def answers_text(probe: Probe) -> None:
-    demand_none(probe, "text", "UTF-8")
+    require_no_violation(probe, "text", "UTF-8")

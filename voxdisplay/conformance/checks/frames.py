@@ -3,80 +3,102 @@
 from __future__ import annotations
 
 from voxdisplay.conformance import ops
-from voxdisplay.conformance.catalogue import at_once, check, seen, voxels
+from voxdisplay.conformance.catalogue import check, immediate_swap, min_voxels, readable_display
 from voxdisplay.conformance.packets import CLEAR, COMMIT, SHOWN, data
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 
-def lit(probe: Probe, *indices: int) -> Page:
+def lit_page(probe: Probe, *indices: int) -> Page:
     """Give a page with full pixels at some indices."""
-    return Page(dict.fromkeys(indices, probe.said.full))
+    return Page(dict.fromkeys(indices, probe.device.full_pixel))
 
 
-def demand_front(probe: Probe, page: Page, **fields: int) -> None:
+def require_front_page(probe: Probe, page: Page, **fields: int) -> None:
     """Wait for ticks, then demand what is on display, and fields of the ACK."""
-    probe.let_ticks_pass()
-    probe.sync()
-    probe.demand_ack(probe.state, **fields)
-    probe.look(probe.state, page)
+    probe.wait_two_ticks()
+    probe.poll_status()
+    probe.require_ack(probe.state, **fields)
+    probe.require_displayed(probe.state, page)
 
 
-@check("6", "clear", "with CLEAR a frame starts dark", seen, voxels(2))
+@check("6", "clear", "with CLEAR a frame starts dark", readable_display, min_voxels(2))
 def clear(probe: Probe) -> None:
     for index in (0, 1, 0):
-        probe.show(ops.dot(probe.said, index))
+        probe.show(ops.single_voxel(probe.device, index))
     probe.show(b"")
 
 
-@check("6", "keep", "without CLEAR a frame starts as a copy of the front page", seen, voxels(4))
+@check(
+    "6",
+    "keep",
+    "without CLEAR a frame starts as a copy of the front page",
+    readable_display,
+    min_voxels(4),
+)
 def keep(probe: Probe) -> None:
-    probe.show(ops.dot(probe.said, 0))
+    probe.show(ops.single_voxel(probe.device, 0))
     for index in (1, 2, 3):
-        probe.show(ops.dot(probe.said, index), clear=False)
+        probe.show(ops.single_voxel(probe.device, index), clear=False)
     probe.show(b"", clear=False)
 
 
-@check("6", "many-packets", "a frame of several packets is drawn by all of them", seen, voxels(6))
+@check(
+    "6",
+    "many-packets",
+    "a frame of several packets is drawn by all of them",
+    readable_display,
+    min_voxels(6),
+)
 def many_packets(probe: Probe) -> None:
-    probe.show(*(ops.dot(probe.said, index) for index in range(6)))
-    probe.show(*(ops.dot(probe.said, index, 0) for index in range(3)), clear=False)
+    probe.show(*(ops.single_voxel(probe.device, index) for index in range(6)))
+    probe.show(*(ops.single_voxel(probe.device, index, 0) for index in range(3)), clear=False)
 
 
-@check("6", "empty-packets", "the sequence of ops may be empty", seen)
+@check("6", "empty-packets", "the sequence of ops may be empty", readable_display)
 def empty_packets(probe: Probe) -> None:
-    probe.show(b"", ops.dot(probe.said, 0), b"")
+    probe.show(b"", ops.single_voxel(probe.device, 0), b"")
 
 
-@check("6", "only-by-commit", "nothing is shown before COMMIT", seen)
+@check("6", "only-by-commit", "nothing is shown before COMMIT", readable_display)
 def only_by_commit(probe: Probe) -> None:
     probe.show(b"")
-    probe.draw(ops.dot(probe.said, 0))
-    demand_front(probe, Page(), shown=1, frame=0, pending=0)
+    probe.draw(ops.single_voxel(probe.device, 0))
+    require_front_page(probe, Page(), shown=1, frame=0, pending=0)
     probe.draw(b"", commit=True)
-    probe.look(probe.await_shown(1), lit(probe, 0))
+    probe.require_displayed(probe.await_shown(1), lit_page(probe, 0))
 
 
-@check("6", "only-whole", "a frame of which packets are missing is not shown, COMMIT or not", seen)
+@check(
+    "6",
+    "only-whole",
+    "a frame of which packets are missing is not shown, COMMIT or not",
+    readable_display,
+)
 def only_whole(probe: Probe) -> None:
-    last = probe.said.voxels - 1
+    last = probe.device.voxel_count - 1
     probe.show(b"")
-    probe.say(data(3, 1, ops.dot(probe.said, last), CLEAR | COMMIT))
-    demand_front(probe, Page(), shown=1, frame=0, pending=0, next=1, received=2)
-    probe.say(data(1, 1, ops.dot(probe.said, 0)))
-    demand_front(probe, Page(), shown=1, frame=0, pending=0, next=2, received=1)
-    come = probe.say(data(2, 1))
-    probe.look(probe.await_shown(1, come), lit(probe, 0, last))
+    probe.send_and_poll(data(3, 1, ops.single_voxel(probe.device, last), CLEAR | COMMIT))
+    require_front_page(probe, Page(), shown=1, frame=0, pending=0, next=1, received=2)
+    probe.send_and_poll(data(1, 1, ops.single_voxel(probe.device, 0)))
+    require_front_page(probe, Page(), shown=1, frame=0, pending=0, next=2, received=1)
+    come = probe.send_and_poll(data(2, 1))
+    probe.require_displayed(probe.await_shown(1, come), lit_page(probe, 0, last))
 
 
-@check("6", "begins-by-arrival", "the first packet taken begins a frame, whatever its number", seen)
+@check(
+    "6",
+    "begins-by-arrival",
+    "the first packet taken begins a frame, whatever its number",
+    readable_display,
+)
 def begins_by_arrival(probe: Probe) -> None:
-    probe.show(ops.dot(probe.said, probe.said.voxels - 1))
-    last = probe.said.voxels - 1
-    probe.say(data(2, 1, ops.dot(probe.said, 0), 0), data(1, 1, b"", 0))
-    come = probe.say(data(3, 1, b"", COMMIT))
-    probe.look(probe.await_shown(1, [*come, probe.state]), lit(probe, 0, last))
+    probe.show(ops.single_voxel(probe.device, probe.device.voxel_count - 1))
+    last = probe.device.voxel_count - 1
+    probe.send_and_poll(data(2, 1, ops.single_voxel(probe.device, 0), 0), data(1, 1, b"", 0))
+    come = probe.send_and_poll(data(3, 1, b"", COMMIT))
+    probe.require_displayed(probe.await_shown(1, [*come, probe.state]), lit_page(probe, 0, last))
 
 
 @check("6", "swap-reported", "a swap is reported when it happens, without being asked for")
@@ -84,101 +106,109 @@ def swap_reported(probe: Probe) -> None:
     for frame in range(3):
         probe.send(data(frame, frame, b"", CLEAR | COMMIT))
         come = []
-        for answer in probe.answers():
+        for answer in probe.responses():
             come.append(answer)
             if answer.kind == spec.TYPE_ACK and answer.flags & SHOWN and answer.frame == frame:
                 break
         else:
             probe.fail(f"an ACK with SHOWN and frame {frame}", come[-1] if come else "nothing")
-        probe.sync()
+        probe.poll_status()
 
 
-@check("6", "one-ack-at-once", "if refresh is 0, one ACK serves packet and swap", at_once)
+@check("6", "one-ack-at-once", "if refresh is 0, one ACK serves packet and swap", immediate_swap)
 def one_ack_at_once(probe: Probe) -> None:
     for frame in range(3):
-        ack = probe.ask(data(frame, frame, b"", CLEAR | COMMIT))
-        probe.demand_ack(ack, shown=1, frame=frame, next=frame + 1, pending=0)
+        ack = probe.request(data(frame, frame, b"", CLEAR | COMMIT))
+        probe.require_ack(ack, shown=1, frame=frame, next=frame + 1, pending=0)
 
 
 @check("6", "first-id", "the first frame of a session has the id 0; others are refused: FRAME at 2")
 def first_id(probe: Probe) -> None:
     for frame in (255, 1, 7):
-        probe.open()
-        probe.refuse(data(0, frame), spec.CODE_FRAME, 2)
+        probe.open_session()
+        probe.require_refused(data(0, frame), spec.CODE_FRAME, 2)
 
 
 @check("6", "next-id", "behind frame f only f and f + 1 are taken; others are refused: FRAME at 2")
 def next_id(probe: Probe) -> None:
     for shown in (False, True):
         for frame in (2, 255, 9):
-            probe.open()
+            probe.open_session()
             if shown:
                 probe.show(b"")
             else:
                 probe.draw(b"")
-            probe.refuse(data(1, frame), spec.CODE_FRAME, 2)
+            probe.require_refused(data(1, frame), spec.CODE_FRAME, 2)
 
 
 @check("6", "after-display", "what belongs to the frame on display is refused: FRAME at 2")
 def after_display(probe: Probe) -> None:
     probe.show(b"")
-    probe.refuse(data(1, 0), spec.CODE_FRAME, 2)
+    probe.require_refused(data(1, 0), spec.CODE_FRAME, 2)
 
 
 @check("6", "behind-commit", "what belongs to f behind its COMMIT is refused: FRAME at 2")
 def behind_commit(probe: Probe) -> None:
-    probe.say(data(1, 0, b"", CLEAR | COMMIT))
-    probe.refuse(data(2, 0), spec.CODE_FRAME, 2)
+    probe.send_and_poll(data(1, 0, b"", CLEAR | COMMIT))
+    probe.require_refused(data(2, 0), spec.CODE_FRAME, 2)
 
 
 @check("6", "clear-flag-differs", "all packets of a frame have the same CLEAR flag: FRAME at 0")
 def clear_flag_differs(probe: Probe) -> None:
     for flags in (0, CLEAR):
-        probe.open()
-        probe.ask(data(0, 0, b"", flags))
-        probe.refuse(data(1, 0, b"", flags ^ CLEAR), spec.CODE_FRAME, 0)
+        probe.open_session()
+        probe.request(data(0, 0, b"", flags))
+        probe.require_refused(data(1, 0, b"", flags ^ CLEAR), spec.CODE_FRAME, 0)
 
 
 @check(
     "6", "next-while-missing", "f + 1 is dropped while packets of f may be missing, and answered"
 )
 def next_while_missing(probe: Probe) -> None:
-    probe.ask(data(1, 0))
-    ack = probe.ask(data(2, 1, b"\x1f\xff"))
-    probe.demand_ack(
+    probe.request(data(1, 0))
+    ack = probe.request(data(2, 1, b"\x1f\xff"))
+    probe.require_ack(
         ack,
         "drop the packet, do not look at its ops, do not mark it as received",
         next=0,
         received=1,
         last=2,
     )
-    probe.ask(data(0, 0))
-    probe.demand_ack(probe.ask(data(2, 1, ops.dot(probe.said, 0))), next=3, received=0)
-    come = probe.say(data(3, 1, b"", CLEAR | COMMIT))
-    probe.look(probe.await_shown(1, [*come, probe.state]), lit(probe, 0))
+    probe.request(data(0, 0))
+    probe.require_ack(
+        probe.request(data(2, 1, ops.single_voxel(probe.device, 0))), next=3, received=0
+    )
+    come = probe.send_and_poll(data(3, 1, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(1, [*come, probe.state]), lit_page(probe, 0))
 
 
 @check("6", "other-while-missing", "so is a packet of any other frame")
 def other_while_missing(probe: Probe) -> None:
-    probe.ask(data(1, 0))
+    probe.request(data(1, 0))
     for frame in (2, 7, 255):
-        ack = probe.ask(data(2, frame, b"\x1f\xff"))
-        probe.demand_ack(ack, "it is dropped like one of f + 1", next=0, received=1, last=2)
+        ack = probe.request(data(2, frame, b"\x1f\xff"))
+        probe.require_ack(ack, "it is dropped like one of f + 1", next=0, received=1, last=2)
 
 
 @check("6", "first-while-missing", "so is one of another frame before any has begun")
 def first_while_missing(probe: Probe) -> None:
-    ack = probe.ask(data(1, 3, b"\x1f\xff"))
-    probe.demand_ack(ack, "number 0 is missing", next=0, received=0, last=1)
+    ack = probe.request(data(1, 3, b"\x1f\xff"))
+    probe.require_ack(ack, "number 0 is missing", next=0, received=0, last=1)
 
 
-@check("6", "given-up", "f + 1 drops f if f is not whole and nothing is missing", seen, voxels(3))
+@check(
+    "6",
+    "given-up",
+    "f + 1 drops f if f is not whole and nothing is missing",
+    readable_display,
+    min_voxels(3),
+)
 def given_up(probe: Probe) -> None:
-    probe.show(ops.dot(probe.said, 0))
-    probe.draw(ops.dot(probe.said, 1))
+    probe.show(ops.single_voxel(probe.device, 0))
+    probe.draw(ops.single_voxel(probe.device, 1))
     probe.frame += 1
-    probe.show(ops.dot(probe.said, 2), clear=False)
-    probe.draw(ops.dot(probe.said, 1), clear=False)
+    probe.show(ops.single_voxel(probe.device, 2), clear=False)
+    probe.draw(ops.single_voxel(probe.device, 1), clear=False)
     probe.frame += 1
     probe.show(b"", clear=False)
 
@@ -186,17 +216,17 @@ def given_up(probe: Probe) -> None:
 @check("6", "out-of-order-next", "behind a frame on display, f + 1 may begin out of order")
 def out_of_order_next(probe: Probe) -> None:
     probe.show(b"")
-    probe.demand_ack(probe.ask(data(2, 1)), next=1, received=1)
-    probe.demand_ack(probe.ask(data(1, 1)), next=3, received=0)
+    probe.require_ack(probe.request(data(2, 1)), next=1, received=1)
+    probe.require_ack(probe.request(data(1, 1)), next=3, received=0)
 
 
-@check("6", "two-commits", "of several COMMIT the lowest counts", seen, voxels(3))
+@check("6", "two-commits", "of several COMMIT the lowest counts", readable_display, min_voxels(3))
 def two_commits(probe: Probe) -> None:
-    probe.say(data(3, 0, ops.dot(probe.said, 2), CLEAR | COMMIT))
-    probe.say(data(1, 0, ops.dot(probe.said, 1), CLEAR | COMMIT))
-    come = probe.say(data(0, 0, ops.dot(probe.said, 0)))
+    probe.send_and_poll(data(3, 0, ops.single_voxel(probe.device, 2), CLEAR | COMMIT))
+    probe.send_and_poll(data(1, 0, ops.single_voxel(probe.device, 1), CLEAR | COMMIT))
+    come = probe.send_and_poll(data(0, 0, ops.single_voxel(probe.device, 0)))
     ack = probe.await_shown(0, [*come, probe.state])
-    probe.look(ack, lit(probe, 0, 1, 2))
+    probe.require_displayed(ack, lit_page(probe, 0, 1, 2))
 
 
 @check("6", "ids-wrap", "frame ids and sequence numbers go round modulo 256")
@@ -205,4 +235,4 @@ def ids_wrap(probe: Probe) -> None:
         probe.draw(b"")
         probe.frame = (probe.frame + 1) % 256
     for _ in range(3):
-        probe.show(ops.dot(probe.said, 0))
+        probe.show(ops.single_voxel(probe.device, 0))

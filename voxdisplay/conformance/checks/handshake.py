@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.announced import FEATURES, FORMATS
-from voxdisplay.conformance.catalogue import check, seen, ticking, voxels
-from voxdisplay.conformance.packets import COMMIT, SHOWN, Answer, body, data, hello
+from voxdisplay.conformance.announced_device import FEATURES, FORMATS
+from voxdisplay.conformance.catalogue import check, min_voxels, readable_display, refresh_tick
+from voxdisplay.conformance.packets import COMMIT, SHOWN, Response, body, data, hello
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
@@ -15,24 +15,24 @@ from voxdisplay.wire import spec
 _ATTEMPTS = 6
 
 
-def greeted(probe: Probe, packet: bytes) -> Answer:
+def request_info(probe: Probe, packet: bytes) -> Response:
     """Send a HELLO; demand one INFO."""
-    info = probe.ask(packet)
-    probe.demand(info.kind == spec.TYPE_INFO, "INFO", info)
+    info = probe.request(packet)
+    probe.require(info.kind == spec.TYPE_INFO, "INFO", info)
     return info
 
 
 @check("5", "info-fields", "every field of INFO has a value that is allowed")
 def info_fields(probe: Probe) -> None:
-    info, said = probe.info, probe.said
+    info, device = probe.info, probe.device
     known = sum(1 << bit for bit in FEATURES.values())
-    longest = packets.wire_size(info.max_payload)
+    longest = packets.max_encoded_bytes(info.max_payload)
     needed = spec.LIMIT_RESERVE + longest
     count = info.nx * info.ny * info.nz
     for holds, must, came in (
         (info.major == spec.VERSION_MAJOR, "major 1", info.major),
         (info.format in FORMATS, "format 1 to 4", info.format),
-        (min(said.grid) > 0, "a voxel at least on each axis", said.grid),
+        (min(device.grid) > 0, "a voxel at least on each axis", device.grid),
         (count <= spec.LIMIT_MAX_VOXELS, "at most 2^31 - 1 voxels", count),
         (info.pages >= 2, "two pages at least", info.pages),
         (info.max_payload >= spec.LIMIT_MIN_PAYLOAD, "max_payload 64 at least", info.max_payload),
@@ -43,19 +43,19 @@ def info_fields(probe: Probe) -> None:
         ),
         (not info.features & ~known, "no bit of features without a name", hex(info.features)),
     ):
-        probe.demand(bool(holds), must, came)
+        probe.require(bool(holds), must, came)
     for name in ("DIFF", "PALETTE"):
-        fits = not said.has(name) or info.format == spec.FORMAT_INDEX8
-        probe.demand(fits, f"{name} only with the format INDEX8", info)
+        fits = not device.has(name) or info.format == spec.FORMAT_INDEX8
+        probe.require(fits, f"{name} only with the format INDEX8", info)
 
 
 @check("5", "info-strings", "INFO ends with three strings in UTF-8")
 def info_strings(probe: Probe) -> None:
     at, tail = 0, probe.info.tail
     for name in ("name", "firmware", "serial"):
-        probe.demand(at < len(tail), f"a size of the string {name}", "the end of INFO")
+        probe.require(at < len(tail), f"a size of the string {name}", "the end of INFO")
         end = at + 1 + tail[at]
-        probe.demand(end <= len(tail), f"{tail[at]} bytes of {name}", f"{len(tail) - at - 1}")
+        probe.require(end <= len(tail), f"{tail[at]} bytes of {name}", f"{len(tail) - at - 1}")
         try:
             tail[at + 1 : end].decode()
         except UnicodeDecodeError:
@@ -66,90 +66,99 @@ def info_strings(probe: Probe) -> None:
 @check("5", "info-same", "INFO says the same each time, but for the session")
 def info_same(probe: Probe) -> None:
     for session in (1, 0x1234, 0xFFFF):
-        info = greeted(probe, hello(session))
-        probe.demand(info.session == session, f"session {session:04X}h in INFO", info)
+        info = request_info(probe, hello(session))
+        probe.require(info.session == session, f"session {session:04X}h in INFO", info)
         same = info.body[:4] + info.body[6:] == probe.info.body[:4] + probe.info.body[6:]
-        probe.demand(same, f"as before: {probe.info}", info)
+        probe.require(same, f"as before: {probe.info}", info)
 
 
 @check("5", "hello-repeated", "each HELLO is answered with INFO, also one that is repeated")
 def hello_repeated(probe: Probe) -> None:
     packet = hello(0x5A17)
-    come = probe.say(packet, packet, packet)
+    come = probe.send_and_poll(packet, packet, packet)
     kinds = [answer.kind for answer in come]
-    probe.demand(kinds == 3 * [spec.TYPE_INFO], "3 times INFO", " and ".join(map(str, come)))
-    probe.demand_ack(probe.state, session=0x5A17, next=0)
+    probe.require(kinds == 3 * [spec.TYPE_INFO], "3 times INFO", " and ".join(map(str, come)))
+    probe.require_ack(probe.state, session=0x5A17, next=0)
 
 
 @check("5", "new-session", "a HELLO begins a session: next 0, nothing received, nothing shown")
 def new_session(probe: Probe) -> None:
     probe.show(b"")
     for seq in (1, 2, 5):
-        probe.ask(data(seq, 1))
-    probe.open()
-    probe.sync()
-    probe.demand_ack(probe.state, session=probe.session, next=0, received=0, shown=0, pending=0)
+        probe.request(data(seq, 1))
+    probe.open_session()
+    probe.poll_status()
+    probe.require_ack(probe.state, session=probe.session, next=0, received=0, shown=0, pending=0)
     probe.draw(b"")
 
 
 @check(
-    "5", "front-page-stays", "the front page stays as it is, but its frame id is forgotten", seen
+    "5",
+    "front-page-stays",
+    "the front page stays as it is, but its frame id is forgotten",
+    readable_display,
 )
 def front_page_stays(probe: Probe) -> None:
-    probe.show(ops.dot(probe.said, probe.said.voxels - 1))
-    probe.open()
-    probe.sync()
-    probe.demand_ack(probe.state, "SHOWN is clear until the session's first swap", shown=0, frame=0)
-    probe.look(probe.state, probe.front or Page())
+    probe.show(ops.single_voxel(probe.device, probe.device.voxel_count - 1))
+    probe.open_session()
+    probe.poll_status()
+    probe.require_ack(
+        probe.state, "SHOWN is clear until the session's first swap", shown=0, frame=0
+    )
+    probe.require_displayed(probe.state, probe.front or Page())
 
 
-@check("5", "filling-dropped", "a frame that is not on display is dropped by HELLO", seen)
+@check(
+    "5", "filling-dropped", "a frame that is not on display is dropped by HELLO", readable_display
+)
 def filling_dropped(probe: Probe) -> None:
     probe.show(b"")
-    probe.draw(ops.dot(probe.said, 0))
-    probe.open()
-    probe.let_ticks_pass()
-    probe.sync()
-    probe.demand_ack(probe.state, shown=0, pending=0)
-    probe.look(probe.state, Page())
+    probe.draw(ops.single_voxel(probe.device, 0))
+    probe.open_session()
+    probe.wait_two_ticks()
+    probe.poll_status()
+    probe.require_ack(probe.state, shown=0, pending=0)
+    probe.require_displayed(probe.state, Page())
     probe.show(b"", clear=False)
 
 
-@check("5", "pending-dropped", "so is one that waits for its tick", ticking, seen)
+@check("5", "pending-dropped", "so is one that waits for its tick", refresh_tick, readable_display)
 def pending_dropped(probe: Probe) -> None:
     for _ in range(_ATTEMPTS):
         probe.show(b"")
         session = probe.session % 65535 + 1
-        come = probe.say(data(1, 1, ops.dot(probe.said, 0), 1 | COMMIT), hello(session))
+        come = probe.send_and_poll(
+            data(1, 1, ops.single_voxel(probe.device, 0), 1 | COMMIT), hello(session)
+        )
         probe.session = session
         kinds = [answer.kind for answer in come]
-        probe.demand(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
+        probe.require(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
         at = kinds.index(spec.TYPE_INFO)
         if any(answer.flags & SHOWN and answer.frame == 1 for answer in come[:at]):
-            probe.open()
+            probe.open_session()
             continue  # the tick was faster
-        probe.let_ticks_pass()
-        probe.sync()
-        probe.demand_ack(probe.state, shown=0, pending=0)
-        probe.look(probe.state, Page())
+        probe.wait_two_ticks()
+        probe.poll_status()
+        probe.require_ack(probe.state, shown=0, pending=0)
+        probe.require_displayed(probe.state, Page())
         return
 
 
 @check("5", "other-major", "a HELLO of another major gets INFO, and opens no session")
 def other_major(probe: Probe) -> None:
-    probe.ask(data(0, 0))
+    probe.request(data(0, 0))
     for major in (0, 2, 255):
-        info = greeted(probe, hello(0x4321, major))
-        probe.demand(info.session == 0x4321, "the session of that HELLO in INFO", info)
-        probe.demand(info.major == spec.VERSION_MAJOR, "the device's own major in INFO", info)
-        probe.demand_ack(probe.state, "what was open stays open", session=probe.session, next=1)
+        info = request_info(probe, hello(0x4321, major))
+        probe.require(info.session == 0x4321, "the session of that HELLO in INFO", info)
+        probe.require(info.major == spec.VERSION_MAJOR, "the device's own major in INFO", info)
+        probe.require_ack(probe.state, "what was open stays open", session=probe.session, next=1)
 
 
 @check("5", "other-major-first", "also where no session is open")
 def other_major_first(probe: Probe) -> None:
-    probe.close()
-    greeted(probe, hello(0x4321, 2))
-    probe.demand(probe.state.kind == spec.TYPE_ERROR, "NO_SESSION answers STATUS", probe.state)
+    probe.end_session()
+    request_info(probe, hello(0x4321, 2))
+    probe.require(probe.state.kind == spec.TYPE_ERROR, "NO_SESSION answers STATUS", probe.state)
 
 
 @check("5", "hello-ignored", "flags, seq, frame, minor, reserved and further bytes are ignored")
@@ -161,9 +170,9 @@ def hello_ignored(probe: Probe) -> None:
         body(spec.TYPE_HELLO, 0, 0, 0, b"\1" + session + b"\0\0" + bytes(range(40))),
         body(spec.TYPE_HELLO, 1, 255, 255, b"\1" + session + b"\1\1\0\0\0"),
     ):
-        info = greeted(probe, packet)
-        probe.demand(info.session == probe.session, "the session of the HELLO", info)
-        probe.demand_ack(probe.state, session=probe.session)
+        info = request_info(probe, packet)
+        probe.require(info.session == probe.session, "the session of the HELLO", info)
+        probe.require_ack(probe.state, session=probe.session)
 
 
 @check(
@@ -171,21 +180,25 @@ def hello_ignored(probe: Probe) -> None:
 )
 def hello_short(probe: Probe) -> None:
     for payload in (b"\1\1\1\0", b"\1\1\1", b"\1", b"", b"\1\0\0\0", b"\2\0\0", b"\7\1\1\0"):
-        probe.refuse(body(spec.TYPE_HELLO, payload=payload), spec.CODE_LENGTH, 0)
-        probe.demand_ack(probe.state, "what was open stays open", session=probe.session)
+        probe.require_refused(body(spec.TYPE_HELLO, payload=payload), spec.CODE_LENGTH, 0)
+        probe.require_ack(probe.state, "what was open stays open", session=probe.session)
 
 
 @check("5", "session-zero", "a HELLO with session 0 is refused: FIELD at 4, whatever its major")
 def session_zero(probe: Probe) -> None:
     for major in (1, 0, 2):
-        probe.refuse(hello(0, major), spec.CODE_FIELD, 4)
-        probe.demand_ack(probe.state, "what was open stays open", session=probe.session)
+        probe.require_refused(hello(0, major), spec.CODE_FIELD, 4)
+        probe.require_ack(probe.state, "what was open stays open", session=probe.session)
 
 
 @check(
-    "5", "keep-in-new-session", "a first frame without CLEAR copies what is shown", seen, voxels(2)
+    "5",
+    "keep-in-new-session",
+    "a first frame without CLEAR copies what is shown",
+    readable_display,
+    min_voxels(2),
 )
 def keep_in_new_session(probe: Probe) -> None:
-    probe.show(ops.dot(probe.said, 0))
-    probe.open()
-    probe.show(ops.dot(probe.said, 1), clear=False)
+    probe.show(ops.single_voxel(probe.device, 0))
+    probe.open_session()
+    probe.show(ops.single_voxel(probe.device, 1), clear=False)

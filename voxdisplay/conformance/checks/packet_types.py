@@ -11,10 +11,10 @@ from voxdisplay.wire import spec
 HOST_TYPES = (spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ)
 
 
-def demand_still_open(probe: Probe) -> None:
+def require_session_open(probe: Probe) -> None:
     """Demand that what was refused has changed nothing."""
-    probe.sync()
-    probe.demand_ack(
+    probe.poll_status()
+    probe.require_ack(
         probe.state, "a refused packet other than DATA changes nothing", session=probe.session
     )
 
@@ -23,33 +23,33 @@ def demand_still_open(probe: Probe) -> None:
 def reserved_types(probe: Probe) -> None:
     for kind in range(16):
         if kind not in HOST_TYPES:
-            probe.refuse(body(kind, seq=kind, frame=9, payload=b"\1"), spec.CODE_TYPE, 0)
-            probe.refuse(body(kind, flags=3), spec.CODE_TYPE, 0)
-    demand_still_open(probe)
+            probe.require_refused(body(kind, seq=kind, frame=9, payload=b"\1"), spec.CODE_TYPE, 0)
+            probe.require_refused(body(kind, flags=3), spec.CODE_TYPE, 0)
+    require_session_open(probe)
 
 
 @check("4", "data-flags", "a reserved flag of DATA is refused: FIELD at 0")
 def data_flags(probe: Probe) -> None:
     for flags in (2, 8, 10, 2 | CLEAR | COMMIT):
-        probe.open()
-        probe.refuse(data(0, 0, b"", flags), spec.CODE_FIELD, 0)
+        probe.open_session()
+        probe.require_refused(data(0, 0, b"", flags), spec.CODE_FIELD, 0)
 
 
 @check("4", "status-fields", "reserved flags and frame of a STATUS are refused: FIELD")
 def status_fields(probe: Probe) -> None:
     for flags in (1, 2, 4, 8, 15):
-        probe.refuse(body(spec.TYPE_STATUS, flags, 9), spec.CODE_FIELD, 0)
-    probe.refuse(body(spec.TYPE_STATUS, 0, 9, 1), spec.CODE_FIELD, 2)
-    probe.refuse(body(spec.TYPE_STATUS, 1, 9, 1), spec.CODE_FIELD, 0)
-    demand_still_open(probe)
+        probe.require_refused(body(spec.TYPE_STATUS, flags, 9), spec.CODE_FIELD, 0)
+    probe.require_refused(body(spec.TYPE_STATUS, 0, 9, 1), spec.CODE_FIELD, 2)
+    probe.require_refused(body(spec.TYPE_STATUS, 1, 9, 1), spec.CODE_FIELD, 0)
+    require_session_open(probe)
 
 
 @check("4", "read-fields", "reserved flags, frame and byte of a READ are refused", feature("READ"))
 def read_fields(probe: Probe) -> None:
     for flags in (2, 4, 8, 2 | BACK):
-        probe.refuse(packets.read(0, 1, 9, flags), spec.CODE_FIELD, 0)
+        probe.require_refused(packets.read(0, 1, 9, flags), spec.CODE_FIELD, 0)
     framed = bytearray(packets.read(0, 1, 9))
     framed[2] = 1
-    probe.refuse(bytes(framed), spec.CODE_FIELD, 2)
-    probe.refuse(packets.read(0, 1, 9, reserved=1), spec.CODE_FIELD, 3)
-    demand_still_open(probe)
+    probe.require_refused(bytes(framed), spec.CODE_FIELD, 2)
+    probe.require_refused(packets.read(0, 1, 9, reserved=1), spec.CODE_FIELD, 3)
+    require_session_open(probe)

@@ -5,25 +5,24 @@ from __future__ import annotations
 import itertools
 
 from voxdisplay.conformance import ops
-from voxdisplay.conformance.announced import Said
-from voxdisplay.conformance.catalogue import check, feature, seen, voxels
-from voxdisplay.conformance.checks.drawing import long_axis
+from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
+from voxdisplay.conformance.catalogue import check, feature, min_voxels, readable_display
+from voxdisplay.conformance.checks.drawing import axis_of_two
 from voxdisplay.conformance.probe import Probe
-from voxdisplay.conformance.reference_decoder import Place
 from voxdisplay.wire import spec
 
 _SIDE = 12  # of the part of the grid in which boxes are drawn
 
 
-def two_axes(said: Said) -> str:
+def axes_of_three_and_two(device: AnnouncedDevice) -> str:
     """Need an axis of three voxels, and another one of two."""
-    a, b, _ = sorted(said.grid, reverse=True)
+    a, b, _ = sorted(device.grid, reverse=True)
     return "" if a > 2 and b > 1 else "no axis of three voxels beside one of two"
 
 
-def corners(said: Said) -> list[Place]:
+def corners(device: AnnouncedDevice) -> list[Voxel]:
     """Give the corners of the grid."""
-    xs, ys, zs = (sorted({0, side - 1}) for side in said.grid)
+    xs, ys, zs = (sorted({0, side - 1}) for side in device.grid)
     return [(x, y, z) for z in zs for y in ys for x in xs]
 
 
@@ -32,16 +31,16 @@ def corners(said: Said) -> list[Place]:
     "lines",
     "LINE draws the straight line, both ends included",
     feature("LINE"),
-    seen,
-    long_axis,
+    readable_display,
+    axis_of_two,
 )
 def lines(probe: Probe) -> None:
-    said, rng = probe.said, probe.rng
-    for begin in corners(said):
-        probe.show(ops.line(said, begin, ops.some_place(said, rng)))
+    device, rng = probe.device, probe.rng
+    for begin in corners(device):
+        probe.show(ops.line(device, begin, ops.random_voxel(device, rng)))
     for _ in range(6):
-        probe.show(ops.line(said, ops.some_place(said, rng), ops.some_place(said, rng)))
-    probe.show(ops.line(said, (0, 0, 0), corners(said)[-1]))
+        probe.show(ops.line(device, ops.random_voxel(device, rng), ops.random_voxel(device, rng)))
+    probe.show(ops.line(device, (0, 0, 0), corners(device)[-1]))
 
 
 @check(
@@ -49,15 +48,15 @@ def lines(probe: Probe) -> None:
     "line-ties",
     "LINE rounds up from the middle, in both directions",
     feature("LINE"),
-    seen,
-    two_axes,
+    readable_display,
+    axes_of_three_and_two,
 )
 def line_ties(probe: Probe) -> None:
-    said = probe.said
+    device = probe.device
     for main, other in itertools.permutations(range(3), 2):
-        if said.grid[main] < 3 or said.grid[other] < 2:
+        if device.grid[main] < 3 or device.grid[other] < 2:
             continue
-        length = 4 if said.grid[main] > 4 and said.grid[other] > 2 else 2
+        length = 4 if device.grid[main] > 4 and device.grid[other] > 2 else 2
         ends = []
         for way in (0, 1):
             place = [0, 0, 0]
@@ -68,27 +67,33 @@ def line_ties(probe: Probe) -> None:
         for end in mirrored:
             end[other] = length // 2 - end[other]
         for a, b in (ends, [(e[0], e[1], e[2]) for e in mirrored]):
-            probe.show(ops.line(said, a, b))
-            probe.show(ops.line(said, b, a))
-
-
-@check("7.3", "line-of-one", "a LINE to its own place is one voxel", feature("LINE"), seen)
-def line_of_one(probe: Probe) -> None:
-    place = ops.some_place(probe.said, probe.rng)
-    probe.show(ops.line(probe.said, place, place))
+            probe.show(ops.line(device, a, b))
+            probe.show(ops.line(device, b, a))
 
 
 @check(
-    "7.3", "shape-cursor", "after LINE and BOX the cursor is at the voxel named", seen, long_axis
+    "7.3", "line-of-one", "a LINE to its own place is one voxel", feature("LINE"), readable_display
+)
+def line_of_one(probe: Probe) -> None:
+    place = ops.random_voxel(probe.device, probe.rng)
+    probe.show(ops.line(probe.device, place, place))
+
+
+@check(
+    "7.3",
+    "shape-cursor",
+    "after LINE and BOX the cursor is at the voxel named",
+    readable_display,
+    axis_of_two,
 )
 def shape_cursor(probe: Probe) -> None:
-    said = probe.said
-    end = tuple(min(side - 1, 4) for side in said.grid)
-    erase = ops.pen(said, 0) + ops.run()
+    device = probe.device
+    end = tuple(min(side - 1, 4) for side in device.grid)
+    erase = ops.pen(device, 0) + ops.run()
     for name, make in (("LINE", ops.line), ("BOX", ops.box)):
-        if said.has(name):
-            probe.show(make(said, (0, 0, 0), (end[0], end[1], end[2])) + erase)
-            probe.show(make(said, (end[0], end[1], end[2]), (0, 0, 0)) + erase)
+        if device.has(name):
+            probe.show(make(device, (0, 0, 0), (end[0], end[1], end[2])) + erase)
+            probe.show(make(device, (end[0], end[1], end[2]), (0, 0, 0)) + erase)
 
 
 @check(
@@ -96,26 +101,28 @@ def shape_cursor(probe: Probe) -> None:
     "boxes",
     "BOX has all voxels between two corners, whichever is larger",
     feature("BOX"),
-    seen,
+    readable_display,
 )
 def boxes(probe: Probe) -> None:
-    said, rng = probe.said, probe.rng
-    base = ops.some_place(said, rng)
+    device, rng = probe.device, probe.rng
+    base = ops.random_voxel(device, rng)
     for _ in range(10):
-        probe.show(ops.box(said, base, ops.near(said, rng, base, _SIDE)))
-    place = ops.some_place(said, rng)
-    probe.show(ops.box(said, place, place))
-    low = tuple(max(side - _SIDE, 0) for side in said.grid)
-    probe.show(ops.box(said, corners(said)[-1], (low[0], low[1], low[2])))
+        probe.show(ops.box(device, base, ops.random_voxel_near(device, rng, base, _SIDE)))
+    place = ops.random_voxel(device, rng)
+    probe.show(ops.box(device, place, place))
+    low = tuple(max(side - _SIDE, 0) for side in device.grid)
+    probe.show(ops.box(device, corners(device)[-1], (low[0], low[1], low[2])))
 
 
-@check("7.3", "dots", "DOTS draws the 1 to 256 voxels that it names", feature("DOTS"), seen)
+@check(
+    "7.3", "dots", "DOTS draws the 1 to 256 voxels that it names", feature("DOTS"), readable_display
+)
 def dots(probe: Probe) -> None:
-    said, rng = probe.said, probe.rng
-    room = (said.max_payload - 2) // (3 * said.coordinate_bytes)
+    device, rng = probe.device, probe.rng
+    room = (device.max_payload - 2) // (3 * device.coordinate_bytes)
     for n in sorted({1, 2, 255, 256, min(room, spec.LIMIT_MAX_DOTS)}):
         if n <= min(room, spec.LIMIT_MAX_DOTS):
-            probe.show(ops.dots(said, [ops.some_place(said, rng) for _ in range(n)]))
+            probe.show(ops.dots(device, [ops.random_voxel(device, rng) for _ in range(n)]))
 
 
 @check(
@@ -123,11 +130,11 @@ def dots(probe: Probe) -> None:
     "dots-cursor",
     "after DOTS the cursor is at its last voxel",
     feature("DOTS"),
-    seen,
-    voxels(2),
+    readable_display,
+    min_voxels(2),
 )
 def dots_cursor(probe: Probe) -> None:
-    said = probe.said
-    places = [said.place(0), said.place(said.voxels - 1), said.place(1)]
-    probe.show(ops.dots(said, places) + ops.pen(said, 0) + ops.run())
-    probe.show(ops.skip(said.voxels) + ops.dots(said, places))
+    device = probe.device
+    places = [device.voxel_at(0), device.voxel_at(device.voxel_count - 1), device.voxel_at(1)]
+    probe.show(ops.dots(device, places) + ops.pen(device, 0) + ops.run())
+    probe.show(ops.skip(device.voxel_count) + ops.dots(device, places))

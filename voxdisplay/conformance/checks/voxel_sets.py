@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from voxdisplay.conformance import ops
-from voxdisplay.conformance.catalogue import check, feature, seen, voxels
+from voxdisplay.conformance.catalogue import check, feature, min_voxels, readable_display
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
@@ -11,13 +11,19 @@ from voxdisplay.wire import spec
 def _payload(probe: Probe, level: int, density: float) -> bytes:
     """Give a brick that fits a packet."""
     while True:
-        op = ops.some_brick(probe.said, probe.rng, level, density)
-        if len(op) <= probe.said.max_payload:
+        op = ops.random_brick(probe.device, probe.rng, level, density)
+        if len(op) <= probe.device.max_payload:
             return op
         density /= 2
 
 
-@check("7.4", "levels", "OCT draws a brick of each level, from its masks", feature("OCT"), seen)
+@check(
+    "7.4",
+    "levels",
+    "OCT draws a brick of each level, from its masks",
+    feature("OCT"),
+    readable_display,
+)
 def levels(probe: Probe) -> None:
     for level in range(spec.LIMIT_MAX_LEVEL + 1):
         for density in (0.05, 0.5):
@@ -25,49 +31,68 @@ def levels(probe: Probe) -> None:
 
 
 @check(
-    "7.4", "children", "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)", feature("OCT"), seen
+    "7.4",
+    "children",
+    "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)",
+    feature("OCT"),
+    readable_display,
 )
 def children(probe: Probe) -> None:
     for level in (1, 2, 3, 4):
         side = 1 << level - 1
         for bit in range(8):
             child = (side * (bit & 1), side * (bit >> 1 & 1), side * (bit >> 2))
-            if all(at < n for at, n in zip(child, probe.said.grid, strict=True)):
-                probe.show(ops.brick(probe.said, level, (0, 0, 0), [child]))
+            if all(at < n for at, n in zip(child, probe.device.grid, strict=True)):
+                probe.show(ops.brick(probe.device, level, (0, 0, 0), [child]))
 
 
 @check(
-    "7.4", "full-nodes", "a mask 00 is a node of which all voxels are written", feature("OCT"), seen
+    "7.4",
+    "full-nodes",
+    "a mask 00 is a node of which all voxels are written",
+    feature("OCT"),
+    readable_display,
 )
 def full_nodes(probe: Probe) -> None:
-    said = probe.said
+    device = probe.device
     for level in range(1, spec.LIMIT_MAX_LEVEL + 1):
-        if 1 << level <= min(said.grid):
-            probe.show(bytes((spec.OP_OCT | level,)) + ops.xyz(said, (0, 0, 0)) + b"\0")
+        if 1 << level <= min(device.grid):
+            probe.show(bytes((spec.OP_OCT | level,)) + ops.xyz(device, (0, 0, 0)) + b"\0")
         probe.show(_payload(probe, level, 1.0))
 
 
 @check(
-    "7.4", "brick-cursor", "OCT leaves cursor and pen as they are", feature("OCT"), seen, voxels(2)
+    "7.4",
+    "brick-cursor",
+    "OCT leaves cursor and pen as they are",
+    feature("OCT"),
+    readable_display,
+    min_voxels(2),
 )
 def brick_cursor(probe: Probe) -> None:
-    said = probe.said
-    brick = ops.brick(said, 0, (0, 0, 0), [])
-    probe.show(ops.skip(said.voxels - 1) + ops.pen(said, 1) + brick + ops.run())
-    probe.show(ops.skip(said.voxels) + brick)
+    device = probe.device
+    brick = ops.brick(device, 0, (0, 0, 0), [])
+    probe.show(ops.skip(device.voxel_count - 1) + ops.pen(device, 1) + brick + ops.run())
+    probe.show(ops.skip(device.voxel_count) + brick)
 
 
-@check("7.5", "differences", "DIFF adds -8 to 7 to the pen, modulo 256", feature("DIFF"), seen)
+@check(
+    "7.5",
+    "differences",
+    "DIFF adds -8 to 7 to the pen, modulo 256",
+    feature("DIFF"),
+    readable_display,
+)
 def differences(probe: Probe) -> None:
-    said, rng = probe.said, probe.rng
-    most = min(said.voxels, 200, 2 * (said.max_payload - 8))
+    device, rng = probe.device, probe.rng
+    most = min(device.voxel_count, 200, 2 * (device.max_payload - 8))
     for n in sorted({1, 2, 3, 31, 32, 33, most - 1, most}):
         if 0 < n <= most:
             values = [rng.randint(-8, 7) for _ in range(n)]
-            probe.show(ops.pen(said, rng.randrange(256)) + ops.differences(values))
+            probe.show(ops.pen(device, rng.randrange(256)) + ops.differences(values))
     up = min(most, 40)
-    probe.show(ops.pen(said, 250) + ops.differences([7] * up))
-    probe.show(ops.pen(said, 5) + ops.differences([-8] * up))
+    probe.show(ops.pen(device, 250) + ops.differences([7] * up))
+    probe.show(ops.pen(device, 5) + ops.differences([-8] * up))
 
 
 @check(
@@ -75,13 +100,13 @@ def differences(probe: Probe) -> None:
     "difference-pen",
     "after DIFF the pen is the last pixel",
     feature("DIFF"),
-    seen,
-    voxels(4),
+    readable_display,
+    min_voxels(4),
 )
 def difference_pen(probe: Probe) -> None:
-    said = probe.said
-    probe.show(ops.pen(said, 9) + ops.differences([3, -1]) + ops.run(2))
-    probe.show(ops.literal(said, [20]) + ops.differences([1, 2, 3]))
+    device = probe.device
+    probe.show(ops.pen(device, 9) + ops.differences([3, -1]) + ops.run(2))
+    probe.show(ops.literal(device, [20]) + ops.differences([1, 2, 3]))
 
 
 @check(
@@ -98,7 +123,7 @@ def colors(probe: Probe) -> None:
         (255, 1),
         (7, 3),
         (250, 6),
-        (0, min(256, probe.said.max_payload // 3 - 1)),
+        (0, min(256, probe.device.max_payload // 3 - 1)),
     ):
         values = [(rng.randrange(256), rng.randrange(256), rng.randrange(256)) for _ in range(n)]
         probe.show(ops.colors(first, values) + ops.run(), exactly=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from voxdisplay.conformance import ops
-from voxdisplay.conformance.catalogue import check, seen, voxels
-from voxdisplay.conformance.checks.frames import lit
+from voxdisplay.conformance.catalogue import check, min_voxels, readable_display
+from voxdisplay.conformance.checks.frames import lit_page
 from voxdisplay.conformance.packets import CLEAR, COMMIT, data
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.reference_page import Page
@@ -17,63 +17,77 @@ from voxdisplay.wire import spec
 def window_edges(probe: Probe) -> None:
     for base in (0, 3):
         for ahead in (31, 32, 33, 128, 223, 224, 255):
-            probe.open()
+            probe.open_session()
             for _ in range(base):
                 probe.draw(b"")
             packet = data(base + ahead, 0)
             if 32 <= ahead < 224:
-                probe.refuse(packet, spec.CODE_SEQUENCE, 1)
+                probe.require_refused(packet, spec.CODE_SEQUENCE, 1)
             else:
                 bits = 1 << 30 if ahead == 31 else 0
                 last = (base + ahead) % 256
-                probe.demand_ack(probe.ask(packet), next=base, received=bits, last=last)
+                probe.require_ack(probe.request(packet), next=base, received=bits, last=last)
 
 
 @check("9.1", "duplicate-answered", "a duplicate is answered with ACK, and changes nothing")
 def duplicate_answered(probe: Probe) -> None:
     for seq in (0, 3):
-        probe.ask(data(seq, 0))
+        probe.request(data(seq, 0))
     for seq in (0, 3, 0):
-        probe.demand_ack(probe.ask(data(seq, 0)), next=1, received=2, last=seq)
+        probe.require_ack(probe.request(data(seq, 0)), next=1, received=2, last=seq)
 
 
 @check(
-    "9.1", "duplicate-unseen", "neither frame nor ops of a duplicate are looked at", seen, voxels(3)
+    "9.1",
+    "duplicate-unseen",
+    "neither frame nor ops of a duplicate are looked at",
+    readable_display,
+    min_voxels(3),
 )
 def duplicate_unseen(probe: Probe) -> None:
-    probe.say(data(0, 0, ops.dot(probe.said, 0)), data(2, 0))
+    probe.send_and_poll(data(0, 0, ops.single_voxel(probe.device, 0)), data(2, 0))
     for packet in (
-        data(0, 0, ops.dot(probe.said, 1)),
-        data(2, 0, ops.dot(probe.said, 2)),
+        data(0, 0, ops.single_voxel(probe.device, 1)),
+        data(2, 0, ops.single_voxel(probe.device, 2)),
         data(0, 9, b"\x1f"),
         data(2, 1, b"\x1f", 0),
         data(0, 0, b"", CLEAR | COMMIT),
     ):
-        probe.demand_ack(probe.ask(packet), next=1, received=1)
-    come = probe.say(data(1, 0), data(3, 0, b"", CLEAR | COMMIT))
-    probe.look(probe.await_shown(0, [*come, probe.state]), lit(probe, 0))
-    probe.demand_ack(probe.ask(data(3, 0, b"\x1f", CLEAR | COMMIT)), next=4, shown=1)
+        probe.require_ack(probe.request(packet), next=1, received=1)
+    come = probe.send_and_poll(data(1, 0), data(3, 0, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, 0))
+    probe.require_ack(probe.request(data(3, 0, b"\x1f", CLEAR | COMMIT)), next=4, shown=1)
 
 
 @check(
-    "9.1", "applied-once", "each packet is applied once, however often it comes", seen, voxels(2)
+    "9.1",
+    "applied-once",
+    "each packet is applied once, however often it comes",
+    readable_display,
+    min_voxels(2),
 )
 def applied_once(probe: Probe) -> None:
-    probe.say(data(0, 0, ops.run(2)), data(1, 0, ops.pen(probe.said, 0) + ops.run()))
-    probe.say(data(0, 0, ops.run(2)))
-    come = probe.say(data(2, 0, b"", CLEAR | COMMIT))
-    probe.look(probe.await_shown(0, [*come, probe.state]), lit(probe, 1))
+    probe.send_and_poll(data(0, 0, ops.run(2)), data(1, 0, ops.pen(probe.device, 0) + ops.run()))
+    probe.send_and_poll(data(0, 0, ops.run(2)))
+    come = probe.send_and_poll(data(2, 0, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, 1))
 
 
-@check("9.1", "out-of-order", "packets of a frame may arrive in any order", seen, voxels(9))
+@check(
+    "9.1",
+    "out-of-order",
+    "packets of a frame may arrive in any order",
+    readable_display,
+    min_voxels(9),
+)
 def out_of_order(probe: Probe) -> None:
     order = list(range(9))
     probe.rng.shuffle(order)
     come = []
     for seq in order:
         flags = CLEAR | (COMMIT if seq == 8 else 0)
-        come = probe.say(data(seq, 0, ops.dot(probe.said, seq), flags))
-    probe.look(probe.await_shown(0, [*come, probe.state]), lit(probe, *range(9)))
+        come = probe.send_and_poll(data(seq, 0, ops.single_voxel(probe.device, seq), flags))
+    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, *range(9)))
 
 
 @check("9.1", "around-256", "numbers go round: the window lies across 255 and 0")
@@ -82,24 +96,29 @@ def around_256(probe: Probe) -> None:
         probe.draw(b"")
     for seq in (253, 2, 25, 255, 0, 26):
         if (seq - 250) % 256 < spec.LIMIT_WINDOW:
-            probe.demand_ack(probe.ask(data(seq, 0)), next=250, last=seq)
+            probe.require_ack(probe.request(data(seq, 0)), next=250, last=seq)
     bits = sum(1 << (seq - 251) % 256 for seq in (253, 2, 25, 255, 0))
-    probe.sync()
-    probe.demand_ack(probe.state, next=250, received=bits)
-    probe.demand_ack(probe.ask(data(249, 0)), "a number below `next` is a duplicate", next=250)
-    probe.demand_ack(probe.ask(data(218, 0)), "a number below `next` is a duplicate", next=250)
+    probe.poll_status()
+    probe.require_ack(probe.state, next=250, received=bits)
+    probe.require_ack(probe.request(data(249, 0)), "a number below `next` is a duplicate", next=250)
+    probe.require_ack(probe.request(data(218, 0)), "a number below `next` is a duplicate", next=250)
     for seq in (250, 251, 252, 254, 1):
-        probe.ask(data(seq, 0))
-    probe.sync()
-    probe.demand_ack(probe.state, next=3, received=1 << 21)
-    probe.refuse(data(35, 0), spec.CODE_SEQUENCE, 1)
+        probe.request(data(seq, 0))
+    probe.poll_status()
+    probe.require_ack(probe.state, next=3, received=1 << 21)
+    probe.require_refused(data(35, 0), spec.CODE_SEQUENCE, 1)
 
 
-@check("9.1", "nothing-of-the-refused", "a refused packet draws nothing that is ever shown", seen)
+@check(
+    "9.1",
+    "nothing-of-the-refused",
+    "a refused packet draws nothing that is ever shown",
+    readable_display,
+)
 def nothing_of_the_refused(probe: Probe) -> None:
     probe.show(b"")
-    probe.say(data(1, 1, ops.run() + b"\x1f"))
-    probe.open()
-    probe.sync()
-    probe.look(probe.state, Page())
+    probe.send_and_poll(data(1, 1, ops.run() + b"\x1f"))
+    probe.open_session()
+    probe.poll_status()
+    probe.require_displayed(probe.state, Page())
     probe.show(b"", clear=False)

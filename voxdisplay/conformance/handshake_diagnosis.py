@@ -16,7 +16,7 @@ from voxdisplay.conformance.catalogue import Check
 if TYPE_CHECKING:
     from voxdisplay.conformance.probe import Probe
 
-_EACH_S = 0.3
+_VARIANT_TIMEOUT_S = 0.3
 _MASK = 0xFFFFFFFF
 
 
@@ -30,7 +30,7 @@ def _crc32(data: bytes, poly: int, *, init: int = _MASK, last: int = _MASK) -> i
     return crc ^ last
 
 
-def _plain_crc32(data: bytes) -> int:
+def _unreflected_crc32(data: bytes) -> int:
     """Compute a CRC-32 that is not reflected."""
     crc = _MASK
     for byte in data:
@@ -46,34 +46,34 @@ _CHECK_VALUES: dict[str, Callable[[bytes], bytes]] = {
     "XOROUT is left out": lambda data: (zlib.crc32(data) ^ _MASK).to_bytes(4, "little"),
     "INIT is 0": lambda data: _crc32(data, _ETHERNET, init=0).to_bytes(4, "little"),
     "it is CRC-32C": lambda data: _crc32(data, _CASTAGNOLI).to_bytes(4, "little"),
-    "it is not reflected": lambda data: _plain_crc32(data).to_bytes(4, "little"),
+    "it is not reflected": lambda data: _unreflected_crc32(data).to_bytes(4, "little"),
     "it is left out": lambda data: b"",  # noqa: ARG005
 }
 
 
-def why_silent(probe: Probe) -> str:
+def diagnose_silence(probe: Probe) -> str:
     """Try what a device could take for a HELLO; say what it took, or what to look at."""
     hello = packets.hello(probe.session)
     for why, check_value in _CHECK_VALUES.items():
-        if _stirs(probe, packets.stuff(hello + check_value(hello)) + b"\0"):
+        if _gets_response(probe, packets.cobs_encode(hello + check_value(hello)) + b"\0"):
             return f"the device answers a HELLO whose check value is wrong: {why}"
-    if _stirs(probe, packets.wire(hello)[:-1]):
+    if _gets_response(probe, packets.encode(hello)[:-1]):
         return "the device answers before the 00 that ends a packet"
-    if _stirs(probe, hello + zlib.crc32(hello).to_bytes(4, "little")):
+    if _gets_response(probe, hello + zlib.crc32(hello).to_bytes(4, "little")):
         return "the device answers a HELLO that is not encoded by COBS"
-    if probe.hearing.heard:
-        return f"{probe.hearing.heard} bytes came, and no packet: is that its baud rate?"
+    if probe.reader.byte_count:
+        return f"{probe.reader.byte_count} bytes came, and no packet: is that its baud rate?"
     return "not a byte came: is it the right port and baud rate, and is the device on?"
 
 
-def _stirs(probe: Probe, stream: bytes) -> bool:
+def _gets_response(probe: Probe, stream: bytes) -> bool:
     """Send something; tell whether anything comes that could be a packet."""
-    before = probe.hearing.segments
-    probe.raw(b"\0" + stream, "a HELLO that is not as it must be")
-    until_s = probe.clock() + _EACH_S
-    while probe.clock() < until_s and probe.hearing.segments == before:
-        probe.hear(until_s)
-    return probe.hearing.segments > before
+    before = probe.reader.segment_count
+    probe.send_raw(b"\0" + stream, "a HELLO that is not as it must be")
+    until_s = probe.clock() + _VARIANT_TIMEOUT_S
+    while probe.clock() < until_s and probe.reader.segment_count == before:
+        probe.receive(until_s)
+    return probe.reader.segment_count > before
 
 
 def _never(probe: Probe) -> None:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from voxdisplay.conformance import packets
 from voxdisplay.wire import spec
 
+Voxel = tuple[int, int, int]  # x, y, z
+
 FEATURES = {
     name.removeprefix("FEATURE_"): bit
     for name, bit in vars(spec).items()
@@ -23,7 +25,7 @@ FORMATS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class AnnouncedDevice:
     """A device's announcement; the names are those of INFO."""
 
     format: int
@@ -41,7 +43,7 @@ class Said:
     serial: str = ""
 
     @classmethod
-    def of(cls, info: packets.Answer) -> Said:
+    def from_info(cls, info: packets.Response) -> AnnouncedDevice:
         """Take it from an INFO."""
         texts, at = [], 0
         for _ in range(3):
@@ -62,7 +64,7 @@ class Said:
         return self.nx, self.ny, self.nz
 
     @property
-    def voxels(self) -> int:
+    def voxel_count(self) -> int:
         """V of section 2."""
         return self.nx * self.ny * self.nz
 
@@ -72,7 +74,7 @@ class Said:
         return spec.PIXEL_BYTES[self.format]
 
     @property
-    def full(self) -> int:
+    def full_pixel(self) -> int:
         """The value of the full pixel."""
         return 1 if self.format == spec.FORMAT_MONO1 else (1 << 8 * self.pixel_bytes) - 1
 
@@ -87,12 +89,12 @@ class Said:
         return 1000 / self.refresh if self.refresh else 0.0
 
     @property
-    def longest_wire(self) -> int:
+    def longest_packet_bytes(self) -> int:
         """Bytes that the longest packet may have on the wire."""
-        return packets.wire_size(self.max_payload)
+        return packets.max_encoded_bytes(self.max_payload)
 
     @property
-    def is_seen(self) -> bool:
+    def is_readable(self) -> bool:
         """Whether it can be found out at all what is on display."""
         return self.has("READ") or self.has("DIGEST")
 
@@ -100,7 +102,7 @@ class Said:
         """Give the place of a voxel in scan order."""
         return x + self.nx * (y + self.ny * z)
 
-    def place(self, index: int) -> tuple[int, int, int]:
+    def voxel_at(self, index: int) -> tuple[int, int, int]:
         """Give the coordinates of an index."""
         return index % self.nx, index // self.nx % self.ny, index // self.nx // self.ny
 
