@@ -26,8 +26,8 @@ import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.tap import Tap
-from voxdisplay.view.live.message import Moment, encode
-from voxdisplay.view.live.page import page
+from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.page import page_html
 from voxdisplay.view.live.server import open_server
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
@@ -69,20 +69,20 @@ class Film:
 
     def __init__(self, frames: list[vd.Frame]) -> None:
         self._moments = [
-            Moment(f.array(), f.grid, f.format, n, "bench", f.digest())
+            Snapshot(f.array(), f.grid, f.format, n, "bench", f.digest())
             for n, f in enumerate(frames)
         ]
         self._turns = itertools.count()
 
-    def next(self) -> tuple[Hashable, Moment]:
+    def next(self) -> tuple[Hashable, Snapshot]:
         """See `Source`."""
         turn = next(self._turns)
         return turn, self._moments[turn % len(self._moments)]
 
-    def forget(self) -> None:
+    def resend(self) -> None:
         """See `Source`."""
 
-    def check(self) -> None:
+    def check_alive(self) -> None:
         """See `Source`."""
 
     def close(self) -> None:
@@ -221,11 +221,12 @@ def _decode(device: Device, payloads: list[bytes]) -> tuple[float, float]:
 
 def bench_live(repeats: int, *, quick: bool) -> None:
     """Print all of it."""
-    moment = Film([ripple(0, 50_000)]).next()[1]
-    encode(moment)
+    snapshot = Film([ripple(0, 50_000)]).next()[1]
+    encode(snapshot)
     began_s = time.perf_counter()
-    size = len(encode(moment))
+    size = len(encode(snapshot))
     took_ms = (time.perf_counter() - began_s) * 1000
-    print(f"page: {len(page().encode())} bytes; 50k voxels: {size} bytes, made in {took_ms:.1f} ms")
+    page_bytes = len(page_html().encode())
+    print(f"page: {page_bytes} bytes; 50k voxels: {size} bytes, made in {took_ms:.1f} ms")
     bench_tap(repeats)
     bench_browser(1 if quick else repeats, quick=quick)

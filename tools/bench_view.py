@@ -19,8 +19,8 @@ import voxdisplay as vd
 from voxdisplay.view.animation import Turntable, save_gif
 from voxdisplay.view.half_blocks import half_blocks
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.picture import Look, picture, picture_of
-from voxdisplay.view.stage import stage
+from voxdisplay.view.picture import RenderOptions, render_page, render_voxels
+from voxdisplay.view.stage import draw_stage
 
 SEED = 22
 RGB = vd.PixelFormat.RGB888
@@ -76,12 +76,12 @@ def bench_view(repeats: int, *, quick: bool = False) -> None:
     for name, make in [*SCENES.items()][: 1 if quick else None]:
         page, grid = make()
         lit = lit_voxels(page, grid, RGB)
-        drawn = picture(page, grid, RGB)
+        drawn = render_page(page, grid, RGB)
         cells = [
             timed(lambda: lit_voxels(page, grid, RGB), repeats),  # noqa: B023 - called at once
-            *timed_twice(lambda: picture_of(lit, grid, Look()), repeats),  # noqa: B023
-            timed(lambda: picture_of(lit, grid, Look(glow=False)), repeats),  # noqa: B023
-            timed(lambda: picture_of(lit, grid, Look(size=(400, 300))), repeats),  # noqa: B023
+            *timed_twice(lambda: render_voxels(lit, grid, RenderOptions()), repeats),  # noqa: B023
+            timed(lambda: render_voxels(lit, grid, RenderOptions(glow=False)), repeats),  # noqa: B023
+            timed(lambda: render_voxels(lit, grid, RenderOptions(size=(400, 300))), repeats),  # noqa: B023
             timed(lambda: half_blocks(lit, grid, 80, 23), repeats),  # noqa: B023
             timed(lambda: saved_png(drawn), repeats),  # noqa: B023
         ]
@@ -96,8 +96,8 @@ def bench_films(repeats: int) -> None:
     grid = vd.Grid(128, 128, 128)
 
     def new_stage() -> object:
-        stage.cache_clear()
-        return stage(grid, Look().camera, Look().size, labels=True)
+        draw_stage.cache_clear()
+        return draw_stage(grid, RenderOptions().camera, RenderOptions().size, labels=True)
 
     print(f"the stage of a new angle: {1000 * timed(new_stage, repeats):.1f} ms")
     with tempfile.TemporaryDirectory() as folder:
@@ -105,7 +105,7 @@ def bench_films(repeats: int) -> None:
         for name in ("paper curve, 128^3", "50 000 voxels, 128^3"):
             page, grid = SCENES[name]()
             lit = lit_voxels(page, grid, RGB)
-            film = Turntable(lit, grid, Look(), FILM)
+            film = Turntable(lit, grid, RenderOptions(), FILM)
             wall_s, cpu_s = timed_twice(lambda: save_gif(path, film, 20), min(repeats, 3))  # noqa: B023
             print(
                 f"GIF of {FILM}, 800x600, {name}: {wall_s:.2f} s, {cpu_s:.2f} s of CPU, "

@@ -218,11 +218,11 @@ class Frame:
     def _repr_png_(self) -> bytes | None:
         """Give notebooks a picture, if Pillow is installed."""
         try:
-            from voxdisplay.view.picture import picture  # noqa: PLC0415 - an extra
+            from voxdisplay.view.picture import render_page  # noqa: PLC0415 - an extra
         except MissingExtra:
             return None
         file = io.BytesIO()
-        picture(self.array(), self.grid, self.format).save(file, format="PNG")
+        render_page(self.array(), self.grid, self.format).save(file, format="PNG")
         return file.getvalue()
 
     def rgb(self) -> NDArray[np.uint8]:

@@ -13,7 +13,7 @@ import voxdisplay as vd
 from voxdisplay.cli.main import cli, main
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.picture import Look, picture
+from voxdisplay.view.picture import RenderOptions, render_page
 
 TREFOIL = "examples/trefoil.json"
 # A folder that is there, and in which nobody makes files, not even root.
@@ -36,8 +36,10 @@ def test_a_scene_as_a_picture(run, tmp_path):
     frame = vd.Frame((128, 128, 128))
     for item in scene.items:
         frame.draw(item.curve, item.color)
-    look = Look(size=(320, 200), camera=Camera(np.radians(-90), np.radians(10)).zoomed(1.3))
-    meant = picture(frame.array(), frame.grid, frame.format, look)
+    look = RenderOptions(
+        size=(320, 200), camera=Camera(np.radians(-90), np.radians(10)).zoomed(1.3)
+    )
+    meant = render_page(frame.array(), frame.grid, frame.format, look)
     assert np.array_equal(pixels(path), np.asarray(meant))
 
 
@@ -114,7 +116,7 @@ def test_push_preview_is_of_the_device_s_own_page(run, emulator, tmp_path, forma
     drawn = vd.Frame(grid, format_, own_palette=True)
     for item in vd.load_scene("examples/house.json").fitted(grid)[0].items:
         drawn.draw(item.curve, item.color)
-    meant = picture(page, grid, PixelFormat(format_), palette=drawn.palette)
+    meant = render_page(page, grid, PixelFormat(format_), palette=drawn.palette)
     assert np.array_equal(pixels(path), np.asarray(meant))
 
 
@@ -125,7 +127,7 @@ def test_push_preview_is_not_of_what_the_host_believes(tmp_path, monkeypatch):
     path = tmp_path / "shown.png"
     arguments = ["push", TREFOIL, "--port", "sim:?size=3x5x7", "--preview", str(path)]
     assert CliRunner().invoke(cli, arguments).exit_code == 0
-    meant = picture(other, vd.Grid(3, 5, 7), PixelFormat.RGB888)
+    meant = render_page(other, vd.Grid(3, 5, 7), PixelFormat.RGB888)
     assert np.array_equal(pixels(path), np.asarray(meant))
 
 

@@ -44,7 +44,8 @@ def test_serial_ports_are_listed_by_name_with_what_is_known_of_them(known):
 
 def test_each_kind_of_port_has_a_finder(known, monkeypatch):
     known()
-    usb = SimpleNamespace(found=lambda: [FoundPort("usb:1209:0001:7", "display", 0x1209, 1, "7")])
+    display = FoundPort("usb:1209:0001:7", "display", 0x1209, 1, "7")
+    usb = SimpleNamespace(usb_ports=lambda: [display])
     monkeypatch.setitem(sys.modules, "voxdisplay.transport.usb", usb)
     assert [(port.port, port.kind) for port in all_ports()] == [
         ("sim:", "emulator"),

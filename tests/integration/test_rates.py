@@ -109,7 +109,7 @@ def test_a_rate_that_a_port_refuses_is_left_out(monkeypatch):
 
     class Picky:
         port = "picky"
-        is_rated = True
+        has_baud_rate = True
 
         def set_baud(self, rate):
             asked.append(rate)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from voxdisplay.view.save import Shot
+    from voxdisplay.view.save import ExportJob
 
 # The keys of voxdisplay.view.save.WRITERS, which is not imported for them.
 SUFFIXES = (".png", ".gif", ".mp4", ".html")
@@ -109,7 +109,7 @@ view_angle_option = click.option(
 
 
 def save_picture(
-    path: Path, shot: Shot, progress: Callable[[int, int], None] | None = None
+    path: Path, shot: ExportJob, progress: Callable[[int, int], None] | None = None
 ) -> None:
     """Write a picture; a file that cannot be written is a usage error that names it."""
     from voxdisplay.view.save import save  # noqa: PLC0415 - an extra
@@ -127,9 +127,9 @@ def save_page(
 
     The palette, which cannot be read back, is the frame's: the display's digest has proved both.
     """
-    from voxdisplay.view.save import Shot  # noqa: PLC0415
+    from voxdisplay.view.save import ExportJob  # noqa: PLC0415
 
     title = f"{info.name or 'voxdisplay'} {info.serial}".strip()
-    save_picture(path, Shot(page, info.grid, info.format, title=title, palette=palette))
+    save_picture(path, ExportJob(page, info.grid, info.format, title=title, palette=palette))
     lit = int(page.any(axis=-1).sum() if page.ndim == 4 else (page != 0).sum())
     note(f"{path}: {plural(lit, 'voxel')} read back from the display")

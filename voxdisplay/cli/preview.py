@@ -112,10 +112,10 @@ def preview(
 
     Needs the extra `view`: pip install 'voxdisplay[view]'.
     """
-    from voxdisplay.view.picture import Look  # noqa: PLC0415 - an extra
-    from voxdisplay.view.save import FILMS, Shot  # noqa: PLC0415
+    from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
+    from voxdisplay.view.save import FILM_SUFFIXES, ExportJob  # noqa: PLC0415
 
-    film = output.suffix.lower() in FILMS
+    film = output.suffix.lower() in FILM_SUFFIXES
     if film and size_px[0] * size_px[1] * seconds * fps > _MOST_PIXELS:
         raise click.BadParameter(
             f"{seconds * fps:.0f} pictures of {size_px[0]}x{size_px[1]} are too many: make them "
@@ -129,8 +129,8 @@ def preview(
         note(remark)
     frame = vd.Frame(grid, format_)
     draw(fitted, frame)
-    look = Look(size=size_px, glow=not plain, axes=not plain).seen_from(view_angle, zoom)
-    shot = Shot(frame.array(), grid, frame.format, look, _title(scene), seconds, fps)
+    look = RenderOptions(size=size_px, glow=not plain, axes=not plain).with_view(view_angle, zoom)
+    shot = ExportJob(frame.array(), grid, frame.format, look, _title(scene), seconds, fps)
     with progress_bar("drawing") as progress:
         save_picture(output, shot, progress)
     note(f"{output}: {plural(len(frame.lit()[0]), 'voxel')} on {grid} {format_}")

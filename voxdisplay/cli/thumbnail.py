@@ -46,7 +46,7 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
     if count > _MOST_DRAWN:
         return
     try:
-        from voxdisplay.view.half_blocks import full_color, half_blocks  # noqa: PLC0415 - an extra
+        from voxdisplay.view.half_blocks import half_blocks, has_true_color  # noqa: PLC0415 - an extra
         from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
     except vd.MissingExtra:
         return
@@ -61,7 +61,7 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
     columns, rows = min(_COLUMNS, room.columns - 1), min(_ROWS, room.lines - 5)
     if columns < 2 * rows or rows < 6:
         return
-    for line in half_blocks(lit, info.grid, columns, rows, full=full_color()):
+    for line in half_blocks(lit, info.grid, columns, rows, full=has_true_color()):
         click.echo(line, err=True, color=True)
     click.echo(what, err=True)
 

@@ -25,7 +25,7 @@ from voxdisplay.raster.pixel_format import Pixels
 
 if TYPE_CHECKING:
     from voxdisplay.view.live.sources import Source
-    from voxdisplay.view.terminal import View
+    from voxdisplay.view.terminal import TerminalView
 
 _DEFAULT_GRID = vd.Grid(128, 128, 128)
 
@@ -105,12 +105,12 @@ def view(
         with source as ready:
             _serve(ready, listen, open_browser=not no_open)
         return
-    from voxdisplay.view.terminal import show  # noqa: PLC0415 - an extra
+    from voxdisplay.view.terminal import run  # noqa: PLC0415 - an extra
 
     what = _of_scene(scene, display_size) if scene else _of_display(port, baud, timeout_s)
     with what as ready:
         try:
-            show(ready)
+            run(ready)
         except ValueError as error:
             raise click.UsageError(f"--terminal: {error}") from error
 
@@ -138,11 +138,11 @@ def _serve(source: Source, listen: tuple[str, int], *, open_browser: bool) -> No
 
 @contextlib.contextmanager
 def _still(scene: str, display_size: vd.Grid | None) -> Iterator[Source]:
-    from voxdisplay.view.live.message import Moment  # noqa: PLC0415 - an extra
-    from voxdisplay.view.live.sources import StillSource  # noqa: PLC0415
+    from voxdisplay.view.live.message import Snapshot  # noqa: PLC0415 - an extra
+    from voxdisplay.view.live.sources import StaticSource  # noqa: PLC0415
 
     frame, title = _frame(scene, display_size), Path(scene).name
-    yield StillSource(Moment(frame.array(), frame.grid, frame.format, 1, title, frame.digest()))
+    yield StaticSource(Snapshot(frame.array(), frame.grid, frame.format, 1, title, frame.digest()))
 
 
 @contextlib.contextmanager
@@ -201,24 +201,24 @@ def _frame(scene: str, display_size: vd.Grid | None) -> vd.Frame:
 
 
 @contextlib.contextmanager
-def _of_scene(scene: str, display_size: vd.Grid | None) -> Iterator[View]:
+def _of_scene(scene: str, display_size: vd.Grid | None) -> Iterator[TerminalView]:
     from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
-    from voxdisplay.view.terminal import View  # noqa: PLC0415
+    from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
     frame = _frame(scene, display_size)
     lit = lit_voxels(frame.array(), frame.grid, frame.format)
-    yield View(frame.grid, Path(scene).name, lambda: lit, changes=False)
+    yield TerminalView(frame.grid, Path(scene).name, lambda: lit, changes=False)
 
 
 @contextlib.contextmanager
-def _of_display(port: str | None, baud: Baud, timeout_s: float) -> Iterator[View]:
-    from voxdisplay.view.lit_voxels import Lit, lit_voxels  # noqa: PLC0415
-    from voxdisplay.view.terminal import View  # noqa: PLC0415
+def _of_display(port: str | None, baud: Baud, timeout_s: float) -> Iterator[TerminalView]:
+    from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels  # noqa: PLC0415
+    from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
     with open_display(port, baud, timeout_s) as display:
         info, watched = display.info, _Watched(display)
 
-        def read() -> Lit:
+        def read() -> LitVoxels:
             return lit_voxels(watched.read(), info.grid, info.format)
 
-        yield View(info.grid, display.port, read, changes=True)
+        yield TerminalView(info.grid, display.port, read, changes=True)

@@ -66,7 +66,7 @@ def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) 
     transport = open_transport(port, baud=DEFAULT_BAUD)
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415 - loads pyserial
 
-    if not isinstance(transport, SerialTransport) or not transport.is_rated:
+    if not isinstance(transport, SerialTransport) or not transport.has_baud_rate:
         note(f"{port} is no line that has a rate")
         return transport
     try:

@@ -40,28 +40,28 @@ class Capture:
         self._file = file
         self._clock = clock
         self._began_s = clock()
-        self._line({"voxdisplay_capture": VERSION, "port": self.port})
+        self._write_line({"voxdisplay_capture": VERSION, "port": self.port})
 
     def read(self, timeout_s: float) -> bytes:
         """See `Transport.read`."""
         data = self._inner.read(timeout_s)
         if data:
-            self._note("host", data)
+            self._record("host", data)
         return data
 
     def write(self, data: bytes, timeout_s: float) -> None:
         """See `Transport.write`."""
-        self._note("device", data)
+        self._record("device", data)
         self._inner.write(data, timeout_s)
 
     def close(self) -> None:
         """See `Transport.close`."""
         self._inner.close()
 
-    def _note(self, to: str, data: bytes) -> None:
+    def _record(self, to: str, data: bytes) -> None:
         seconds = round(self._clock() - self._began_s, 6)
-        self._line({"s": seconds, "to": to, "hex": data.hex()})
+        self._write_line({"s": seconds, "to": to, "hex": data.hex()})
 
-    def _line(self, entry: dict[str, object]) -> None:
+    def _write_line(self, entry: dict[str, object]) -> None:
         self._file.write(json.dumps(entry) + "\n")
         self._file.flush()

@@ -16,15 +16,15 @@ from voxdisplay.errors import OpenError
 from voxdisplay.transport.discovery import serial_ports
 
 _PROC = Path("/proc")
-_MOST_NAMED = 8
+_MAX_LISTED = 8
 
 
-def reason(error: BaseException) -> str:
+def message_of(error: BaseException) -> str:
     """Give what an error says, or at least its kind."""
     return str(error) or type(error).__name__
 
 
-def explain(port: str, error: BaseException) -> OpenError:
+def as_open_error(port: str, error: BaseException) -> OpenError:
     """Turn what was said when a serial port was opened into what a person can do.
 
     Parameters
@@ -36,28 +36,28 @@ def explain(port: str, error: BaseException) -> OpenError:
 
     """
     number = _errno(error)
-    path = _path(port)
+    path = _device_path(port)
     if number in {errno.EACCES, errno.EPERM}:
-        return _forbidden(port, path)
+        return _permission_error(port, path)
     if number in {errno.EBUSY, errno.EAGAIN} or "PermissionError" in str(error):
         # Windows says of a port that is open elsewhere that access is denied.
-        return busy(port, path)
+        return busy_error(port, path)
     if number == errno.ENOENT or "FileNotFoundError" in str(error):
-        return OpenError(f"{port} does not exist", port=port, hint=_what_there_is())
+        return OpenError(f"{port} does not exist", port=port, hint=_available_ports())
     if number in {errno.EIO, errno.ENXIO, errno.ENODEV}:
         return OpenError(
             f"{port} has no device behind it: {os.strerror(number)}",
             port=port,
-            hint=f"it was pulled out, or never there; {_what_there_is()}",
+            hint=f"it was pulled out, or never there; {_available_ports()}",
         )
     if number in {errno.ENOTTY, errno.EISDIR}:
-        return OpenError(f"{port} is no serial port", port=port, hint=_what_there_is())
+        return OpenError(f"{port} is no serial port", port=port, hint=_available_ports())
     if number in {errno.ELOOP, errno.ENOTDIR, errno.ENAMETOOLONG}:
         return OpenError(
-            f"{port} names nothing: {os.strerror(number)}", port=port, hint=_what_there_is()
+            f"{port} names nothing: {os.strerror(number)}", port=port, hint=_available_ports()
         )
     hint = "is the device, or the server for it, running there?" if "://" in port else None
-    return OpenError(f"{port} cannot be opened: {reason(error)}", port=port, hint=hint)
+    return OpenError(f"{port} cannot be opened: {message_of(error)}", port=port, hint=hint)
 
 
 def _errno(error: BaseException) -> int | None:
@@ -72,24 +72,24 @@ def _errno(error: BaseException) -> int | None:
     return None
 
 
-def _path(port: str) -> str:
+def _device_path(port: str) -> str:
     """Give the device behind a port's name: spy:///dev/ttyUSB0?file=x is one, too."""
     return port.partition("://")[2].partition("?")[0] if "://" in port else port
 
 
-def _what_there_is() -> str:
+def _available_ports() -> str:
     found = [found.port for found in serial_ports()]
-    more = f" and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
-    known = "there is " + ", ".join(found[:_MOST_NAMED]) if found else "no serial port was found"
+    more = f" and {len(found) - _MAX_LISTED} more" if len(found) > _MAX_LISTED else ""
+    known = "there is " + ", ".join(found[:_MAX_LISTED]) if found else "no serial port was found"
     return f"{known}{more}; sim: is the built-in emulator"
 
 
 # -- somebody else has it
 
 
-def busy(port: str, path: str) -> OpenError:
+def busy_error(port: str, path: str) -> OpenError:
     """Give the error for a port that somebody else has open, at a path of the system."""
-    names = [f"{_program(pid)} (process {pid})" for pid in _holders(path)]
+    names = [f"{_process_name(pid)} (process {pid})" for pid in _holding_processes(path)]
     if not names:
         return OpenError(
             f"{port} is busy",
@@ -103,18 +103,18 @@ def busy(port: str, path: str) -> OpenError:
     )
 
 
-def _holders(path: str) -> list[int]:
+def _holding_processes(path: str) -> list[int]:
     """Find the processes that have a device open; of these, those that have locked it, if any."""
     try:
         device = os.stat(path)  # noqa: PTH116 - a port's name need not be a path
     except OSError:
         return []
-    openers = sorted(set(_openers(device.st_rdev)))
-    locked = set(_lockers(device.st_ino))
+    openers = sorted(set(_processes_with_open(device.st_rdev)))
+    locked = set(_processes_with_lock(device.st_ino))
     return [pid for pid in openers if pid in locked] or openers
 
 
-def _openers(device: int) -> Iterator[int]:
+def _processes_with_open(device: int) -> Iterator[int]:
     for descriptor in _PROC.glob("[0-9]*/fd/*"):
         try:
             status = descriptor.stat()
@@ -124,7 +124,7 @@ def _openers(device: int) -> Iterator[int]:
             yield int(descriptor.parts[-3])
 
 
-def _lockers(inode: int) -> Iterator[int]:
+def _processes_with_lock(inode: int) -> Iterator[int]:
     """Read /proc/locks: `1: FLOCK  ADVISORY  WRITE 8280 00:1a:3 0 EOF`."""
     try:
         lines = (_PROC / "locks").read_text(encoding="ascii").splitlines()
@@ -136,7 +136,7 @@ def _lockers(inode: int) -> Iterator[int]:
                 yield int(pid)
 
 
-def _program(pid: int) -> str:
+def _process_name(pid: int) -> str:
     if pid == os.getpid():
         return "this program itself"
     try:
@@ -149,7 +149,7 @@ def _program(pid: int) -> str:
 # -- it is not for us
 
 
-def _forbidden(port: str, path: str) -> OpenError:
+def _permission_error(port: str, path: str) -> OpenError:
     try:
         status = os.stat(path)  # noqa: PTH116 - a port's name need not be a path
     except OSError:

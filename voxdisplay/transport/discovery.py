@@ -12,7 +12,7 @@ from typing import Final
 # only when ports are listed, and left out where what they need is not installed.
 _FINDERS: Final = (
     ("voxdisplay.transport.discovery", "serial_ports"),
-    ("voxdisplay.transport.usb", "found"),
+    ("voxdisplay.transport.usb", "usb_ports"),
 )
 
 
@@ -75,10 +75,10 @@ def serial_ports() -> list[FoundPort]:
 
 def all_ports() -> list[FoundPort]:
     """List everything that can be opened without further knowledge."""
-    return [FoundPort("sim:", "the built-in emulator"), *_found()]
+    return [FoundPort("sim:", "the built-in emulator"), *_discovered()]
 
 
-def _found() -> Iterator[FoundPort]:
+def _discovered() -> Iterator[FoundPort]:
     for module, name in _FINDERS:
         try:
             finder = getattr(import_module(module), name)

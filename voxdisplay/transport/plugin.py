@@ -13,10 +13,10 @@ def open_usb(port: str, opener: Callable[[str], Any]) -> Transport:
     """Open a display on a USB that an entry point of the group ``voxdisplay.usb`` knows."""
     from voxdisplay.transport.usb import UsbTransport  # noqa: PLC0415 - loads pyusb
 
-    return UsbTransport(port, backend=_opened(port, opener))
+    return UsbTransport(port, backend=_call_opener(port, opener))
 
 
-def _opened(port: str, opener: Callable[[str], Any]) -> Any:
+def _call_opener(port: str, opener: Callable[[str], Any]) -> Any:
     try:
         return opener(port)
     except ValueError as error:
@@ -30,7 +30,7 @@ class PluginTransport:
 
     def __init__(self, port: str, opener: Callable[[str], Any]) -> None:
         self.port = port
-        self._pipe = _opened(port, opener)
+        self._pipe = _call_opener(port, opener)
 
     @property
     def pipe(self) -> Any:

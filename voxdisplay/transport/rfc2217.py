@@ -18,13 +18,13 @@ from serial import rfc2217
 
 _READ_BYTES: Final = 1 << 16
 # More is not taken from the server until some of it is read, so that it waits as a tty would.
-_MOST_BYTES: Final = 1 << 20
+_MAX_BUFFERED_BYTES: Final = 1 << 20
 
 _IAC, _SB, _SE = 0xFF, 0xFA, 0xF0
 _WITH_OPTION = range(0xFB, 0xFF)  # WILL, WONT, DO, DONT
 
 
-class Sieve:
+class TelnetDecoder:
     """Parts what a telnet server sends into data and commands, wherever it is cut."""
 
     def __init__(self) -> None:
@@ -60,12 +60,12 @@ class Sieve:
         return bytes(plain), bytes(commands)
 
 
-class _Sieved:
+class _CommandSocket:
     """A socket that keeps the data, and gives the commands to who reads it."""
 
     def __init__(self, inner: socket.socket) -> None:
         self._inner = inner
-        self._sieve = Sieve()
+        self._decoder = TelnetDecoder()
         self._data = bytearray()
         self._ended = False
         self._changed = threading.Condition()
@@ -74,14 +74,14 @@ class _Sieved:
         """Give the next commands; ``b""`` at the end."""
         commands = b""
         while not commands and (data := self._inner.recv(_READ_BYTES)):
-            plain, commands = self._sieve.feed(data)
+            plain, commands = self._decoder.feed(data)
             with self._changed:
                 self._data += plain
                 self._changed.notify_all()
-                self._changed.wait_for(lambda: self._ended or len(self._data) < _MOST_BYTES)
+                self._changed.wait_for(lambda: self._ended or len(self._data) < _MAX_BUFFERED_BYTES)
         return commands
 
-    def take(self, count: int, timeout_s: float | None) -> bytes:
+    def read_data(self, count: int, timeout_s: float | None) -> bytes:
         """Give so many bytes of data, or fewer if no more come in time or at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or len(self._data) >= count, timeout_s)
@@ -93,11 +93,11 @@ class _Sieved:
         return data
 
     @property
-    def waiting(self) -> int:
+    def data_waiting(self) -> int:
         """Count the bytes of data that have come."""
         return len(self._data)
 
-    def end(self) -> None:
+    def mark_ended(self) -> None:
         """Wake who waits: nothing more comes."""
         with self._changed:
             self._ended = True
@@ -115,48 +115,48 @@ class _Sieved:
         return self._inner.fileno()
 
     def shutdown(self, how: int) -> None:
-        self.end()
+        self.mark_ended()
         self._inner.shutdown(how)
 
     def close(self) -> None:
-        self.end()
+        self.mark_ended()
         self._inner.close()
 
 
 class Serial(rfc2217.Serial):
     """pyserial's port, but for how data are read."""
 
-    _sieved: _Sieved | None = None
+    _command_socket: _CommandSocket | None = None
 
     @property
     def _socket(self) -> Any:
-        return self._sieved
+        return self._command_socket
 
     @_socket.setter
     def _socket(self, inner: socket.socket | None) -> None:
-        self._sieved = None if inner is None else _Sieved(inner)
+        self._command_socket = None if inner is None else _CommandSocket(inner)
 
     def _telnet_read_loop(self) -> None:
-        sieved = self._sieved
+        sieved = self._command_socket
         try:
             super()._telnet_read_loop()  # type: ignore[misc] # not in its types
         finally:
             if sieved is not None:
-                sieved.end()
+                sieved.mark_ended()
 
     @property
     def in_waiting(self) -> int:
         """See pyserial."""
-        return 0 if self._sieved is None else self._sieved.waiting
+        return 0 if self._command_socket is None else self._command_socket.data_waiting
 
     def read(self, size: int = 1) -> bytes:
         """See pyserial."""
-        if self._sieved is None:
+        if self._command_socket is None:
             raise serial.PortNotOpenError
-        return self._sieved.take(size, self.timeout)
+        return self._command_socket.read_data(size, self.timeout)
 
     def reset_input_buffer(self) -> None:
         """See pyserial."""
         super().reset_input_buffer()
-        if self._sieved is not None:
-            self._sieved.take(self._sieved.waiting, 0)
+        if self._command_socket is not None:
+            self._command_socket.read_data(self._command_socket.data_waiting, 0)

@@ -15,7 +15,7 @@ from typing import Any
 import serial
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
-from voxdisplay.transport.diagnosis import explain, reason
+from voxdisplay.transport.diagnosis import as_open_error, message_of
 from voxdisplay.transport.ftdi_latency import lower_latency
 
 _READ_BYTES = 1 << 16
@@ -26,7 +26,7 @@ _WRITE_BYTES = 1 << 14
 _POLL_S = 0.02
 _POLLED_WRITE_BYTES = 2048
 _POLLED_WRITE_S = 5.0
-_CLOGGED = "is something still reading there?"
+_STALLED_HINT = "is something still reading there?"
 
 # A device that goes away shows itself as any of these, by pyserial's layer and the system's mood.
 _GONE: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
@@ -59,7 +59,7 @@ class SerialTransport:
         try:
             self._serial: Any = _open(port, baud)  # of many kinds, with more than they share
         except _GONE as error:
-            raise explain(port, error) from error
+            raise as_open_error(port, error) from error
         except (ValueError, OverflowError) as error:  # a URL that is unknown, or an absurd rate
             raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
         self._closed = False
@@ -68,10 +68,10 @@ class SerialTransport:
     @property
     def bytes_per_s(self) -> float | None:
         """What the line can carry, a start and a stop bit a byte; None if it has no rate."""
-        return self.baud / 10 if self.is_rated else None
+        return self.baud / 10 if self.has_baud_rate else None
 
     @property
-    def is_rated(self) -> bool:
+    def has_baud_rate(self) -> bool:
         """Whether there is a line behind the port that has a rate: ptys and sockets have none."""
         if not isinstance(self._serial, serial.Serial):
             return _is_rfc2217(self._serial)
@@ -93,7 +93,9 @@ class SerialTransport:
         try:
             self._serial.baudrate = baud
         except _GONE as error:
-            raise ValueError(f"{self.port} has no rate of {baud} Bd: {reason(error)}") from error
+            raise ValueError(
+                f"{self.port} has no rate of {baud} Bd: {message_of(error)}"
+            ) from error
         except OverflowError as error:  # the system has no number for it
             raise ValueError(f"{self.port} has no rate of {baud} Bd") from error
         self.baud = baud
@@ -107,7 +109,7 @@ class SerialTransport:
             readable, _, _ = select.select([self._descriptor], [], [], max(timeout_s, 0.0))
             return bytes(self._serial.read(_READ_BYTES)) if readable else b""
         except _GONE as error:
-            raise TransportClosed(f"{self.port} is gone: {reason(error)}") from error
+            raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def _read_polled(self, timeout_s: float) -> bytes:
         deadline_s = time.monotonic() + timeout_s
@@ -129,21 +131,23 @@ class SerialTransport:
         try:
             while view:
                 left_s = max(deadline_s - time.monotonic(), 0.0)
-                if not self._takes_more(left_s):
+                if not self._wait_writable(left_s):
                     break
                 view = view[self._serial.write(view[:step]) :]
         except serial.SerialTimeoutException as error:
-            raise TransportTimeout(f"{self.port} takes no more bytes", hint=_CLOGGED) from error
+            raise TransportTimeout(
+                f"{self.port} takes no more bytes", hint=_STALLED_HINT
+            ) from error
         except _GONE as error:
-            raise TransportClosed(f"{self.port} is gone: {reason(error)}") from error
+            raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
         if view:
             raise TransportTimeout(
                 f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
                 f"in {timeout_s:.1f} s",
-                hint=_CLOGGED,
+                hint=_STALLED_HINT,
             )
 
-    def _takes_more(self, timeout_s: float) -> bool:
+    def _wait_writable(self, timeout_s: float) -> bool:
         """Wait until the port takes bytes; tell whether it does."""
         wire = self._descriptor
         if _is_rfc2217(self._serial):

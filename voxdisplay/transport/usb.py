@@ -20,17 +20,19 @@ import usb.util
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport.discovery import FoundPort
-from voxdisplay.transport.usb_access import busy, find_backend, forbidden
+from voxdisplay.transport.usb_access import busy_error, find_backend, permission_error
 from voxdisplay.wire import spec
 
 _READ_BYTES = 16384  # a multiple of every packet size there is, so that no packet is too long
 _WRITE_BYTES = 65536
-_REST_S = 0.02  # for as much as one read takes, at full speed; the end of a transfer ends it sooner
-_SHORTEST_S = 0.001  # libusb counts in milliseconds, and takes 0 for ever
-_MOST_FAULTS = 8  # stalls and packets that are too long, in a row
-_SHOWN = 10  # devices named in an error
+_CONTINUATION_TIMEOUT_S = (
+    0.02  # for as much as one read takes, at full speed; the end of a transfer ends it sooner
+)
+_MIN_TIMEOUT_S = 0.001  # libusb counts in milliseconds, and takes 0 for ever
+_MAX_CONSECUTIVE_ERRORS = 8  # stalls and packets that are too long, in a row
+_MAX_LISTED = 10  # devices named in an error
 
-_GONE = (errno.EIO, errno.ENODEV, errno.ENOENT, errno.ESHUTDOWN)
+_DISCONNECTED = (errno.EIO, errno.ENODEV, errno.ENOENT, errno.ESHUTDOWN)
 
 
 class UsbTransport:
@@ -52,15 +54,15 @@ class UsbTransport:
 
     def __init__(self, port: str, *, backend: Any = None) -> None:
         self.port = port
-        wanted = _Wanted("usb:" if backend is not None else port)
+        wanted = _DeviceSelector("usb:" if backend is not None else port)
         self.backend = find_backend(port) if backend is None else backend
         self._closed = False
-        self._faults = 0
-        self._claimed: int | None = None
-        self._detached: int | None = None
-        self._device = _choose(port, wanted, self.backend)
+        self._consecutive_errors = 0
+        self._claimed_interface: int | None = None
+        self._detached_driver: int | None = None
+        self._device = _select_device(port, wanted, self.backend)
         try:
-            with _explained(port, self._device):
+            with _as_open_error(port, self._device):
                 self._claim()
         except BaseException:
             self.close()
@@ -77,9 +79,9 @@ class UsbTransport:
         with contextlib.suppress(NotImplementedError):  # not on every system
             if device.is_kernel_driver_active(number):
                 device.detach_kernel_driver(number)
-                self._detached = number
+                self._detached_driver = number
         usb.util.claim_interface(device, number)
-        self._claimed = number
+        self._claimed_interface = number
 
     def read(self, timeout_s: float) -> bytes:
         """See `Transport.read`."""
@@ -89,22 +91,22 @@ class UsbTransport:
         while True:
             # A transfer ends with a packet that is not full, and a device need not send one. So
             # the first packet is waited for by itself, and the rest only as long as it flows.
-            data = self._receive(packet_bytes, deadline_s - time.monotonic())
+            data = self._transfer_in(packet_bytes, deadline_s - time.monotonic())
             if len(data) == packet_bytes:
-                data += self._receive(_READ_BYTES, _REST_S)
+                data += self._transfer_in(_READ_BYTES, _CONTINUATION_TIMEOUT_S)
             if data or time.monotonic() >= deadline_s:
                 return data
 
-    def _receive(self, size: int, timeout_s: float) -> bytes:
+    def _transfer_in(self, size: int, timeout_s: float) -> bytes:
         """Do a transfer; give nothing if nothing came, or an empty packet, or a damaged one."""
         try:
             data = bytes(self._in.read(size, _milliseconds(timeout_s)))
         except usb.core.USBTimeoutError:
             return b""
         except usb.core.USBError as error:
-            self._mend(error, self._in)
+            self._recover(error, self._in)
             return b""
-        self._faults = 0
+        self._consecutive_errors = 0
         return data
 
     def write(self, data: bytes, timeout_s: float) -> None:
@@ -114,14 +116,14 @@ class UsbTransport:
         sent = 0
         while sent < len(data):
             piece = data[sent : sent + _WRITE_BYTES]
-            sent += self._send(piece, deadline_s, f"only {sent} of {len(data)} bytes")
+            sent += self._transfer_out(piece, deadline_s, f"only {sent} of {len(data)} bytes")
             if sent < len(data) and time.monotonic() > deadline_s:
                 raise TransportTimeout(f"{self.port} took only {sent} of {len(data)} bytes in time")
         if data and len(data) % _packet_bytes(self._out) == 0:
             # The device may wait for more in a transfer of its own: tell it that this is all.
-            self._send(b"", deadline_s, "no end of what was sent")
+            self._transfer_out(b"", deadline_s, "no end of what was sent")
 
-    def _send(self, data: bytes, deadline_s: float, so_far: str) -> int:
+    def _transfer_out(self, data: bytes, deadline_s: float, so_far: str) -> int:
         """Do a transfer; give how many bytes the device took, which may be a part."""
         left_s = deadline_s - time.monotonic()
         try:
@@ -131,27 +133,30 @@ class UsbTransport:
                 f"{self.port} took {so_far}", hint="is its firmware still running?"
             ) from error
         except usb.core.USBError as error:
-            self._mend(error, self._out)
+            self._recover(error, self._out)
             return 0
-        self._faults = 0
+        self._consecutive_errors = 0
         return sent
 
-    def _mend(self, error: usb.core.USBError, endpoint: Any) -> None:
+    def _recover(self, error: usb.core.USBError, endpoint: Any) -> None:
         """Clear a stall, or let a packet go that was too long; raise what is past mending.
 
         What was under way is lost or comes twice: the protocol finds out, and repeats it.
         """
-        self._faults += 1
-        if error.errno not in {errno.EPIPE, errno.EOVERFLOW} or self._faults > _MOST_FAULTS:
-            raise self._lost(error) from error
+        self._consecutive_errors += 1
+        if (
+            error.errno not in {errno.EPIPE, errno.EOVERFLOW}
+            or self._consecutive_errors > _MAX_CONSECUTIVE_ERRORS
+        ):
+            raise self._closed_error(error) from error
         if error.errno == errno.EPIPE:
             try:
                 endpoint.clear_halt()
             except usb.core.USBError as worse:
-                raise self._lost(worse) from worse
+                raise self._closed_error(worse) from worse
 
-    def _lost(self, error: usb.core.USBError) -> TransportClosed:
-        if error.errno in _GONE:
+    def _closed_error(self, error: usb.core.USBError) -> TransportClosed:
+        if error.errno in _DISCONNECTED:
             return TransportClosed(f"{self.port} is gone: it was unplugged, or has restarted")
         return TransportClosed(f"{self.port} does not work any more: {error}")
 
@@ -166,29 +171,29 @@ class UsbTransport:
             return
         self._closed = True
         with contextlib.suppress(usb.core.USBError):  # it may be gone
-            if self._claimed is not None:
-                usb.util.release_interface(self._device, self._claimed)
-            if self._detached is not None:
-                self._device.attach_kernel_driver(self._detached)
+            if self._claimed_interface is not None:
+                usb.util.release_interface(self._device, self._claimed_interface)
+            if self._detached_driver is not None:
+                self._device.attach_kernel_driver(self._detached_driver)
         usb.util.dispose_resources(self._device)
 
 
-def found() -> list[FoundPort]:
+def usb_ports() -> list[FoundPort]:
     """List the displays on USB. Without libusb there are none to be seen."""
     try:
-        displays = _displays(find_backend("usb:"))
+        displays = _display_devices(find_backend("usb:"))
     except (OpenError, usb.core.USBError):
         return []
     ports = []
     for device in displays:
-        product = _text(device, "product")
+        product = _string_descriptor(device, "product")
         description = product or "a display"
-        ports.append(FoundPort(_name(device), description, *_ids(device), product=product))
+        ports.append(FoundPort(_port_name(device), description, *_ids(device), product=product))
         usb.util.dispose_resources(device)
     return sorted(ports, key=lambda port: port.port)
 
 
-class _Wanted:
+class _DeviceSelector:
     """What a name asks for."""
 
     def __init__(self, port: str) -> None:
@@ -209,19 +214,19 @@ class _Wanted:
         if not self._serial:
             return True
         _active_configuration(device)  # opens it, or says why not
-        return _text(device, "serial_number") == self._serial
+        return _string_descriptor(device, "serial_number") == self._serial
 
 
-def _choose(port: str, wanted: _Wanted, backend: Any) -> usb.core.Device:
+def _select_device(port: str, wanted: _DeviceSelector, backend: Any) -> usb.core.Device:
     """Give the only display that is wanted."""
-    with _explained(port):
-        displays = _displays(backend)
+    with _as_open_error(port):
+        displays = _display_devices(backend)
     chosen = []
     for device in displays:
-        with _explained(port, device):
+        with _as_open_error(port, device):
             if wanted(device):
                 chosen.append(device)
-    named = ", ".join(_name(device) for device in (chosen or displays)[:_SHOWN])
+    named = ", ".join(_port_name(device) for device in (chosen or displays)[:_MAX_LISTED])
     for device in displays:
         if chosen != [device]:
             usb.util.dispose_resources(device)
@@ -238,7 +243,7 @@ def _choose(port: str, wanted: _Wanted, backend: Any) -> usb.core.Device:
     )
 
 
-def _displays(backend: Any) -> list[usb.core.Device]:
+def _display_devices(backend: Any) -> list[usb.core.Device]:
     """Find the devices with an interface of the protocol's class."""
     displays = []
     for device in usb.core.find(find_all=True, backend=backend):
@@ -292,7 +297,7 @@ def _active_configuration(device: usb.core.Device) -> int:
         raise
 
 
-def _text(device: usb.core.Device, name: str) -> str | None:
+def _string_descriptor(device: usb.core.Device, name: str) -> str | None:
     """Give a text of the device; None if it has none, or gives none."""
     try:
         text = getattr(device, name)
@@ -302,29 +307,29 @@ def _text(device: usb.core.Device, name: str) -> str | None:
 
 
 def _ids(device: usb.core.Device) -> tuple[int, int, str | None]:
-    return device.idVendor, device.idProduct, _text(device, "serial_number")
+    return device.idVendor, device.idProduct, _string_descriptor(device, "serial_number")
 
 
-def _name(device: usb.core.Device) -> str:
+def _port_name(device: usb.core.Device) -> str:
     vid, pid, serial = _ids(device)
     return f"usb:{vid:04x}:{pid:04x}" + (f":{serial}" if serial else "")
 
 
 def _milliseconds(seconds: float) -> int:
-    return max(1, round(max(seconds, _SHORTEST_S) * 1000))
+    return max(1, round(max(seconds, _MIN_TIMEOUT_S) * 1000))
 
 
 @contextlib.contextmanager
-def _explained(port: str, device: usb.core.Device | None = None) -> Iterator[None]:
+def _as_open_error(port: str, device: usb.core.Device | None = None) -> Iterator[None]:
     """Turn what USB says on opening into what a person can do."""
     try:
         yield
     except usb.core.USBError as error:
         if error.errno == errno.EACCES:
-            raise forbidden(port) from error
+            raise permission_error(port) from error
         if error.errno == errno.EBUSY:
-            raise busy(port, device) from error
-        if error.errno in _GONE:
+            raise busy_error(port, device) from error
+        if error.errno in _DISCONNECTED:
             raise OpenError(
                 f"{port} went away while it was opened", port=port, hint="is it plugged in well?"
             ) from error

@@ -56,7 +56,7 @@ def find_backend(port: str) -> Any:
     return backend
 
 
-def forbidden(port: str) -> OpenError:
+def permission_error(port: str) -> OpenError:
     """Give the error for a device that may not be opened, with the way to be allowed."""
     hint = (
         f"allow it, and plug the display in again:\n  echo '{UDEV_RULE}' | sudo tee {_UDEV_FILE}\n"
@@ -67,13 +67,13 @@ def forbidden(port: str) -> OpenError:
     return OpenError(f"{port} may not be opened", port=port, hint=hint)
 
 
-def busy(port: str, device: Any) -> OpenError:
+def busy_error(port: str, device: Any) -> OpenError:
     """Give the error for a device that another program uses, with its name if it can be known."""
     if device is not None:
         usb.util.dispose_resources(device)  # or else we would be one of those who have it open
         node = _NODES / f"{device.bus or 0:03d}" / f"{device.address or 0:03d}"
         if node.exists():
-            return diagnosis.busy(port, str(node))
+            return diagnosis.busy_error(port, str(node))
     return OpenError(
         f"{port} is busy", port=port, hint="another program has it open: end it, or let go there"
     )

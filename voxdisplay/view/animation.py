@@ -19,15 +19,15 @@ import numpy as np
 
 from voxdisplay.errors import MissingExtra
 from voxdisplay.raster.grid import Grid
-from voxdisplay.view.glow import gather
-from voxdisplay.view.lit_voxels import Lit
-from voxdisplay.view.picture import Look, meter, picture_of
+from voxdisplay.view.glow import accumulate_light
+from voxdisplay.view.lit_voxels import LitVoxels
+from voxdisplay.view.picture import RenderOptions, auto_exposure, render_voxels
 from voxdisplay.view.pillow import Image
 from voxdisplay.view.stage import AXIS_COLORS
 
 # Pictures that the palette is made from, spread over the film, and how much a colour's frequency
 # counts in it: 0 not at all, 1 fully.
-_SAMPLES, _COMMON = 4, 0.4
+_PALETTE_SAMPLES, _FREQUENCY_EXPONENT = 4, 0.4
 
 
 class Turntable(Sequence[Image.Image]):
@@ -37,7 +37,7 @@ class Turntable(Sequence[Image.Image]):
     ----------
     lit : Lit
     grid : Grid
-    look : Look
+    options : Look
         Its camera is where the turn begins.
     count : int
         Pictures.
@@ -48,16 +48,16 @@ class Turntable(Sequence[Image.Image]):
 
     def __init__(
         self,
-        lit: Lit,
+        lit: LitVoxels,
         grid: Grid,
-        look: Look,
+        options: RenderOptions,
         count: int,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
-        self._lit, self._grid, self._look, self._count = lit, grid, look, count
+        self._lit, self._grid, self._options, self._count = lit, grid, options, count
         self._progress = progress
-        light = gather(lit, grid, look.camera, look.size).light
-        self._exposure = meter(light) if light.size else 1.0
+        light = accumulate_light(lit, grid, options.camera, options.size).light
+        self._exposure = auto_exposure(light) if light.size else 1.0
 
     def __len__(self) -> int:
         return self._count
@@ -73,8 +73,10 @@ class Turntable(Sequence[Image.Image]):
             raise IndexError(number)
         if self._progress:
             self._progress(number % self._count + 1, self._count)
-        camera = self._look.camera.turned(2 * math.pi * number / self._count)
-        return picture_of(self._lit, self._grid, replace(self._look, camera=camera), self._exposure)
+        camera = self._options.camera.turned(2 * math.pi * number / self._count)
+        return render_voxels(
+            self._lit, self._grid, replace(self._options, camera=camera), self._exposure
+        )
 
 
 def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
@@ -83,7 +85,10 @@ def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
     Its clock ticks a hundred times a second: the times of the pictures are rounded to that, and
     the whole is as long as it should be.
     """
-    samples = {n: pictures[n] for n in {i * len(pictures) // _SAMPLES for i in range(_SAMPLES)}}
+    samples = {
+        n: pictures[n]
+        for n in {i * len(pictures) // _PALETTE_SAMPLES for i in range(_PALETTE_SAMPLES)}
+    }
     palette = _palette([*samples.values()])
     quantised = (
         (samples.pop(number, None) or pictures[number]).quantize(
@@ -115,7 +120,9 @@ def _palette(samples: Sequence[Image.Image]) -> Image.Image:
     red, green, blue = (colors >> 1).astype(np.int32).T
     counts = np.bincount(red << 14 | green << 7 | blue)
     distinct = np.flatnonzero(counts)
-    repeated = np.repeat(distinct, np.ceil(counts[distinct] ** _COMMON).astype(np.int64))
+    repeated = np.repeat(
+        distinct, np.ceil(counts[distinct] ** _FREQUENCY_EXPONENT).astype(np.int64)
+    )
     rgb = np.stack([repeated >> 14, repeated >> 7 & 127, repeated & 127], axis=1).astype(np.uint8)
     rgb <<= 1
     count = 256 - len(AXIS_COLORS)  # thin lines, which an average would lose
@@ -146,12 +153,14 @@ def save_mp4(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
                 "MP4 films need PyAV or ffmpeg, and neither is installed",
                 hint="pip install 'voxdisplay[mp4]', or install ffmpeg, or write a .gif",
             ) from None
-        _by_ffmpeg(ffmpeg, path, frames, (width, height), fps)
+        _encode_by_ffmpeg(ffmpeg, path, frames, (width, height), fps)
     else:
-        _by_pyav(path, frames, (width, height), fps)
+        _encode_by_pyav(path, frames, (width, height), fps)
 
 
-def _by_pyav(path: Path, frames: Iterator[Image.Image], size: tuple[int, int], fps: float) -> None:
+def _encode_by_pyav(
+    path: Path, frames: Iterator[Image.Image], size: tuple[int, int], fps: float
+) -> None:
     import av  # noqa: PLC0415
 
     picture_of_av: Any = av.VideoFrame  # of which PyAV gives no types
@@ -165,7 +174,7 @@ def _by_pyav(path: Path, frames: Iterator[Image.Image], size: tuple[int, int], f
         film.mux(stream.encode(None))
 
 
-def _by_ffmpeg(
+def _encode_by_ffmpeg(
     ffmpeg: str, path: Path, frames: Iterator[Image.Image], size: tuple[int, int], fps: float
 ) -> None:
     command = [ffmpeg, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]

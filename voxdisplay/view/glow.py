@@ -15,28 +15,28 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.view.camera import Camera, Floats
-from voxdisplay.view.lit_voxels import Lit
+from voxdisplay.view.lit_voxels import LitVoxels
 from voxdisplay.view.pillow import Image
 
 Light = NDArray[np.float32]
 
 # Voxels added at once: bounds the memory that a dense volume takes.
-_AT_ONCE = 1 << 19
+_CHUNK_VOXELS = 1 << 19
 # Blobs wider than this, as a standard deviation in pixels, are drawn on a coarser raster, so wide
 # there at least, and enlarged: as smooth, and much faster.
-_SMOOTH_PX = 1.5
+_COARSE_SIGMA_PX = 1.5
 # On a coarser raster, voxels whose sizes differ by less are blobs of one size.
-_ALIKE = 1.1
+_SIZE_CLASS_RATIO = 1.1
 # What bilinear weights alone blur a point by: its variance, in square pixels.
-_BILINEAR = 1 / 6
+_BILINEAR_VARIANCE = 1 / 6
 # A pass of the blur adds so much variance at most. Small steps make rounder spots, which is seen,
 # and is cheap, where they are enlarged.
-_STEP, _FINE_STEP = 0.5, 0.15
+_MAX_STEP_VARIANCE, _COARSE_STEP_VARIANCE = 0.5, 0.15
 
 _LINEAR = (np.arange(256) / 255) ** 2.2
 
 
-class Glare(NamedTuple):
+class LightRegion(NamedTuple):
     """Light on a part of the picture; all else is dark.
 
     Attributes
@@ -53,7 +53,9 @@ class Glare(NamedTuple):
     top: int
 
 
-def gather(lit: Lit, grid: Grid, camera: Camera, size: tuple[int, int]) -> Glare:
+def accumulate_light(
+    lit: LitVoxels, grid: Grid, camera: Camera, size: tuple[int, int]
+) -> LightRegion:
     """Add up the light of lit voxels.
 
     Each is a soft round spot, as wide as the voxel at its distance; nearer ones are brighter.
@@ -72,34 +74,44 @@ def gather(lit: Lit, grid: Grid, camera: Camera, size: tuple[int, int]) -> Glare
 
     """
     middle_px = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
-    wide = _spread_px(middle_px) / _SMOOTH_PX
+    wide = _splat_sigma_px(middle_px) / _COARSE_SIGMA_PX
     factor = 1 if wide < 1 else max(2, int(wide))
-    box = _box(lit, grid, camera, size, factor)
+    box = _lit_region(lit, grid, camera, size, factor)
     shape = 3, box.height, box.width
     rasters: dict[int, Light] = {}
-    for start in range(0, len(lit.positions) if box.width and box.height else 0, _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
+    for start in range(0, len(lit.positions) if box.width and box.height else 0, _CHUNK_VOXELS):
+        part = slice(start, start + _CHUNK_VOXELS)
         x, y, scale = camera.project(lit.positions[part] + 0.5, grid, size)
         x, y = x / factor - box.left, y / factor - box.top
         near = scale / middle_px
         light = _LINEAR.take(lit.colors[part].T) * (near * near)
         # Blobs of a pixel or two cannot differ much in size; on a coarse grid they show distance.
-        band = np.rint(np.log(near) / math.log(_ALIKE)).astype(np.int64) if factor > 1 else None
+        band = (
+            np.rint(np.log(near) / math.log(_SIZE_CLASS_RATIO)).astype(np.int64)
+            if factor > 1
+            else None
+        )
         for number in [0] if band is None else np.unique(band).tolist():
             own = slice(None) if band is None else band == number
             raster = rasters.setdefault(number, np.zeros(shape, dtype=np.float32))
-            _deposit(raster, x[own], y[own], light[:, own])
+            _splat(raster, x[own], y[own], light[:, own])
     total: Light = np.zeros(shape, dtype=np.float32)
-    step = _STEP if factor == 1 else _FINE_STEP
+    step = _MAX_STEP_VARIANCE if factor == 1 else _COARSE_STEP_VARIANCE
     for number, raster in rasters.items():
-        spread_px = _spread_px(middle_px * _ALIKE**number) / factor
-        variance = max(0.0, spread_px**2 - _BILINEAR)
+        spread_px = _splat_sigma_px(middle_px * _SIZE_CLASS_RATIO**number) / factor
+        variance = max(0.0, spread_px**2 - _BILINEAR_VARIANCE)
         # A voxel's light has spread over so many pixels, and is to be 1 in its middle.
-        total += spread(raster, variance, step) * np.float32(2 * math.pi * (variance + _BILINEAR))
-    return Glare(total, box.left, box.top) if factor == 1 else _enlarged(total, box, factor, size)
+        total += blur(raster, variance, step) * np.float32(
+            2 * math.pi * (variance + _BILINEAR_VARIANCE)
+        )
+    return (
+        LightRegion(total, box.left, box.top)
+        if factor == 1
+        else _upsampled(total, box, factor, size)
+    )
 
 
-class _Box(NamedTuple):
+class _Region(NamedTuple):
     """A part of a raster."""
 
     left: int
@@ -108,14 +120,16 @@ class _Box(NamedTuple):
     height: int
 
 
-def _box(lit: Lit, grid: Grid, camera: Camera, size: tuple[int, int], factor: int) -> _Box:
+def _lit_region(
+    lit: LitVoxels, grid: Grid, camera: Camera, size: tuple[int, int], factor: int
+) -> _Region:
     """Find the part of the raster that can have light: where the lit voxels' own box is seen."""
     if len(lit.positions) == 0:
-        return _Box(0, 0, 0, 0)
+        return _Region(0, 0, 0, 0)
     ends = [(column.min() + 0.5, column.max() + 0.5) for column in lit.positions.T]
     corners = list(itertools.product(*ends))
     x, y, scale = camera.project(corners, grid, size)
-    margin = 2 + math.ceil(3.5 * _spread_px(float(scale.max())) / factor)
+    margin = 2 + math.ceil(3.5 * _splat_sigma_px(float(scale.max())) / factor)
     left, right = (
         min(max(0, math.floor(edge / factor) + more), -(-size[0] // factor))
         for edge, more in ((x.min(), -margin), (x.max(), margin))
@@ -124,15 +138,15 @@ def _box(lit: Lit, grid: Grid, camera: Camera, size: tuple[int, int], factor: in
         min(max(0, math.floor(edge / factor) + more), -(-size[1] // factor))
         for edge, more in ((y.min(), -margin), (y.max(), margin))
     )
-    return _Box(left, top, right - left, bottom - top)
+    return _Region(left, top, right - left, bottom - top)
 
 
-def _spread_px(voxel_px: float) -> float:
+def _splat_sigma_px(voxel_px: float) -> float:
     """Give a spot's standard deviation: neighbours melt into a line, unless they are large."""
     return voxel_px * (0.19 + 0.26 / (1 + (voxel_px / 6) ** 2))
 
 
-def _deposit(raster: Light, x: Floats, y: Floats, light: Floats) -> None:
+def _splat(raster: Light, x: Floats, y: Floats, light: Floats) -> None:
     """Add points to the four pixels around each; leave out what is outside."""
     height, width = raster.shape[1:]
     left, top = np.floor(x - 0.5), np.floor(y - 0.5)
@@ -149,7 +163,7 @@ def _deposit(raster: Light, x: Floats, y: Floats, light: Floats) -> None:
         np.add(plane, np.bincount(index, shares, height * width).reshape(plane.shape), out=plane)
 
 
-def spread(light: Light, variance: float, step: float) -> Light:
+def blur(light: Light, variance: float, step: float) -> Light:
     """Blur planes by a variance, in square pixels, in passes of at most a step; 2/3 at most."""
     passes = math.ceil(variance / step)
     share = np.float32(variance / max(1, passes) / 2)
@@ -166,7 +180,7 @@ def spread(light: Light, variance: float, step: float) -> Light:
     return light
 
 
-def _enlarged(light: Light, box: _Box, factor: int, size: tuple[int, int]) -> Glare:
+def _upsampled(light: Light, box: _Region, factor: int, size: tuple[int, int]) -> LightRegion:
     """Bring light from a coarser raster onto the picture's."""
     wide, high = box.width * factor, box.height * factor
     planes = [
@@ -175,4 +189,4 @@ def _enlarged(light: Light, box: _Box, factor: int, size: tuple[int, int]) -> Gl
     ]
     left, top = box.left * factor, box.top * factor
     inside = np.stack(planes)[:, : size[1] - top, : size[0] - left]
-    return Glare(np.maximum(inside, 0), left, top)
+    return LightRegion(np.maximum(inside, 0), left, top)

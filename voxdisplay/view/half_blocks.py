@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.lit_voxels import Lit
-from voxdisplay.view.picture import Look, picture_of
-from voxdisplay.view.stage import AXIS_COLORS, tips
+from voxdisplay.view.lit_voxels import LitVoxels
+from voxdisplay.view.picture import RenderOptions, render_voxels
+from voxdisplay.view.stage import AXIS_COLORS, axis_tips
 
 RESET = "\x1b[0m"
-_HALF = "\N{UPPER HALF BLOCK}"
+_UPPER_HALF = "\N{UPPER HALF BLOCK}"
 # Drawn so much finer and reduced: thin lines keep their brightness, and edges are soft.
-_FINER = 2
+_SUPERSAMPLING = 2
 # Nearer than on a screen: there is no room to give away.
 CAMERA = Camera(distance=2.2)
 
@@ -31,13 +31,13 @@ _CUBE = np.array([(r, g, b) for r in _LEVELS for g in _LEVELS for b in _LEVELS])
 _XTERM = np.concatenate((_CUBE, np.arange(8, 248, 10)[:, None].repeat(3, axis=1)))
 
 
-def full_color(environment: Mapping[str, str] = os.environ) -> bool:
+def has_true_color(environment: Mapping[str, str] = os.environ) -> bool:
     """Tell whether the terminal says that it has all colours, and not only 256."""
     return environment.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
 
 
 def half_blocks(
-    lit: Lit,
+    lit: LitVoxels,
     grid: Grid,
     columns: int,
     rows: int,
@@ -63,21 +63,21 @@ def half_blocks(
         ``rows`` lines without line ends, each of which resets the colours at its end.
 
     """
-    size = columns * _FINER, 2 * rows * _FINER
-    look = Look(size=size, camera=camera, labels=False)
-    pixels = np.asarray(picture_of(lit, grid, look).reduce(_FINER))
-    names = _names(grid, replace(look, size=(columns, 2 * rows)))
-    codes = _codes(pixels, full=full)
+    size = columns * _SUPERSAMPLING, 2 * rows * _SUPERSAMPLING
+    options = RenderOptions(size=size, camera=camera, labels=False)
+    pixels = np.asarray(render_voxels(lit, grid, options).reduce(_SUPERSAMPLING))
+    names = _axis_name_cells(grid, replace(options, size=(columns, 2 * rows)))
+    codes = _color_codes(pixels, full=full)
     return [
         _line(codes[2 * row], codes[2 * row + 1], names.get(row, {}), full=full)
         for row in range(rows)
     ]
 
 
-def _names(grid: Grid, look: Look) -> dict[int, dict[int, int]]:
+def _axis_name_cells(grid: Grid, options: RenderOptions) -> dict[int, dict[int, int]]:
     """Find where the axes' names stand: row -> column -> axis. A cell beyond each tip."""
-    x, y, _ = look.camera.project(np.vstack((np.zeros(3), tips(grid))), grid, look.size)
-    columns, rows = look.size[0], look.size[1] // 2
+    x, y, _ = options.camera.project(np.vstack((np.zeros(3), axis_tips(grid))), grid, options.size)
+    columns, rows = options.size[0], options.size[1] // 2
     found: dict[int, dict[int, int]] = {}
     for axis in range(3):
         along = np.array([x[axis + 1] - x[0], y[axis + 1] - y[0]])
@@ -88,7 +88,7 @@ def _names(grid: Grid, look: Look) -> dict[int, dict[int, int]]:
     return found
 
 
-def _codes(pixels: NDArray[np.uint8], *, full: bool) -> list[list[str]]:
+def _color_codes(pixels: NDArray[np.uint8], *, full: bool) -> list[list[str]]:
     """Give each pixel's colour as terminals write it, after 38; or 48;."""
     if full:
         return [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
@@ -102,10 +102,10 @@ def _line(upper: list[str], lower: list[str], names: dict[int, int], *, full: bo
     parts, front, back = [], "", ""
     for column, (top, bottom) in enumerate(zip(upper, lower, strict=True)):
         axis = names.get(column)
-        character = " " if top == bottom else _HALF
+        character = " " if top == bottom else _UPPER_HALF
         if axis is not None:
             character = "xyz"[axis]
-            top = _codes(np.array([[AXIS_COLORS[axis]]], np.uint8), full=full)[0][0]  # noqa: PLW2901
+            top = _color_codes(np.array([[AXIS_COLORS[axis]]], np.uint8), full=full)[0][0]  # noqa: PLW2901
         if bottom != back:
             parts.append(f"\x1b[48;{bottom}m")
             back = bottom

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.view.live.message import Moment, encode
-from voxdisplay.view.live.page import page, policy
-from voxdisplay.view.save import replacing
+from voxdisplay.view.atomic_write import atomic_write
+from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.page import content_security_policy, page_html
 
 _LEVEL = 9
 _HEAD = '<meta charset="utf-8">\n'
@@ -69,17 +69,20 @@ def save_html(
         raise ValueError(f"{fps} pages a second: take 0.1 to 120")
     grid = Grid(*grid)
     frames = [
-        Moment(np.asarray(one), grid, format, number, title, palette=palette)
+        Snapshot(np.asarray(one), grid, format, number, title, palette=palette)
         for number, one in enumerate(pages, 1)
     ]
     packed = [zlib.compress(encode(frame), _LEVEL) for frame in frames]
     data = json.dumps({"fps": fps, "frames": [base64.b64encode(f).decode() for f in packed]})
-    text = page()
+    text = page_html()
     for mark, more in (
-        (_HEAD, f'<meta http-equiv="Content-Security-Policy" content="{policy()}">\n'),
+        (
+            _HEAD,
+            f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy()}">\n',
+        ),
         (_PLACE, data),  # base64 and numbers: nothing in it ends the script
     ):
         text = text.replace(mark, mark + more, 1)
     text = text.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
-    with replacing(Path(path)) as unfinished:
+    with atomic_write(Path(path)) as unfinished:
         unfinished.write_text(text, encoding="utf-8")

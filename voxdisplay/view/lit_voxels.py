@@ -14,11 +14,11 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 
-_AT_ONCE = 8  # pixels of 1, 2 or 3 bytes, which make whole words
-_FULL = 8  # where more than one in so many has something, it does not pay to look twice
+_BLOCK_PIXELS = 8  # pixels of 1, 2 or 3 bytes, which make whole words
+_DENSE_RATIO = 8  # where more than one in so many has something, it does not pay to look twice
 
 
-class Lit(NamedTuple):
+class LitVoxels(NamedTuple):
     """Lit voxels, in scan order.
 
     Attributes
@@ -39,7 +39,7 @@ def lit_voxels(
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - the word of the command line
     palette: Colors | None = None,
-) -> Lit:
+) -> LitVoxels:
     """List what is lit.
 
     Parameters
@@ -64,7 +64,7 @@ def lit_voxels(
     page = np.asarray(page)
     format.check(page, grid.array_shape)
     flat = page.reshape(format.shape((grid.voxels,)))
-    index, pixels = _lit(np.ascontiguousarray(flat))
+    index, pixels = _nonzero_pixels(np.ascontiguousarray(flat))
     if format is PixelFormat.RGB888:
         colors = pixels
     else:
@@ -77,31 +77,35 @@ def lit_voxels(
         positions[:, column] = rest - above * rest.dtype.type(side)
         rest = above
     positions[:, 2] = rest
-    return Lit(positions, colors.astype(np.uint8, copy=False))
+    return LitVoxels(positions, colors.astype(np.uint8, copy=False))
 
 
-def _lit(flat: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.integer]]:
+def _nonzero_pixels(flat: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.integer]]:
     """Find pixels that are not 0, and give where they are and what.
 
     Most of a volume is dark: looks at words first, eight bytes of eight pixels,
     and at the pixels only of those that are not 0.
     """
-    whole = len(flat) // _AT_ONCE
-    eights = flat[: whole * _AT_ONCE].reshape(whole, _AT_ONCE, *flat.shape[1:])
+    whole = len(flat) // _BLOCK_PIXELS
+    eights = flat[: whole * _BLOCK_PIXELS].reshape(whole, _BLOCK_PIXELS, *flat.shape[1:])
     words = eights.reshape(-1).view(np.uint64)
     something = words != 0
-    if np.count_nonzero(something) > len(words) // _FULL:
-        index = np.flatnonzero(_not_dark(flat))
+    if np.count_nonzero(something) > len(words) // _DENSE_RATIO:
+        index = np.flatnonzero(_is_nonzero(flat))
         return index, flat[index]
     found = np.flatnonzero(something) // flat[:1].nbytes  # a pixel's bytes are an eight's words
     busy = found[np.diff(found, prepend=-1) != 0]
     # What fills no eight is looked at in any case.
-    pixels = np.concatenate((eights[busy].reshape(-1, *flat.shape[1:]), flat[whole * _AT_ONCE :]))
-    at = np.flatnonzero(_not_dark(pixels))
-    return np.append(busy, whole)[at // _AT_ONCE] * _AT_ONCE + at % _AT_ONCE, pixels[at]
+    pixels = np.concatenate(
+        (eights[busy].reshape(-1, *flat.shape[1:]), flat[whole * _BLOCK_PIXELS :])
+    )
+    at = np.flatnonzero(_is_nonzero(pixels))
+    return np.append(busy, whole)[at // _BLOCK_PIXELS] * _BLOCK_PIXELS + at % _BLOCK_PIXELS, pixels[
+        at
+    ]
 
 
-def _not_dark(pixels: NDArray[np.integer]) -> NDArray[np.bool_]:
+def _is_nonzero(pixels: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Tell which pixels are not 0. A comparison last: numpy finds True fastest."""
     if pixels.ndim > 1:
         red, green, blue = pixels.T

@@ -14,34 +14,36 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.glow import Light, gather, spread
-from voxdisplay.view.lit_voxels import Lit, lit_voxels
+from voxdisplay.view.glow import Light, accumulate_light, blur
+from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels
 from voxdisplay.view.pillow import Image, ImageChops
-from voxdisplay.view.stage import GROUND, stage
+from voxdisplay.view.stage import BACKGROUND, draw_stage
 
 SIZE = (800, 600)
 
 # The halo is made on a raster this much coarser.
-_COARSER = 8
+_BLOOM_SCALE = 8
 # Its blurs: variance in square pixels of that raster, and share.
-_SCATTER = ((0.8, 0.6), (12.0, 0.8))
-_STEP = 0.6
+_BLOOM_BLURS = ((0.8, 0.6), (12.0, 0.8))
+_BLOOM_STEP_VARIANCE = 0.6
 # How white the brightest light becomes.
-_WHITEST = 0.35
+_HIGHLIGHT_WHITENESS = 0.35
 # It is amplified to this brightness of 255 at most, and by no more than this.
-_HALO_PEAK, _MOST_GAIN = 72.0, 3.0
+_BLOOM_PEAK, _BLOOM_MAX_GAIN = 72.0, 3.0
 _SMOOTH = Image.Resampling.BICUBIC
 # How bright the light is, as a share of full, that this share of the lit pixels does not exceed.
-_SHARE, _BRIGHT = 0.92, 0.8
+_METER_QUANTILE, _METER_TARGET = 0.92, 0.8
 
 # Of so many pixels at most.
-_METERED = 1 << 15
-_STEPS = 4096
-_TO_SRGB = np.rint(255 * (np.arange(_STEPS) / (_STEPS - 1)) ** (1 / 2.2)).astype(np.uint8)
+_METER_PIXELS = 1 << 15
+_SRGB_STEPS = 4096
+_SRGB_TABLE = np.rint(255 * (np.arange(_SRGB_STEPS) / (_SRGB_STEPS - 1)) ** (1 / 2.2)).astype(
+    np.uint8
+)
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RenderOptions:
     """How a picture is taken.
 
     Attributes
@@ -61,17 +63,17 @@ class Look:
     axes: bool = True
     labels: bool = True
 
-    def seen_from(self, angle: tuple[float, float] | None, zoom: float = 1.0) -> Look:
-        """Give the look from a yaw and a pitch, in radians, and nearer by a factor."""
+    def with_view(self, angle: tuple[float, float] | None, zoom: float = 1.0) -> RenderOptions:
+        """Give the options from a yaw and a pitch, in radians, and nearer by a factor."""
         yaw, pitch = angle or (self.camera.yaw, self.camera.pitch)
         return replace(self, camera=replace(self.camera, yaw=yaw, pitch=pitch).zoomed(zoom))
 
 
-def picture(
+def render_page(
     page: NDArray[np.integer],
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - the word of the command line
-    look: Look = Look(),
+    options: RenderOptions = RenderOptions(),
     palette: Colors | None = None,
 ) -> Image.Image:
     """Draw a page.
@@ -82,95 +84,97 @@ def picture(
         What `Display.read` and `Frame.array` give, indexed [z, y, x].
     grid : Grid
     format : PixelFormat
-    look : Look
+    options : Look
     palette : (256, 3) uint8 array, optional
         Of an index8 page; by default the default one.
 
     Returns
     -------
     PIL.Image.Image
-        RGB, of the look's size.
+        RGB, of the options's size.
 
     """
-    return picture_of(lit_voxels(page, grid, format, palette), grid, look)
+    return render_voxels(lit_voxels(page, grid, format, palette), grid, options)
 
 
-def picture_of(lit: Lit, grid: Grid, look: Look, exposure: float | None = None) -> Image.Image:
+def render_voxels(
+    lit: LitVoxels, grid: Grid, options: RenderOptions, exposure: float | None = None
+) -> Image.Image:
     """Draw lit voxels.
 
     Parameters
     ----------
     lit : Lit
     grid : Grid
-    look : Look
+    options : Look
     exposure : float, optional
         What light is multiplied by; by default as much as shows it best. A film has one for all
         its pictures, by `meter`.
 
     """
-    image = _stage(grid, look)
-    glare = gather(lit, grid, look.camera, look.size)
+    image = _background(grid, options)
+    glare = accumulate_light(lit, grid, options.camera, options.size)
     if not glare.light.size:
         return image
-    exposed = _toned(glare.light * np.float32(exposure or meter(glare.light)))
-    sharp = _srgb(exposed)
-    if not look.glow:
-        return _screened(image, sharp, glare.left, glare.top)
-    whole = Image.new("RGB", look.size)
+    exposed = _tone_mapped(glare.light * np.float32(exposure or auto_exposure(glare.light)))
+    sharp = _to_srgb(exposed)
+    if not options.glow:
+        return _screen_blended(image, sharp, glare.left, glare.top)
+    whole = Image.new("RGB", options.size)
     whole.paste(sharp, (glare.left, glare.top))
-    image = _screened(image, sharp, glare.left, glare.top)
-    return _screened(image, *_halo(whole))
+    image = _screen_blended(image, sharp, glare.left, glare.top)
+    return _screen_blended(image, *_bloom(whole))
 
 
-def _screened(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:
+def _screen_blended(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:
     """Shine light on a part of an image, and give the image."""
     box = left, top, left + light.width, top + light.height
     image.paste(ImageChops.screen(image.crop(box), light), box)
     return image
 
 
-def meter(light: Light) -> float:
+def auto_exposure(light: Light) -> float:
     """Find the exposure that shows light best: most of what is lit clearly, little of it burnt."""
-    apart = max(1, round((light[0].size / _METERED) ** 0.5))
+    apart = max(1, round((light[0].size / _METER_PIXELS) ** 0.5))
     most = light[:, ::apart, ::apart].max(axis=0)
     most = most[most > most.max(initial=0.0) / 50]
     if not len(most):
         return 1.0
-    return -float(np.log(1 - _BRIGHT)) / float(np.quantile(most, _SHARE))
+    return -float(np.log(1 - _METER_TARGET)) / float(np.quantile(most, _METER_QUANTILE))
 
 
-def _stage(grid: Grid, look: Look) -> Image.Image:
-    if look.axes:
-        return stage(grid, look.camera, look.size, labels=look.labels).copy()
-    return Image.new("RGB", look.size, GROUND)
+def _background(grid: Grid, options: RenderOptions) -> Image.Image:
+    if options.axes:
+        return draw_stage(grid, options.camera, options.size, labels=options.labels).copy()
+    return Image.new("RGB", options.size, BACKGROUND)
 
 
-def _toned(light: Light) -> Light:
+def _tone_mapped(light: Light) -> Light:
     """Bring light of any strength below 1, keeping its hue; the brightest turns towards white."""
     most = light.max(axis=0)
     toned = 1 - np.exp(-most)
     white = toned * toned * toned
-    white *= white * np.float32(_WHITEST)
+    white *= white * np.float32(_HIGHLIGHT_WHITENESS)
     kept = toned * (1 - white) / np.maximum(most, np.float32(1e-6))
     return np.asarray(light * kept + toned * white, dtype=np.float32)
 
 
-def _srgb(light: Light) -> Image.Image:
+def _to_srgb(light: Light) -> Image.Image:
     """Encode linear light of 0 to 1."""
-    steps = (light * np.float32(_STEPS - 1)).astype(np.uint16)
-    return Image.merge("RGB", [Image.fromarray(plane) for plane in _TO_SRGB.take(steps)])
+    steps = (light * np.float32(_SRGB_STEPS - 1)).astype(np.uint16)
+    return Image.merge("RGB", [Image.fromarray(plane) for plane in _SRGB_TABLE.take(steps)])
 
 
-def _halo(sharp: Image.Image) -> tuple[Image.Image, int, int]:
+def _bloom(sharp: Image.Image) -> tuple[Image.Image, int, int]:
     """Give the light that scatters around what is bright: a narrow and a wide blur of it.
 
     And where it lies in the picture, left and top; it is dark around it.
     """
-    coarse = np.asarray(sharp.reduce(_COARSER), dtype=np.float32).transpose(2, 0, 1)
+    coarse = np.asarray(sharp.reduce(_BLOOM_SCALE), dtype=np.float32).transpose(2, 0, 1)
     scattered = np.zeros_like(coarse)
-    for variance, share in _SCATTER:
-        scattered += share * spread(coarse, variance, _STEP)
-    gain = min(_MOST_GAIN, _HALO_PEAK / max(1.0, float(scattered.max())))
+    for variance, share in _BLOOM_BLURS:
+        scattered += share * blur(coarse, variance, _BLOOM_STEP_VARIANCE)
+    gain = min(_BLOOM_MAX_GAIN, _BLOOM_PEAK / max(1.0, float(scattered.max())))
     planes = np.rint(scattered * gain).astype(np.uint8)
     small = Image.merge("RGB", [Image.fromarray(plane) for plane in planes])
     left, top, right, bottom = small.getbbox() or (0, 0, 1, 1)
@@ -181,8 +185,8 @@ def _halo(sharp: Image.Image) -> tuple[Image.Image, int, int]:
         min(small.width, right + 2),
         min(small.height, bottom + 2),
     )
-    size = (box[2] - box[0]) * _COARSER, (box[3] - box[1]) * _COARSER
-    left, top = box[0] * _COARSER, box[1] * _COARSER
+    size = (box[2] - box[0]) * _BLOOM_SCALE, (box[3] - box[1]) * _BLOOM_SCALE
+    left, top = box[0] * _BLOOM_SCALE, box[1] * _BLOOM_SCALE
     large = small.resize(size, _SMOOTH, box)
     # The last coarse pixels may stand over the picture's edge.
     inside = min(large.width, sharp.width - left), min(large.height, sharp.height - top)

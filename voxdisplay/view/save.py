@@ -5,10 +5,7 @@ Files are replaced whole or not at all. Knows what formats there are, not how th
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,14 +16,15 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
+from voxdisplay.view.atomic_write import atomic_write
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.picture import Look, picture
+from voxdisplay.view.picture import RenderOptions, render_page
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class ExportJob:
     """A page and how it is to be taken.
 
     Attributes
@@ -35,7 +33,7 @@ class Shot:
         Indexed [z, y, x].
     grid : Grid
     format : PixelFormat
-    look : Look
+    options : Look
     title : str
     seconds, fps : float
         Of a film: how long one turn takes, and pictures a second.
@@ -47,20 +45,20 @@ class Shot:
     page: NDArray[np.integer]
     grid: Grid
     format: PixelFormat
-    look: Look = field(default_factory=Look)
+    options: RenderOptions = field(default_factory=RenderOptions)
     title: str = "voxdisplay"
     seconds: float = 3.0
     fps: float = 20.0
     palette: Colors | None = None
 
-    def turn(self, progress: Progress | None) -> Turntable:
+    def turntable(self, progress: Progress | None) -> Turntable:
         """Give the pictures of one turn."""
         lit = lit_voxels(self.page, self.grid, self.format, self.palette)
         count = max(1, round(self.seconds * self.fps))
-        return Turntable(lit, self.grid, self.look, count, progress)
+        return Turntable(lit, self.grid, self.options, count, progress)
 
 
-def save(path: Path, shot: Shot, progress: Progress | None = None) -> None:
+def save(path: Path, shot: ExportJob, progress: Progress | None = None) -> None:
     """Write a file of the kind that its suffix names; one of `WRITERS`.
 
     Parameters
@@ -79,43 +77,24 @@ def save(path: Path, shot: Shot, progress: Progress | None = None) -> None:
 
     """
     writer = WRITERS[path.suffix.lower()]
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         writer(unfinished, shot, progress)
 
 
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a file to write to that takes the place of another when it is done, and is gone if not.
-
-    What is no ordinary file, such as ``/dev/null``, is written to as it is.
-    """
-    target = Path(os.path.realpath(path))  # a link stays a link
-    if target.exists() and not target.is_file():
-        yield target
-        return
-    unfinished = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
-    try:
-        unfinished.touch(exist_ok=False)
-        yield unfinished
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
-
-
-def _png(path: Path, shot: Shot, _: Progress | None) -> None:
-    drawn = picture(shot.page, shot.grid, shot.format, shot.look, shot.palette)
+def _png(path: Path, shot: ExportJob, _: Progress | None) -> None:
+    drawn = render_page(shot.page, shot.grid, shot.format, shot.options, shot.palette)
     drawn.save(path, format="PNG")
 
 
-def _gif(path: Path, shot: Shot, progress: Progress | None) -> None:
-    save_gif(path, shot.turn(progress), shot.fps)
+def _gif(path: Path, shot: ExportJob, progress: Progress | None) -> None:
+    save_gif(path, shot.turntable(progress), shot.fps)
 
 
-def _mp4(path: Path, shot: Shot, progress: Progress | None) -> None:
-    save_mp4(path, shot.turn(progress), shot.fps)
+def _mp4(path: Path, shot: ExportJob, progress: Progress | None) -> None:
+    save_mp4(path, shot.turntable(progress), shot.fps)
 
 
-def _html(path: Path, shot: Shot, _: Progress | None) -> None:
+def _html(path: Path, shot: ExportJob, _: Progress | None) -> None:
     from voxdisplay.view.html_export import save_html  # noqa: PLC0415 - it brings a page of its own
 
     save_html(
@@ -129,10 +108,10 @@ def _html(path: Path, shot: Shot, _: Progress | None) -> None:
     )
 
 
-WRITERS: dict[str, Callable[[Path, Shot, Progress | None], None]] = {
+WRITERS: dict[str, Callable[[Path, ExportJob, Progress | None], None]] = {
     ".png": _png,
     ".gif": _gif,
     ".mp4": _mp4,
     ".html": _html,
 }
-FILMS = (".gif", ".mp4")
+FILM_SUFFIXES = (".gif", ".mp4")

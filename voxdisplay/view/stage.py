@@ -17,43 +17,43 @@ from voxdisplay.view.pillow import Image, ImageDraw, ImageFont
 
 Rgb = tuple[int, int, int]
 
-GROUND: Rgb = (7, 9, 14)
+BACKGROUND: Rgb = (7, 9, 14)
 AXIS_COLORS: tuple[Rgb, Rgb, Rgb] = ((255, 84, 84), (72, 214, 112), (92, 148, 255))
 _EDGE: Rgb = (92, 104, 128)
 _FLOOR: Rgb = (60, 70, 92)
 _TEXT: Rgb = (150, 160, 180)
 # How far an axis reaches beyond the box, in longest sides: a flat grid's axes stay apart.
-_BEYOND = 0.075
+_AXIS_OVERHANG = 0.075
 # The floor has at most so many cells along the longest side.
-_CELLS = 8
+_MAX_FLOOR_CELLS = 8
 # Lines are drawn on a raster this much finer, and reduced: Pillow draws hard edges.
-_FINER = 3
+_SUPERSAMPLING = 3
 # A line fades with its distance in so many steps.
-_PIECES = 12
+_FADE_STEPS = 12
 
 
 @functools.lru_cache(maxsize=2)
-def stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
+def draw_stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
     """Draw the stage. Do not draw on it: it is kept for the next picture."""
     pen = _Pen(grid, camera, size)
-    pen.lines(_floor(grid), _FLOOR, 0.9)
-    pen.lines(_edges(grid), _EDGE, 1.0)
-    ends = tips(grid)
+    pen.lines(_floor_lines(grid), _FLOOR, 0.9)
+    pen.lines(_box_edges(grid), _EDGE, 1.0)
+    ends = axis_tips(grid)
     for tip, color in zip(ends, AXIS_COLORS, strict=True):
         pen.arrow(np.zeros(3), tip, color, 1.7)
-    image = Image.new("RGB", size, GROUND)
-    image.paste(pen.image.reduce(_FINER), pen.corner)
+    image = Image.new("RGB", size, BACKGROUND)
+    image.paste(pen.image.reduce(_SUPERSAMPLING), pen.corner)
     if labels:
-        _label(image, ends, grid, camera)
+        _draw_labels(image, ends, grid, camera)
     return image
 
 
-def tips(grid: Grid) -> Floats:
+def axis_tips(grid: Grid) -> Floats:
     """Give the points where the three axes end: rows x, y, z."""
-    return np.diag(np.array(grid) + _BEYOND * max(grid))
+    return np.diag(np.array(grid) + _AXIS_OVERHANG * max(grid))
 
 
-def _edges(grid: Grid) -> list[tuple[Floats, Floats]]:
+def _box_edges(grid: Grid) -> list[tuple[Floats, Floats]]:
     """Give the nine edges of the box that are no axes."""
     corners = [np.array(corner) * grid for corner in itertools.product((0.0, 1.0), repeat=3)]
     return [
@@ -63,11 +63,11 @@ def _edges(grid: Grid) -> list[tuple[Floats, Floats]]:
     ]
 
 
-def _floor(grid: Grid) -> list[tuple[Floats, Floats]]:
+def _floor_lines(grid: Grid) -> list[tuple[Floats, Floats]]:
     """Give lines on the floor, z = 0, a power of two voxels apart."""
     nx, ny, _ = grid
     step = 1
-    while max(grid) > _CELLS * step:
+    while max(grid) > _MAX_FLOOR_CELLS * step:
         step *= 2
     along_y = [(np.array([x, 0.0, 0.0]), np.array([x, ny, 0.0])) for x in range(step, nx, step)]
     along_x = [(np.array([0.0, y, 0.0]), np.array([nx, y, 0.0])) for y in range(step, ny, step)]
@@ -79,33 +79,37 @@ class _Pen:
 
     def __init__(self, grid: Grid, camera: Camera, size: tuple[int, int]) -> None:
         self._grid, self._camera, self._size = grid, camera, size
-        self._unit = _FINER * max(1.0, min(size) / 600)
+        self._unit = _SUPERSAMPLING * max(1.0, min(size) / 600)
         self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
         # Only as much of the picture as there are lines on, and the heads of arrows.
-        ends = np.vstack((tips(grid), list(itertools.product(*((0, side) for side in grid)))))
+        ends = np.vstack((axis_tips(grid), list(itertools.product(*((0, side) for side in grid)))))
         places = np.stack(camera.project(ends, grid, size)[:2])
-        room = 3 + 3 * self._unit / _FINER
+        room = 3 + 3 * self._unit / _SUPERSAMPLING
         low = np.clip(np.floor(places.min(axis=1) - room), 0, np.array(size) - 1).astype(int)
         high = np.clip(np.ceil(places.max(axis=1) + room), low + 1, size).astype(int)
         self.corner = int(low[0]), int(low[1])
-        width, height = ((high - low) * _FINER).tolist()
-        self.image = Image.new("RGB", (width, height), GROUND)
+        width, height = ((high - low) * _SUPERSAMPLING).tolist()
+        self.image = Image.new("RGB", (width, height), BACKGROUND)
         self._draw = ImageDraw.Draw(self.image)
 
     def _project(self, points: Floats) -> tuple[Floats, Floats]:
         x, y, scale = self._camera.project(points, self._grid, self._size)
-        return (np.stack((x, y), axis=1) - self.corner) * _FINER, scale / self._middle
+        return (np.stack((x, y), axis=1) - self.corner) * _SUPERSAMPLING, scale / self._middle
 
     def lines(self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float) -> None:
         """Draw lines whose brightness shows their distance, in a few pieces each."""
         if not ends:
             return
         starts, stops = np.array(ends).swapaxes(0, 1)[:, :, None]
-        along = starts + (stops - starts) * np.linspace(0, 1, _PIECES + 1)[:, None]
+        along = starts + (stops - starts) * np.linspace(0, 1, _FADE_STEPS + 1)[:, None]
         points, near = self._project(along.reshape(-1, 3))
         near = near.reshape(len(ends), -1)
         fade = np.clip((near[:, :-1] + near[:, 1:]) / 2 * 1.55 - 0.95, 0.12, 1)
-        mixed = np.rint(GROUND + np.subtract(color, GROUND) * fade[..., None]).astype(int).tolist()
+        mixed = (
+            np.rint(BACKGROUND + np.subtract(color, BACKGROUND) * fade[..., None])
+            .astype(int)
+            .tolist()
+        )
         thick = max(1, round(width * self._unit))
         for line, colors in zip(points.reshape(len(ends), -1, 2).tolist(), mixed, strict=True):
             for start, stop, fill in zip(line, line[1:], colors, strict=False):
@@ -127,7 +131,7 @@ class _Pen:
         self._draw.polygon([tuple(corner) for corner in head], fill=color)
 
 
-def _label(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None:
+def _draw_labels(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None:
     """Write at each axis its name and how many voxels it has."""
     draw = ImageDraw.Draw(image)
     height = max(9.0, min(image.size) / 40)

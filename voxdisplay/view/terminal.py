@@ -19,35 +19,35 @@ from typing import Any, NoReturn
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.half_blocks import CAMERA, full_color, half_blocks
-from voxdisplay.view.lit_voxels import Lit
+from voxdisplay.view.half_blocks import CAMERA, half_blocks, has_true_color
+from voxdisplay.view.lit_voxels import LitVoxels
 
 # Without a key, how soon a changed window size is seen, and how often a turning view is drawn.
-_GLANCE_S, _TURN_S = 0.25, 0.05
-_STEP, _TURN, _ZOOM = 0.1, 0.03, 1.1
+_IDLE_WAIT_S, _SPIN_WAIT_S = 0.25, 0.05
+_KEY_STEP, _SPIN_STEP, _KEY_ZOOM = 0.1, 0.03, 1.1
 # Re-reading takes a fifth of the time at most, and happens once a second at most.
-_REREAD_S, _SHARE = 1.0, 5.0
+_MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR = 1.0, 5.0
 
-_ENTER = "\x1b[?1049h\x1b[?25l\x1b[2J"
-_LEAVE = "\x1b[0m\x1b[?25h\x1b[?1049l"
+_ENTER_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[2J"
+_LEAVE_SCREEN = "\x1b[0m\x1b[?25h\x1b[?1049l"
 # The terminal shows what comes between the two at once, if it knows them.
-_BEGIN, _END = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
+_BEGIN_UPDATE, _END_UPDATE = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
 _KEY = re.compile(rb"\x1b[\[O][A-D]|[^\x1b]")
-_MOVES: dict[bytes, Callable[[Camera], Camera]] = {
-    **dict.fromkeys((b"D", b"h"), lambda camera: camera.turned(-_STEP)),
-    **dict.fromkeys((b"C", b"l"), lambda camera: camera.turned(_STEP)),
-    **dict.fromkeys((b"A", b"k"), lambda camera: camera.turned(0, _STEP)),
-    **dict.fromkeys((b"B", b"j"), lambda camera: camera.turned(0, -_STEP)),
-    **dict.fromkeys((b"+", b"="), lambda camera: camera.zoomed(_ZOOM)),
-    **dict.fromkeys((b"-", b"_"), lambda camera: camera.zoomed(1 / _ZOOM)),
+_CAMERA_KEYS: dict[bytes, Callable[[Camera], Camera]] = {
+    **dict.fromkeys((b"D", b"h"), lambda camera: camera.turned(-_KEY_STEP)),
+    **dict.fromkeys((b"C", b"l"), lambda camera: camera.turned(_KEY_STEP)),
+    **dict.fromkeys((b"A", b"k"), lambda camera: camera.turned(0, _KEY_STEP)),
+    **dict.fromkeys((b"B", b"j"), lambda camera: camera.turned(0, -_KEY_STEP)),
+    **dict.fromkeys((b"+", b"="), lambda camera: camera.zoomed(_KEY_ZOOM)),
+    **dict.fromkeys((b"-", b"_"), lambda camera: camera.zoomed(1 / _KEY_ZOOM)),
     b"0": lambda _: CAMERA,
 }
-_QUIT = (b"q", b"\x03", b"\x04")
+_QUIT_KEYS = (b"q", b"\x03", b"\x04")
 _HELP = "arrows turn  + - zoom  space spins  0 as at first  q quits"
 
 
 @dataclass
-class View:
+class TerminalView:
     """What is shown, and from where.
 
     Attributes
@@ -64,38 +64,40 @@ class View:
 
     grid: Grid
     title: str
-    read: Callable[[], Lit]
+    read: Callable[[], LitVoxels]
     changes: bool
     camera: Camera = CAMERA
     spins: bool = False
     done: bool = False
-    _lit: Lit = field(init=False)
+    _lit: LitVoxels = field(init=False)
     _next_read_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.refresh()
+        self.read_page()
 
-    def refresh(self) -> None:
+    def read_page(self) -> None:
         """Read the voxels, and decide when to do it again."""
         began_s = time.monotonic()
         self._lit = self.read()
         took_s = time.monotonic() - began_s
-        self._next_read_s = time.monotonic() + max(_REREAD_S, _SHARE * took_s)
+        self._next_read_s = time.monotonic() + max(
+            _MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR * took_s
+        )
 
     @property
-    def stale(self) -> bool:
+    def read_due(self) -> bool:
         """Whether it is time to read again."""
         return self.changes and time.monotonic() >= self._next_read_s
 
-    def press(self, keys: bytes) -> None:
+    def handle_keys(self, keys: bytes) -> None:
         """Do what keys say; what is no key of this view does nothing."""
         for found in _KEY.findall(keys):
             key = found[-1:] if len(found) > 1 else found.lower()
-            if key in _MOVES:
-                self.camera = _MOVES[key](self.camera)
+            if key in _CAMERA_KEYS:
+                self.camera = _CAMERA_KEYS[key](self.camera)
             elif key == b" ":
                 self.spins = not self.spins
-            elif key in _QUIT:
+            elif key in _QUIT_KEYS:
                 self.done = True
 
     def lines(self, columns: int, rows: int, *, full: bool) -> list[str]:
@@ -107,7 +109,7 @@ class View:
         return [*picture, words[: columns - 1]] if rows > 1 else picture
 
 
-def show(view: View) -> None:
+def run(view: TerminalView) -> None:
     """Show a view until somebody quits.
 
     Raises
@@ -122,30 +124,30 @@ def show(view: View) -> None:
         raise ValueError("the standard output is no terminal")
     if "utf" not in (sys.stdout.encoding or "").lower():
         raise ValueError(f"the terminal's encoding is {sys.stdout.encoding}, not UTF-8")
-    with _keyboard() as keyboard, _screen():
-        _loop(view, keyboard)
+    with _cbreak_keyboard() as keyboard, _alternate_screen():
+        _event_loop(view, keyboard)
 
 
-def _loop(view: View, keyboard: int) -> None:
-    full = full_color()
+def _event_loop(view: TerminalView, keyboard: int) -> None:
+    full = has_true_color()
     drawn: object = None
     while not view.done:
         size = os.get_terminal_size(sys.stdout.fileno())
         shown = size, view.camera, id(view._lit)  # noqa: SLF001
         if shown != drawn and min(size) > 0:
             lines = view.lines(size.columns, size.lines, full=full)
-            _write(_BEGIN + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END)
+            _write(_BEGIN_UPDATE + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END_UPDATE)
             drawn = shown
-        wait_s = _TURN_S if view.spins else _GLANCE_S
+        wait_s = _SPIN_WAIT_S if view.spins else _IDLE_WAIT_S
         if select.select([keyboard], [], [], wait_s)[0]:
             keys = os.read(keyboard, 1024)
             if not keys:
                 return  # the terminal is gone
-            view.press(keys)
+            view.handle_keys(keys)
         elif view.spins:
-            view.camera = view.camera.turned(_TURN)
-        if view.stale:
-            view.refresh()
+            view.camera = view.camera.turned(_SPIN_STEP)
+        if view.read_due:
+            view.read_page()
 
 
 def _write(text: str) -> None:
@@ -154,7 +156,7 @@ def _write(text: str) -> None:
 
 
 @contextlib.contextmanager
-def _keyboard() -> Iterator[int]:
+def _cbreak_keyboard() -> Iterator[int]:
     """Give a terminal's keys as they are pressed, unechoed; put it back as it was."""
     try:
         import termios  # noqa: PLC0415 - not everywhere
@@ -181,19 +183,22 @@ def _keyboard() -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def _screen() -> Iterator[None]:
+def _alternate_screen() -> Iterator[None]:
     """Take the terminal's other screen; give it back, also when told to end."""
-    before = {number: signal.signal(number, _end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    before = {
+        number: signal.signal(number, _raise_interrupt)
+        for number in (signal.SIGTERM, signal.SIGHUP)
+    }
     try:
-        _write(_ENTER)
+        _write(_ENTER_SCREEN)
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
         with contextlib.suppress(OSError):
-            _write(_LEAVE)
+            _write(_LEAVE_SCREEN)
 
 
-def _end(number: int, frame: Any) -> NoReturn:
+def _raise_interrupt(number: int, frame: Any) -> NoReturn:
     del number, frame
     raise KeyboardInterrupt

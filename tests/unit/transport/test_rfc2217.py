@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from voxdisplay.transport import rfc2217
-from voxdisplay.transport.rfc2217 import Sieve
+from voxdisplay.transport.rfc2217 import TelnetDecoder
 
 IAC = b"\xff"
 # A few bytes, of which telnet's are many: each means something else after another.
@@ -26,7 +26,7 @@ COMMANDS = st.one_of(
 def test_data_and_commands_are_parted_wherever_they_are_cut(pieces, cuts):
     sent = b"".join(data.replace(IAC, IAC + IAC) + command for data, command in pieces)
     places = sorted({0, len(sent), *(cut for cut in cuts if cut < len(sent))})
-    sieve = Sieve()
+    sieve = TelnetDecoder()
     parted = [sieve.feed(sent[a:b]) for a, b in itertools.pairwise(places)]
     assert b"".join(data for data, _ in parted) == b"".join(data for data, _ in pieces)
     assert b"".join(command for _, command in parted) == b"".join(c for _, c in pieces)
@@ -34,42 +34,42 @@ def test_data_and_commands_are_parted_wherever_they_are_cut(pieces, cuts):
 
 @given(BYTES)
 def test_anything_is_taken(noise):
-    Sieve().feed(noise)
+    TelnetDecoder().feed(noise)
 
 
 def test_an_end_without_a_beginning_is_nothing():
-    assert Sieve().feed(b"a\xff\xf0b") == (b"ab", b"")
+    assert TelnetDecoder().feed(b"a\xff\xf0b") == (b"ab", b"")
 
 
 @pytest.fixture
-def sieved():
+def command_socket():
     ours, theirs = socket.socketpair()
     with theirs:
-        sieved = rfc2217._Sieved(ours)
-        yield sieved, theirs
-        sieved.close()
+        command_socket = rfc2217._CommandSocket(ours)
+        yield command_socket, theirs
+        command_socket.close()
 
 
-def test_no_more_is_taken_than_is_read(sieved, monkeypatch):
-    monkeypatch.setattr(rfc2217, "_MOST_BYTES", 10)
-    sieved, theirs = sieved
-    reader = threading.Thread(target=sieved.recv, args=(1,))
+def test_no_more_is_taken_than_is_read(command_socket, monkeypatch):
+    monkeypatch.setattr(rfc2217, "_MAX_BUFFERED_BYTES", 10)
+    command_socket, theirs = command_socket
+    reader = threading.Thread(target=command_socket.recv, args=(1,))
     reader.start()
     theirs.sendall(b"0123456789")
-    assert sieved.take(10, 20) == b"0123456789"
+    assert command_socket.read_data(10, 20) == b"0123456789"
     theirs.sendall(b"0123456789ab")
-    assert sieved.take(5, 20) == b"01234"
-    assert sieved.take(7, 20) == b"56789ab"
+    assert command_socket.read_data(5, 20) == b"01234"
+    assert command_socket.read_data(7, 20) == b"56789ab"
     theirs.close()
     reader.join(20)
     assert not reader.is_alive()
 
 
-def test_who_waits_is_woken_at_the_end_and_gets_what_has_come(sieved):
-    sieved, theirs = sieved
+def test_who_waits_is_woken_at_the_end_and_gets_what_has_come(command_socket):
+    command_socket, theirs = command_socket
     theirs.sendall(b"bye\xff\xf1")
-    assert sieved.recv(1) == b"\xff\xf1"
-    threading.Timer(0.01, sieved.end).start()
-    assert sieved.take(5, 20) == b"bye"
+    assert command_socket.recv(1) == b"\xff\xf1"
+    threading.Timer(0.01, command_socket.mark_ended).start()
+    assert command_socket.read_data(5, 20) == b"bye"
     with pytest.raises(serial.SerialException, match="closed the connection"):
-        sieved.take(1, 20)
+        command_socket.read_data(1, 20)

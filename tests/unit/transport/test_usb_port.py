@@ -1,6 +1,7 @@
 """``usb:`` ports: which display is meant, and what is said when it cannot be had."""
 
 import errno
+import os
 import re
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport import open_transport, usb_access
 from voxdisplay.transport import usb as port_module
 from voxdisplay.transport.discovery import all_ports
-from voxdisplay.transport.usb import UsbTransport, found
+from voxdisplay.transport.usb import UsbTransport, usb_ports
 
 ROOT = Path(__file__).parents[3]
 
@@ -118,7 +119,7 @@ def test_names_that_are_none(name):
 
 def test_it_is_listed(plug):
     plug(GadgetDevice("B\x1b[2J"), GadgetDevice("A"), printer())
-    first, second = found()
+    first, second = usb_ports()
     assert (first.port, first.description) == ("usb:1209:0001:A", "gadget")
     assert (first.vid, first.pid, first.serial_number) == (0x1209, 1, "A")
     assert "\x1b" not in second.port
@@ -126,7 +127,7 @@ def test_it_is_listed(plug):
 
 
 def test_the_rule_that_is_shown_is_the_one_that_is_brought():
-    said = usb_access.forbidden("usb:")
+    said = usb_access.permission_error("usb:")
     assert str(said) == "usb: may not be opened"
     (rule,) = re.findall("echo '(.*)' [|] sudo tee", said.hint)
     assert rule in (ROOT / "tools/udev/70-voxdisplay.rules").read_text().splitlines()
@@ -151,14 +152,14 @@ def test_a_display_that_may_not_be_opened(monkeypatch, name):
     message, hint = refused(name)
     assert message == f"{name} may not be opened"
     assert "uaccess" in hint
-    (listed,) = found()
+    (listed,) = usb_ports()
     assert listed.port == "usb:1209:0001"
     assert listed.serial_number is None
 
 
 def test_elsewhere_the_way_to_be_allowed_is_not_known(monkeypatch):
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert "udev" not in usb_access.forbidden("usb:").hint
+    assert "udev" not in usb_access.permission_error("usb:").hint
 
 
 def test_a_system_without_a_driver_for_it(monkeypatch):
@@ -185,7 +186,7 @@ def test_a_device_that_cannot_be_looked_at_is_passed_over(monkeypatch):
 
     backend.get_configuration_descriptor = refuse
     monkeypatch.setattr(port_module, "find_backend", lambda port: backend)  # noqa: ARG005
-    assert [port.port for port in found()] == ["usb:1209:0001:B"]
+    assert [port.port for port in usb_ports()] == ["usb:1209:0001:B"]
 
 
 def test_it_gives_the_configuration_that_is_missing(plug):
@@ -225,16 +226,18 @@ def test_busy_and_by_whom(plug, monkeypatch, tmp_path):
     assert refused("usb:")[0] == "usb: is busy"
     node = tmp_path / "001" / "001"
     node.parent.mkdir()
-    node.symlink_to("/dev/null")  # a device that a program has open
+    master, slave = os.openpty()  # a device that only the other process has open
+    node.symlink_to(os.ttyname(slave))
     monkeypatch.setattr(usb_access, "_NODES", tmp_path)
     command = [sys.executable, "-c", "input()"]
     with (
-        Path("/dev/null").open("rb") as null,
-        subprocess.Popen(command, stdin=subprocess.PIPE, stderr=null, text=True) as holder,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stderr=slave, text=True) as holder,
     ):
+        os.close(slave)
         message = refused("usb:")[0]
         holder.communicate("\n")
     assert message.startswith("usb: is busy: ")
+    os.close(master)
     assert f"(process {holder.pid})" in message
     transport.close()
 
@@ -328,7 +331,7 @@ def test_without_libusb(monkeypatch):
     message, hint = refused("usb:")
     assert "no libusb" in message
     assert "pip install 'voxdisplay[usb]'" in hint
-    assert found() == []
+    assert usb_ports() == []
 
 
 def test_the_systems_libusb_where_there_is_no_package(monkeypatch):

@@ -15,7 +15,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.picture import Look, picture_of
+from voxdisplay.view.picture import RenderOptions, render_voxels
 
 GRID = Grid(3, 5, 7)
 SIZE = (161, 121)  # odd, which films do not like
@@ -26,7 +26,9 @@ COUNT = 9
 def turn():
     array = np.zeros((*GRID.array_shape, 3), np.uint8)
     array[0, 0, 0], array[0, 0, 2] = (255, 160, 0), (0, 200, 255)
-    return Turntable(lit_voxels(array, GRID, PixelFormat.RGB888), GRID, Look(size=SIZE), COUNT)
+    return Turntable(
+        lit_voxels(array, GRID, PixelFormat.RGB888), GRID, RenderOptions(size=SIZE), COUNT
+    )
 
 
 def local_palettes(data):
@@ -67,7 +69,7 @@ def test_a_gif_turns_once_with_one_palette(turn, tmp_path):
 
 
 def test_the_turn_begins_where_the_camera_is_and_closes(turn):
-    first = picture_of(turn._lit, GRID, Look(size=SIZE), turn._exposure)
+    first = render_voxels(turn._lit, GRID, RenderOptions(size=SIZE), turn._exposure)
     assert turn[0].tobytes() == first.tobytes()
     assert len(turn) == COUNT
     assert len({picture.tobytes() for picture in turn}) == COUNT
@@ -80,13 +82,13 @@ def test_the_turn_begins_where_the_camera_is_and_closes(turn):
 def test_progress_is_told():
     told = []
     lit = lit_voxels(np.ones((7, 5, 3), np.uint8), GRID, PixelFormat.MONO1)
-    list(Turntable(lit, GRID, Look(size=SIZE), 3, lambda *done: told.append(done)))
+    list(Turntable(lit, GRID, RenderOptions(size=SIZE), 3, lambda *done: told.append(done)))
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_nothing_lit_is_a_film_too(tmp_path):
     lit = lit_voxels(np.zeros((7, 5, 3), np.uint8), GRID, PixelFormat.MONO1)
-    save_gif(tmp_path / "x.gif", Turntable(lit, GRID, Look(size=SIZE), 1), fps=20)
+    save_gif(tmp_path / "x.gif", Turntable(lit, GRID, RenderOptions(size=SIZE), 1), fps=20)
     with Image.open(tmp_path / "x.gif") as film:
         assert film.size == SIZE
 

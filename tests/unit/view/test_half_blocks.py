@@ -8,10 +8,10 @@ import pytest
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.view.half_blocks import CAMERA, RESET, full_color, half_blocks
+from voxdisplay.view.half_blocks import CAMERA, RESET, half_blocks, has_true_color
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.picture import Look, picture_of
-from voxdisplay.view.stage import GROUND
+from voxdisplay.view.picture import RenderOptions, render_voxels
+from voxdisplay.view.stage import BACKGROUND
 
 GRID = Grid(3, 5, 7)
 COLUMNS, ROWS = 60, 20
@@ -60,8 +60,8 @@ def test_a_voxel_is_in_the_cell_that_the_camera_names():
 def test_it_is_the_picture_two_rows_a_line():
     voxels = lit((2, 4, 6), (0, 0, 0))
     characters, pixels = screen(half_blocks(voxels, GRID, COLUMNS, ROWS))
-    look = Look(size=(2 * COLUMNS, 4 * ROWS), camera=CAMERA, labels=False)
-    meant = np.asarray(picture_of(voxels, GRID, look).reduce(2))
+    look = RenderOptions(size=(2 * COLUMNS, 4 * ROWS), camera=CAMERA, labels=False)
+    meant = np.asarray(render_voxels(voxels, GRID, look).reduce(2))
     for row, column in np.ndindex(2 * ROWS, COLUMNS):
         if characters[row // 2][column] not in "xyz":
             assert pixels[row, column] == "2;{};{};{}".format(*meant[row, column])
@@ -87,13 +87,13 @@ def test_256_colours():
     found = {int(re.fullmatch(r"5;(\d+)", code)[1]) for code in pixels.ravel().tolist()}
     assert found <= set(range(16, 256))
     assert len(found) > 10
-    assert pixels[0, 0] == "5;232", f"the darkest grey is nearest to the ground, {GROUND}"
+    assert pixels[0, 0] == "5;232", f"the darkest grey is nearest to the ground, {BACKGROUND}"
 
 
 @pytest.mark.parametrize(("said", "full"), [("truecolor", True), ("24bit", True), ("", False)])
 def test_what_the_terminal_says_of_its_colours(said, full):
-    assert full_color({"COLORTERM": said}) is full
-    assert full_color({}) is False
+    assert has_true_color({"COLORTERM": said}) is full
+    assert has_true_color({}) is False
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(8, 8), (200, 3), (9, 60)])

@@ -28,10 +28,10 @@ from firmware_sim.device import Device
 from firmware_sim.tap import Tap
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
-from voxdisplay.view.live.message import Moment, encode
-from voxdisplay.view.live.page import page as page_text
+from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.page import page_html as page_text
 from voxdisplay.view.live.server import open_server
-from voxdisplay.view.live.sources import DisplaySource, StillSource, TapSource
+from voxdisplay.view.live.sources import DisplaySource, StaticSource, TapSource
 
 WAIT = 20
 GRID = vd.Grid(3, 5, 7)
@@ -87,7 +87,7 @@ def test_a_message_has_every_voxel(format_, size, density, seed):
     top = 2 if format_ is vd.PixelFormat.MONO1 else np.iinfo(format_.dtype).max + 1
     page = rng.integers(1, top, shape).astype(format_.dtype)
     page[rng.random(grid.array_shape) >= density] = 0
-    head, got = read_back(encode(Moment(page, grid, format_, 12, "a", 0xBEEF, {"Lost": 3})))
+    head, got = read_back(encode(Snapshot(page, grid, format_, 12, "a", 0xBEEF, {"Lost": 3})))
     assert np.array_equal(got, page)
     assert (head["number"], head["title"], head["digest"]) == (12, "a", "0000beef")
     assert head["counters"] == {"Lost": 3}
@@ -96,12 +96,12 @@ def test_a_message_has_every_voxel(format_, size, density, seed):
 def test_a_message_has_the_palette():
     palette = vd.Frame(GRID, "index8").palette
     page = np.zeros(GRID.array_shape, np.uint8)
-    plain, _ = read_back(encode(Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "")))
+    plain, _ = read_back(encode(Snapshot(page, GRID, vd.PixelFormat.INDEX8, 1, "")))
     assert np.array_equal(plain["palette"], palette)
     assert plain["own"] == []
     palette[[3, 200]] = (1, 2, 3), (4, 5, 6)
-    moment = Moment(page, GRID, vd.PixelFormat.INDEX8, 1, "", palette=palette)
-    own, _ = read_back(encode(moment))
+    snapshot = Snapshot(page, GRID, vd.PixelFormat.INDEX8, 1, "", palette=palette)
+    own, _ = read_back(encode(snapshot))
     assert np.array_equal(own["palette"], palette)
     assert own["own"] == [3, 200]
 
@@ -118,22 +118,22 @@ def test_a_tap_is_read():
     with Tap(device) as tap:
         device.on_swap = tap.notice
         source = TapSource(*parse_address(tap.address), "title")
-        _, moment = source.next()
-        assert (moment.grid, moment.format, moment.digest) == (GRID, vd.PixelFormat.RGB565, 0)
+        _, snapshot = source.next()
+        assert (snapshot.grid, snapshot.format, snapshot.digest) == (GRID, vd.PixelFormat.RGB565, 0)
         device.memory.back.put(17, b"\x34\x12")
         with device.showing:
             device.memory.swap()
             device.swaps += 1
         tap.notice()
-        (boot, swaps), moment = source.next()
-        assert (boot, swaps, moment.number, moment.title) == (9, 1, 1, "title")
-        assert np.flatnonzero(moment.page).tolist() == [17]
-        assert moment.page.flat[17] == 0x1234
-        source.check()
-        source.forget()
+        (boot, swaps), snapshot = source.next()
+        assert (boot, swaps, snapshot.number, snapshot.title) == (9, 1, 1, "title")
+        assert np.flatnonzero(snapshot.page).tolist() == [17]
+        assert snapshot.page.flat[17] == 0x1234
+        source.check_alive()
+        source.resend()
         assert source.next()[0] == (9, 1)
     with pytest.raises(TransportClosed, match="is gone"):
-        source.check()
+        source.check_alive()
     with pytest.raises(TransportClosed, match="is gone"):
         source.next()
     source.close()
@@ -146,9 +146,9 @@ def test_a_tap_brings_the_palette():
     device.memory.front.palette[9:12] = b"\x01\x02\x04"
     with Tap(device) as tap:
         source = TapSource(*parse_address(tap.address), "")
-        _, moment = source.next()
-        assert moment.palette[3].tolist() == [1, 2, 4]
-        assert np.array_equal(moment.palette[4:], vd.Frame(GRID, "index8").palette[4:])
+        _, snapshot = source.next()
+        assert snapshot.palette[3].tolist() == [1, 2, 4]
+        assert np.array_equal(snapshot.palette[4:], vd.Frame(GRID, "index8").palette[4:])
         source.close()
 
 
@@ -184,18 +184,18 @@ class Panel:
 
 @pytest.mark.parametrize("digest", [True, False])
 def test_a_display_is_read_when_it_shows_something_else(digest, monkeypatch):
-    monkeypatch.setattr("voxdisplay.view.live.sources._BLIND_POLL_S", 0.001)
+    monkeypatch.setattr("voxdisplay.view.live.sources._FULL_READ_POLL_S", 0.001)
     monkeypatch.setattr("voxdisplay.view.live.sources._POLL_S", 0.001)
     panel = Panel(digest=digest)
     source = DisplaySource(panel, GRID, vd.PixelFormat.INDEX8, lambda: {"Bytes sent": 5})
-    key, moment = source.next()
-    assert (moment.number, moment.counters, moment.title) == (1, {"Bytes sent": 5}, "panel")
+    key, snapshot = source.next()
+    assert (snapshot.number, snapshot.counters, snapshot.title) == (1, {"Bytes sent": 5}, "panel")
     threading.Timer(0.05, lambda: panel.page.fill(7)).start()
-    other, moment = source.next()
+    other, snapshot = source.next()
     assert other != key
-    assert moment.page.all()
+    assert snapshot.page.all()
     assert panel.reads == 2 or not digest
-    source.forget()
+    source.resend()
     assert source.next()[0] == other
     source.close()
     with pytest.raises(TransportClosed):
@@ -229,7 +229,7 @@ def served(source, host="127.0.0.1"):
 
 def still(value=7, number=1):
     page = np.full((7, 5, 3), value, np.uint8)
-    return Moment(page, GRID, vd.PixelFormat.INDEX8, number, "still")
+    return Snapshot(page, GRID, vd.PixelFormat.INDEX8, number, "still")
 
 
 class Pushed:
@@ -255,10 +255,10 @@ class Pushed:
             raise TransportClosed("over")
         return self._shown, still(number=self._shown)
 
-    def forget(self):
+    def resend(self):
         self._shown = 0
 
-    def check(self):
+    def check_alive(self):
         pass
 
     def close(self):
@@ -277,7 +277,7 @@ def fetch(url, **headers):
 
 
 def test_what_is_served():
-    with served(StillSource(still())) as url:
+    with served(StaticSource(still())) as url:
         status, headers, body = fetch(url)
         assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
         assert body.startswith(b"<!doctype html>")
@@ -292,7 +292,7 @@ def test_what_is_served():
 
 def test_only_its_own_names_are_answered():
     """A name that an attacker lets point here is none of them; a number cannot be."""
-    with served(StillSource(still())) as url:
+    with served(StaticSource(still())) as url:
         for host in (
             "evil.example",
             "evil.example:80",
@@ -307,7 +307,7 @@ def test_only_its_own_names_are_answered():
 
 
 def test_pages_of_other_sites_get_no_frames():
-    with served(StillSource(still())) as url:
+    with served(StaticSource(still())) as url:
         live = url.replace("http", "ws") + "live"
         for origin in ("http://evil.example", "null", "http://127.0.0.1:1", url.rstrip("/") + "0"):
             with pytest.raises(InvalidStatus) as refused, connect(live, origin=origin):
@@ -386,7 +386,7 @@ def test_two_hundred_that_never_read_are_sent_two_pictures_each(monkeypatch):
 
 
 def test_who_says_more_than_it_has_shown_is_sent_away():
-    with served(StillSource(still())) as url:
+    with served(StaticSource(still())) as url:
         with connect(url.replace("http", "ws") + "live") as browser:
             browser.recv(WAIT)
             for _ in range(3):
@@ -434,7 +434,7 @@ def test_the_end_of_a_source_is_the_end_of_the_view():
         async with open_server(source, "127.0.0.1", 0) as server:
             looking = asyncio.create_task(asyncio.to_thread(look, server.url))
             with pytest.raises(TransportClosed, match="over"):
-                await server.ended()
+                await server.wait_until_ended()
         await looking
 
     asyncio.run(asyncio.wait_for(serve(), WAIT))

@@ -13,14 +13,14 @@ import voxdisplay as vd
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.camera import Camera
-from voxdisplay.view.glow import gather
+from voxdisplay.view.glow import accumulate_light
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.picture import Look, picture, picture_of
+from voxdisplay.view.picture import RenderOptions, render_page, render_voxels
 
 GRIDS = [Grid(3, 5, 7), Grid(300, 4, 3), Grid(9, 64, 33), Grid(128, 128, 128)]
 CAMERAS = [Camera(), Camera(2.5, -0.3, 1.9), Camera(0, 0)]
 RGB = PixelFormat.RGB888
-BARE = Look(glow=False, axes=False)
+BARE = RenderOptions(glow=False, axes=False)
 
 
 def page(grid, voxels, format_=RGB, color=(255, 255, 255)):
@@ -33,8 +33,8 @@ def page(grid, voxels, format_=RGB, color=(255, 255, 255)):
 
 def light_of(grid, voxels, look=BARE, **how):
     """How bright each pixel is, less the ground: (H, W)."""
-    drawn = np.asarray(picture(page(grid, voxels, **how), grid, how.get("format_", RGB), look))
-    empty = np.asarray(picture(page(grid, []), grid, RGB, look))
+    drawn = np.asarray(render_page(page(grid, voxels, **how), grid, how.get("format_", RGB), look))
+    empty = np.asarray(render_page(page(grid, []), grid, RGB, look))
     return (drawn.astype(int) - empty).max(axis=2)
 
 
@@ -47,7 +47,7 @@ def middle_of(light):
 @pytest.mark.parametrize("grid", GRIDS, ids=str)
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_voxel_lands_on_the_pixel_that_the_camera_names(grid, camera):
-    look = Look(glow=False, axes=False, camera=camera)
+    look = RenderOptions(glow=False, axes=False, camera=camera)
     for voxel in [(0, 0, 0), (grid.nx - 1, grid.ny // 2, grid.nz - 1), (1, grid.ny - 1, 1)]:
         light = light_of(grid, [voxel], look)
         (x,), (y,), (scale,) = camera.project([np.array(voxel) + 0.5], grid, look.size)
@@ -77,7 +77,7 @@ def test_every_format_shows_the_same_place_and_its_colour(format_):
     grid, voxel = Grid(3, 5, 7), (2, 1, 5)
     array = page(grid, [voxel], format_, (255, 0, 0))
     (x,), (y,), _ = Camera().project([np.array(voxel) + 0.5], grid, (800, 600))
-    drawn = np.asarray(picture(array, grid, format_, BARE)).astype(int)
+    drawn = np.asarray(render_page(array, grid, format_, BARE)).astype(int)
     red, green, _ = drawn[int(y), int(x)]
     assert red > 200
     assert green > 200 if format_ is PixelFormat.MONO1 else green < red - 60
@@ -89,7 +89,7 @@ def test_light_adds_up_and_nothing_hides_anything():
 
     def light(*voxels):
         lit = lit_voxels(page(grid, voxels), grid, RGB)
-        glare = gather(lit, grid, camera, (800, 600))
+        glare = accumulate_light(lit, grid, camera, (800, 600))
         full = np.zeros((600, 800))
         high, wide = glare.light.shape[1:]
         full[glare.top : glare.top + high, glare.left : glare.left + wide] = glare.light[0]
@@ -105,7 +105,7 @@ def test_a_dense_volume_is_not_burnt_out():
     z, y, x = np.indices(grid.array_shape) - 23.5
     array = np.zeros((*grid.array_shape, 3), np.uint8)
     array[x**2 + y**2 + z**2 < 22**2] = (60, 140, 255)
-    drawn = np.asarray(picture(array, grid, RGB)).astype(int)
+    drawn = np.asarray(render_page(array, grid, RGB)).astype(int)
     assert (drawn.min(axis=2) > 240).mean() < 0.001, "it is blue, not white"
     assert (drawn[..., 2] > 150).mean() > 0.05, "and it is bright"
 
@@ -118,8 +118,8 @@ def test_one_dim_voxel_is_seen():
 def test_the_box_and_the_axes_are_drawn_and_labelled():
     grid = Grid(3, 5, 7)
     empty = page(grid, [])
-    stage = np.asarray(picture(empty, grid, RGB)).astype(int)
-    bare = np.asarray(picture(empty, grid, RGB, BARE)).astype(int)
+    stage = np.asarray(render_page(empty, grid, RGB)).astype(int)
+    bare = np.asarray(render_page(empty, grid, RGB, BARE)).astype(int)
     assert (bare == bare[0, 0]).all()
     red = (stage[..., 0] > 200) & (stage[..., 1] < 120)
     green = (stage[..., 1] > 180) & (stage[..., 0] < 120)
@@ -135,10 +135,10 @@ def test_the_box_and_the_axes_are_drawn_and_labelled():
 def test_the_labels_are_inside_the_picture_from_everywhere():
     grid = Grid(100, 2, 60)
     for yaw in np.linspace(-3, 3, 7):
-        look = Look(size=(240, 180), camera=Camera(yaw, 0.3))
-        with_labels = np.asarray(picture(page(grid, []), grid, RGB, look)).astype(int)
-        plain = Look(size=(240, 180), camera=Camera(yaw, 0.3), labels=False)
-        without = np.asarray(picture(page(grid, []), grid, RGB, plain)).astype(int)
+        look = RenderOptions(size=(240, 180), camera=Camera(yaw, 0.3))
+        with_labels = np.asarray(render_page(page(grid, []), grid, RGB, look)).astype(int)
+        plain = RenderOptions(size=(240, 180), camera=Camera(yaw, 0.3), labels=False)
+        without = np.asarray(render_page(page(grid, []), grid, RGB, plain)).astype(int)
         written = np.argwhere((with_labels != without).any(axis=2))
         assert len(written) > 50
         assert written.min() >= 1
@@ -147,11 +147,11 @@ def test_the_labels_are_inside_the_picture_from_everywhere():
 
 def test_the_picture_kept_for_the_next_one_is_not_drawn_on():
     grid = Grid(3, 5, 7)
-    drawn = picture(page(grid, []), grid, RGB)
+    drawn = render_page(page(grid, []), grid, RGB)
     before = drawn.tobytes()
     drawn.paste((255, 255, 255), (0, 0, 800, 600))
-    picture(page(grid, [(1, 1, 1)]), grid, RGB)
-    assert picture(page(grid, []), grid, RGB).tobytes() == before
+    render_page(page(grid, [(1, 1, 1)]), grid, RGB)
+    assert render_page(page(grid, []), grid, RGB).tobytes() == before
 
 
 @settings(max_examples=25, deadline=None)
@@ -167,14 +167,16 @@ def test_any_grid_from_anywhere_is_a_picture(sides, size, yaw, pitch, distance, 
     grid, rng = Grid(*sides), np.random.default_rng(seed)
     array = rng.integers(0, 256, (*grid.array_shape, 3), dtype=np.uint8)
     array[rng.random(grid.array_shape) < 0.9] = 0
-    drawn = picture(array, grid, RGB, Look(size=size, camera=Camera(yaw, pitch, distance)))
+    drawn = render_page(
+        array, grid, RGB, RenderOptions(size=size, camera=Camera(yaw, pitch, distance))
+    )
     assert (drawn.mode, drawn.size) == ("RGB", size)
 
 
 def test_a_shared_exposure_is_kept():
     grid = Grid(9, 9, 9)
     lit = lit_voxels(page(grid, [(4, 4, 4)]), grid, RGB)
-    dark, bright = (np.asarray(picture_of(lit, grid, BARE, e)).max() for e in (0.05, 2.0))
+    dark, bright = (np.asarray(render_voxels(lit, grid, BARE, e)).max() for e in (0.05, 2.0))
     assert dark < bright
 
 
@@ -183,4 +185,4 @@ def test_a_frame_is_a_png_in_a_notebook():
     frame.draw(np.array([[1, 1, 1]]), "orange")
     image = Image.open(io.BytesIO(frame._repr_png_()))
     assert (image.format, image.size) == ("PNG", (800, 600))
-    assert image.convert("RGB").tobytes() == picture(frame.array(), frame.grid, RGB).tobytes()
+    assert image.convert("RGB").tobytes() == render_page(frame.array(), frame.grid, RGB).tobytes()

@@ -9,18 +9,21 @@ from PIL import Image
 from voxdisplay.cli.image_output import SUFFIXES
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.view.picture import Look, picture
-from voxdisplay.view.save import FILMS, WRITERS, Shot, replacing, save
+from voxdisplay.view.atomic_write import atomic_write
+from voxdisplay.view.picture import RenderOptions, render_page
+from voxdisplay.view.save import FILM_SUFFIXES, WRITERS, ExportJob, save
 
 GRID = Grid(3, 5, 7)
 PAGE = np.zeros((7, 5, 3, 3), np.uint8)
 PAGE[6, 4, 2] = (255, 128, 0)
-SHOT = Shot(PAGE, GRID, PixelFormat.RGB888, Look(size=(160, 120)), seconds=0.2, fps=20)
+SHOT = ExportJob(
+    PAGE, GRID, PixelFormat.RGB888, RenderOptions(size=(160, 120)), seconds=0.2, fps=20
+)
 
 
 def test_the_command_line_knows_what_can_be_written():
     assert tuple(WRITERS) == SUFFIXES
-    assert set(FILMS) < set(WRITERS)
+    assert set(FILM_SUFFIXES) < set(WRITERS)
 
 
 def test_a_png_is_the_picture(tmp_path):
@@ -28,7 +31,7 @@ def test_a_png_is_the_picture(tmp_path):
     save(path, SHOT)
     image = Image.open(path)
     assert image.format == "PNG"
-    meant = picture(PAGE, GRID, PixelFormat.RGB888, Look(size=(160, 120)))
+    meant = render_page(PAGE, GRID, PixelFormat.RGB888, RenderOptions(size=(160, 120)))
     assert image.convert("RGB").tobytes() == meant.tobytes()
     assert [each.name for each in tmp_path.iterdir()] == ["x.PNG"]
 
@@ -49,7 +52,7 @@ def test_who_has_the_old_file_open_keeps_it_whole(tmp_path):
 
 
 def write_and_fail(path):
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_bytes(b"half")
         raise OSError("no space left")
 
@@ -66,7 +69,7 @@ def test_what_fails_leaves_the_old_file_alone(tmp_path):
 def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "real.png").write_bytes(b"old")
     (tmp_path / "link.png").symlink_to("real.png")
-    with replacing(tmp_path / "link.png") as unfinished:
+    with atomic_write(tmp_path / "link.png") as unfinished:
         unfinished.write_bytes(b"new")
     assert (tmp_path / "link.png").is_symlink()
     assert (tmp_path / "real.png").read_bytes() == b"new"
@@ -75,6 +78,6 @@ def test_a_link_stays_a_link(tmp_path):
 def test_what_is_no_ordinary_file_is_not_replaced(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with replacing(pipe) as unfinished:
+    with atomic_write(pipe) as unfinished:
         assert unfinished == pipe
     assert pipe.is_fifo()

@@ -33,8 +33,8 @@ _OFFSET = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
-class Moment:
-    """What a display shows at a moment.
+class Snapshot:
+    """What a display shows at a snapshot.
 
     Attributes
     ----------
@@ -65,10 +65,10 @@ class Moment:
     palette: Colors | None = None
 
 
-def encode(moment: Moment) -> bytes:
+def encode(snapshot: Snapshot) -> bytes:
     """Write a message."""
-    grid = moment.grid
-    voxels = lit_voxels(moment.page, grid, moment.format).positions
+    grid = snapshot.grid
+    voxels = lit_voxels(snapshot.page, grid, snapshot.format).positions
     wide = max(grid) > 256
     bitmap = grid.voxels / 8 < voxels.nbytes / (1 if wide else 2)
     if bitmap:
@@ -77,32 +77,34 @@ def encode(moment: Moment) -> bytes:
         places = np.packbits(lit, bitorder="little").tobytes()
     else:
         places = voxels.T.astype("<u2" if wide else "u1").tobytes()
-    palette = Palette(moment.palette)
+    palette = Palette(snapshot.palette)
     head = json.dumps(
         {
-            "number": moment.number,
-            "title": moment.title,
+            "number": snapshot.number,
+            "title": snapshot.title,
             "size": list(grid),
-            "format": moment.format.value,
+            "format": snapshot.format.value,
             "voxels": len(voxels),
-            "digest": None if moment.digest is None else f"{moment.digest:08x}",
-            "counters": dict(moment.counters),
+            "digest": None if snapshot.digest is None else f"{snapshot.digest:08x}",
+            "counters": dict(snapshot.counters),
             "bitmap": bitmap,
             "wide": wide,
             "own": palette.differs_from(DEFAULT).tolist(),
         }
     ).encode()
     head += b" " * (-(len(head) + _OFFSET.size) % 8)
-    return _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(moment, voxels, palette)
+    return (
+        _OFFSET.pack(_OFFSET.size + len(head)) + head + places + _planes(snapshot, voxels, palette)
+    )
 
 
-def _planes(moment: Moment, voxels: NDArray[np.integer], palette: Palette) -> bytes:
+def _planes(snapshot: Snapshot, voxels: NDArray[np.integer], palette: Palette) -> bytes:
     """Give the pixel values of voxels, byte by byte, and what they mean."""
-    if moment.format is PixelFormat.MONO1:
+    if snapshot.format is PixelFormat.MONO1:
         return b""
     x, y, z = voxels.T
-    values = moment.page[z, y, x].T
-    if moment.format is PixelFormat.RGB565:
+    values = snapshot.page[z, y, x].T
+    if snapshot.format is PixelFormat.RGB565:
         values = np.stack((values & 0xFF, values >> 8))
     planes = bytes(values.astype("u1").tobytes())
-    return planes + palette.colors.T.tobytes() if moment.format is PixelFormat.INDEX8 else planes
+    return planes + palette.colors.T.tobytes() if snapshot.format is PixelFormat.INDEX8 else planes

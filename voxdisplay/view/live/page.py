@@ -14,13 +14,13 @@ from importlib.resources import files
 
 
 @functools.cache
-def page() -> str:
+def page_html() -> str:
     """Give the page."""
     return files(__package__).joinpath("page.html").read_text(encoding="utf-8")
 
 
 @functools.cache
-def policy(connect: str = "'none'") -> str:
+def content_security_policy(connect: str = "'none'") -> str:
     """Give the content security policy under which the page works.
 
     Parameters
@@ -44,6 +44,6 @@ def policy(connect: str = "'none'") -> str:
 
 def _hash(tag: str) -> str:
     """Name the one inline script or style that is ours."""
-    match = re.search(rf"<{tag}>(.*?)</{tag}>", page(), re.DOTALL)
+    match = re.search(rf"<{tag}>(.*?)</{tag}>", page_html(), re.DOTALL)
     assert match  # noqa: S101 - the page is ours too
     return f"'sha256-{base64.b64encode(hashlib.sha256(match[1].encode()).digest()).decode()}'"

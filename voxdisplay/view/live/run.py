@@ -33,6 +33,6 @@ def run(source: Source, host: str, port: int, announce: Callable[[str], object])
     async def serve() -> None:
         async with open_server(source, host, port) as server:
             announce(server.url)
-            await server.ended()
+            await server.wait_until_ended()
 
     asyncio.run(serve())

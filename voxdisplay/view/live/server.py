@@ -20,10 +20,10 @@ from http import HTTPStatus
 from urllib.parse import urlsplit
 
 from voxdisplay.errors import MissingExtra
-from voxdisplay.view.live.message import Moment, encode
-from voxdisplay.view.live.page import page, policy
+from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.page import content_security_policy, page_html
 from voxdisplay.view.live.sources import Source
-from voxdisplay.view.picture import picture
+from voxdisplay.view.picture import render_page
 
 try:
     from websockets.asyncio.server import Server, ServerConnection, serve
@@ -36,26 +36,26 @@ except ModuleNotFoundError as error:
         hint="pip install 'voxdisplay[view]'",
     ) from error
 
-_UNDER_WAY = 2
-_IDLE_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
-_END_S = 2.0  # how long the source may take to end
-_LONGEST_WORD = 64  # a browser has little to say
+_MAX_IN_FLIGHT = 2
+_IDLE_CHECK_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
+_STOP_TIMEOUT_S = 2.0  # how long the source may take to end
+_MAX_MESSAGE_BYTES = 64  # a browser has little to say
 
 
-class _Newest:
+class _LatestSnapshot:
     """The newest picture. Those that it has replaced are forgotten."""
 
     def __init__(self) -> None:
         self.serial = 0
         self.message = b""
-        self.moment: Moment | None = None
+        self.snapshot: Snapshot | None = None
         self.wanted = threading.Event()  # for the source's thread: somebody waits
         self._key: Hashable = None
         self._fresh = False  # nothing else can have been on display since
         self._waiting = 0
         self._changed = asyncio.Event()
 
-    async def after(self, serial: int) -> int:
+    async def wait_for_newer(self, serial: int) -> int:
         """Wait for a picture other than one; give its serial."""
         self._waiting += 1
         self.wanted.set()
@@ -68,16 +68,16 @@ class _Newest:
                 self.wanted.clear()
         return self.serial
 
-    def put(self, key: Hashable, moment: Moment, message: bytes) -> None:
+    def update(self, key: Hashable, snapshot: Snapshot, message: bytes) -> None:
         """Take what is on display now."""
         self._fresh = True
         if key != self._key:
-            self._key, self.moment, self.message = key, moment, message
+            self._key, self.snapshot, self.message = key, snapshot, message
             self.serial += 1
         self._changed.set()
         self._changed = asyncio.Event()
 
-    def doubt(self) -> None:
+    def mark_stale(self) -> None:
         """Take note that nobody looks at the display for a while."""
         self._fresh = False
 
@@ -96,68 +96,68 @@ class LiveServer:
         self.url = ""
         self._name = name
         self._source = source
-        self._newest = _Newest()
+        self._latest = _LatestSnapshot()
         self._closing = False
         self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._thread = threading.Thread(
-            target=self._watch, args=(asyncio.get_running_loop(),), name="source", daemon=True
+            target=self._run_source, args=(asyncio.get_running_loop(),), name="source", daemon=True
         )
 
-    async def ended(self) -> None:
+    async def wait_until_ended(self) -> None:
         """Wait until the source has no more pictures, and raise what it raised."""
         await asyncio.shield(self._ended)
 
     # -- the source, in its thread
 
-    def _watch(self, loop: asyncio.AbstractEventLoop) -> None:
-        newest, source = self._newest, self._source
+    def _run_source(self, loop: asyncio.AbstractEventLoop) -> None:
+        newest, source = self._latest, self._source
         try:
             while not self._closing:
                 if not newest.wanted.is_set():
-                    loop.call_soon_threadsafe(newest.doubt)
-                    while not newest.wanted.wait(_IDLE_S):
-                        source.check()
-                    source.forget()
-                key, moment = source.next()
-                loop.call_soon_threadsafe(newest.put, key, moment, encode(moment))
+                    loop.call_soon_threadsafe(newest.mark_stale)
+                    while not newest.wanted.wait(_IDLE_CHECK_S):
+                        source.check_alive()
+                    source.resend()
+                key, snapshot = source.next()
+                loop.call_soon_threadsafe(newest.update, key, snapshot, encode(snapshot))
         except Exception as error:  # noqa: BLE001 - raised again where somebody waits for it
             if not self._closing:
                 loop.call_soon_threadsafe(self._ended.set_exception, error)
 
-    async def _end_watch(self) -> None:
+    async def _stop_source(self) -> None:
         self._closing = True
-        self._newest.wanted.set()
+        self._latest.wanted.set()
         self._source.close()
-        await asyncio.to_thread(self._thread.join, _END_S)
+        await asyncio.to_thread(self._thread.join, _STOP_TIMEOUT_S)
 
     # -- browsers
 
-    async def _answer(self, _: ServerConnection, request: Request) -> Response | None:
+    async def _handle_request(self, _: ServerConnection, request: Request) -> Response | None:
         """Answer an HTTP request; None lets it become a WebSocket."""
         host = request.headers.get("Host", "")
-        if not _is_ours(host, self._name):
-            return _text(HTTPStatus.FORBIDDEN, f"this is no place called {host!r}\n")
+        if not _is_known_host(host, self._name):
+            return _text_response(HTTPStatus.FORBIDDEN, f"this is no place called {host!r}\n")
         match urlsplit(request.path).path:
             case "/":
-                return _page()
+                return _page_response()
             case "/frame.png":
-                return await self._picture()
-            case "/live" if not _same_origin(request.headers.get("Origin"), host):
-                return _text(HTTPStatus.FORBIDDEN, "not for pages of other sites\n")
+                return await self._picture_response()
+            case "/live" if not _is_same_origin(request.headers.get("Origin"), host):
+                return _text_response(HTTPStatus.FORBIDDEN, "not for pages of other sites\n")
             case "/live":
                 return None
-        return _text(HTTPStatus.NOT_FOUND, "there are / and /frame.png\n")
+        return _text_response(HTTPStatus.NOT_FOUND, "there are / and /frame.png\n")
 
-    async def _picture(self) -> Response:
-        await self._newest.after(0)
-        moment = self._newest.moment
-        assert moment is not None  # noqa: S101 - there is a first one now
-        return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, moment))
+    async def _picture_response(self) -> Response:
+        await self._latest.wait_for_newer(0)
+        snapshot = self._latest.snapshot
+        assert snapshot is not None  # noqa: S101 - there is a first one now
+        return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, snapshot))
 
-    async def _show(self, browser: ServerConnection) -> None:
+    async def _serve_browser(self, browser: ServerConnection) -> None:
         """Send frames, as the browser has room for them."""
-        room = asyncio.BoundedSemaphore(_UNDER_WAY)
-        sending = asyncio.create_task(self._send(browser, room))
+        room = asyncio.BoundedSemaphore(_MAX_IN_FLIGHT)
+        sending = asyncio.create_task(self._send_snapshots(browser, room))
         try:
             async for _ in browser:
                 room.release()
@@ -168,12 +168,14 @@ class LiveServer:
             with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
                 await sending
 
-    async def _send(self, browser: ServerConnection, room: asyncio.BoundedSemaphore) -> None:
+    async def _send_snapshots(
+        self, browser: ServerConnection, room: asyncio.BoundedSemaphore
+    ) -> None:
         serial = 0
         while True:
             await room.acquire()
-            serial = await self._newest.after(serial)
-            await browser.send(self._newest.message)
+            serial = await self._latest.wait_for_newer(serial)
+            await browser.send(self._latest.message)
 
 
 @contextlib.asynccontextmanager
@@ -196,12 +198,12 @@ async def open_server(source: Source, host: str, port: int) -> AsyncIterator[Liv
     live = LiveServer(source, host)
     try:
         async with serve(
-            live._show,  # noqa: SLF001 - of this module
+            live._serve_browser,  # noqa: SLF001 - of this module
             host,
             port,
-            process_request=live._answer,  # noqa: SLF001
+            process_request=live._handle_request,  # noqa: SLF001
             compression=None,  # it costs more than this machine's own network
-            max_size=_LONGEST_WORD,
+            max_size=_MAX_MESSAGE_BYTES,
             close_timeout=1,
         ) as server:
             live.url = _url(server)
@@ -209,7 +211,7 @@ async def open_server(source: Source, host: str, port: int) -> AsyncIterator[Liv
             yield live
     finally:
         if live._thread.ident:  # noqa: SLF001
-            await live._end_watch()  # noqa: SLF001
+            await live._stop_source()  # noqa: SLF001
         else:
             source.close()
 
@@ -222,7 +224,7 @@ def _url(server: Server) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
-def _is_ours(host: str, known_as: str) -> bool:
+def _is_known_host(host: str, known_as: str) -> bool:
     """Tell whether a browser that asks for a host means this server, which has one name.
 
     A number is fine: only a name can be made to point here by somebody else. The port is not
@@ -241,20 +243,21 @@ def _is_ours(host: str, known_as: str) -> bool:
     return True
 
 
-def _same_origin(origin: str | None, host: str) -> bool:
+def _is_same_origin(origin: str | None, host: str) -> bool:
     """Tell whether a page that opens a WebSocket came from here; programs send no origin."""
     return origin is None or origin in (f"http://{host}", f"https://{host}")
 
 
-def _page() -> Response:
+def _page_response() -> Response:
     headers = {
-        "Content-Security-Policy": policy(connect="'self'") + "; frame-ancestors 'none'",
+        "Content-Security-Policy": content_security_policy(connect="'self'")
+        + "; frame-ancestors 'none'",
         "Referrer-Policy": "no-referrer",
     }
-    return _response(HTTPStatus.OK, "text/html; charset=utf-8", page().encode(), headers)
+    return _response(HTTPStatus.OK, "text/html; charset=utf-8", page_html().encode(), headers)
 
 
-def _text(status: HTTPStatus, text: str) -> Response:
+def _text_response(status: HTTPStatus, text: str) -> Response:
     return _response(status, "text/plain; charset=utf-8", text.encode())
 
 
@@ -272,8 +275,8 @@ def _response(
     return Response(status, status.phrase, Headers(common | (headers or {})), body)
 
 
-def _png(moment: Moment) -> bytes:
+def _png(snapshot: Snapshot) -> bytes:
     out = io.BytesIO()
-    drawn = picture(moment.page, moment.grid, moment.format, palette=moment.palette)
+    drawn = render_page(snapshot.page, snapshot.grid, snapshot.format, palette=snapshot.palette)
     drawn.save(out, "PNG", compress_level=1)
     return out.getvalue()

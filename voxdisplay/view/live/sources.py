@@ -20,18 +20,18 @@ from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels
-from voxdisplay.view.live.message import Moment
+from voxdisplay.view.live.message import Snapshot
 
 _POLL_S = 0.05
 # A display that gives no digest is read as a whole to find out whether it shows something else.
-_BLIND_POLL_S = 0.5
+_FULL_READ_POLL_S = 0.5
 _CONNECT_S = 5.0
 
 
 class Source(Protocol):
     """Brings pictures."""
 
-    def next(self) -> tuple[Hashable, Moment]:
+    def next(self) -> tuple[Hashable, Snapshot]:
         """Wait for another picture than the last one; give it and what tells it from others.
 
         Raises
@@ -41,10 +41,10 @@ class Source(Protocol):
 
         """
 
-    def forget(self) -> None:
+    def resend(self) -> None:
         """Let the next picture be what is on display now, even if it is the last one again."""
 
-    def check(self) -> None:
+    def check_alive(self) -> None:
         """Find out, without waiting, whether there can be pictures still.
 
         Raises
@@ -84,21 +84,21 @@ class TapSource:
     def __init__(self, host: str, port: int, title: str) -> None:
         self._name = f"the emulator's tap at {host}:{port}"
         self._title = title
-        self._has = self._NOTHING
+        self._last_seen = self._NOTHING
         try:
             self._socket = socket.create_connection((host, port), _CONNECT_S)
         except OSError as error:
             raise OpenError(f"{self._name} cannot be reached: {error}", port=self._name) from error
         self._socket.settimeout(None)
 
-    def forget(self) -> None:
-        """See `Source.forget`."""
-        self._has = self._NOTHING
+    def resend(self) -> None:
+        """See `Source.resend`."""
+        self._last_seen = self._NOTHING
 
-    def next(self) -> tuple[Hashable, Moment]:
+    def next(self) -> tuple[Hashable, Snapshot]:
         """See `Source.next`."""
         try:
-            self._socket.sendall(self._QUESTION.pack(*self._has))
+            self._socket.sendall(self._QUESTION.pack(*self._last_seen))
             header = self._HEADER.unpack(self._receive(self._HEADER.size))
             magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
             format_ = PixelFormat.of_wire(number)
@@ -112,8 +112,8 @@ class TapSource:
         except OSError as error:
             raise TransportClosed(f"{self._name} is gone: {error}") from error
         page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
-        self._has = boot, swaps
-        return self._has, Moment(
+        self._last_seen = boot, swaps
+        return self._last_seen, Snapshot(
             page.reshape(format_.shape(grid.array_shape)),
             grid,
             format_,
@@ -124,8 +124,8 @@ class TapSource:
             palette,
         )
 
-    def check(self) -> None:
-        """See `Source.check`: a tap says nothing unasked, so that what can be read is its end."""
+    def check_alive(self) -> None:
+        """See `Source.check_alive`. A tap sends nothing unasked: readable means closed."""
         readable, _, _ = select.select([self._socket], [], [], 0)
         if readable:
             raise TransportClosed(f"{self._name} is gone")
@@ -147,7 +147,7 @@ class TapSource:
         self._socket.close()
 
 
-class Readable(Protocol):
+class ReadableDisplay(Protocol):
     """A display, as far as it is looked at: see `Display`."""
 
     port: str
@@ -175,7 +175,7 @@ class DisplaySource:
 
     def __init__(
         self,
-        display: Readable,
+        display: ReadableDisplay,
         grid: Grid,
         format: PixelFormat,  # noqa: A002 - the word of the command line
         counters: Callable[[], dict[str, int]] = dict,
@@ -183,67 +183,69 @@ class DisplaySource:
         self._display = display
         self._grid, self._format = grid, format
         self._counters = counters
-        self._last: Moment | None = None
-        self._told = False  # whether the last picture has been given since it was asked for anew
+        self._last: Snapshot | None = None
+        self._delivered = (
+            False  # whether the last picture has been given since it was asked for anew
+        )
         self._closing = threading.Event()
 
-    def forget(self) -> None:
-        """See `Source.forget`."""
-        self._told = False
+    def resend(self) -> None:
+        """See `Source.resend`."""
+        self._delivered = False
 
-    def next(self) -> tuple[Hashable, Moment]:
+    def next(self) -> tuple[Hashable, Snapshot]:
         """See `Source.next`."""
         while True:
             digest = self._display.digest()
             if self._last is None or digest is None or digest != self._last.digest:
-                self._look(digest)
-            if self._last and not self._told:
-                self._told = True
+                self._read_page(digest)
+            if self._last and not self._delivered:
+                self._delivered = True
                 return self._last.number, self._last
-            if self._closing.wait(_POLL_S if digest is not None else _BLIND_POLL_S):
+            if self._closing.wait(_POLL_S if digest is not None else _FULL_READ_POLL_S):
                 raise TransportClosed(f"{self._display.port} is closed")
 
-    def _look(self, digest: int | None) -> None:
+    def _read_page(self, digest: int | None) -> None:
         """Read the page back, and note it if it is another."""
         page, last = self._display.read(), self._last
         if last and digest is None and np.array_equal(page, last.page):
             return
-        self._told = False
+        self._delivered = False
         number = last.number + 1 if last else 1
-        self._last = Moment(
+        self._last = Snapshot(
             page, self._grid, self._format, number, self._display.port, digest, self._counters()
         )
 
-    def check(self) -> None:
-        """See `Source.check`: a display tells only who asks, and is asked for nothing in vain."""
+    def check_alive(self) -> None:
+        """See `Source.check_alive`. An idle display is not polled."""
 
     def close(self) -> None:
         """See `Source.close`."""
         self._closing.set()
 
 
-class StillSource:
+class StaticSource:
     """One picture that stays."""
 
-    def __init__(self, moment: Moment) -> None:
-        self._moment = moment
-        self._told = False
+    def __init__(self, snapshot: Snapshot) -> None:
+        self._snapshot = snapshot
+        self._delivered = False
         self._closing = threading.Event()
 
-    def forget(self) -> None:
-        """See `Source.forget`."""
-        self._told = False
+    def resend(self) -> None:
+        """See `Source.resend`."""
+        self._delivered = False
 
-    def next(self) -> tuple[Hashable, Moment]:
+    def next(self) -> tuple[Hashable, Snapshot]:
         """See `Source.next`."""
-        if self._told:
+        if self._delivered:
             self._closing.wait()
-            raise TransportClosed(f"{self._moment.title} is closed")
-        self._told = True
-        return self._moment.number, self._moment
+            raise TransportClosed(f"{self._snapshot.title} is closed")
+        self._delivered = True
+        return self._snapshot.number, self._snapshot
 
-    def check(self) -> None:
-        """See `Source.check`: it stays."""
+    def check_alive(self) -> None:
+        """See `Source.check_alive`: it stays."""
 
     def close(self) -> None:
         """See `Source.close`."""
