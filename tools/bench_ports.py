@@ -24,7 +24,7 @@ from typing import Any
 from bench_usb import on_usb, on_usbip
 from serial import rfc2217
 
-from voxdisplay.display.handshake import greet
+from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport, open_transport
 
@@ -270,7 +270,7 @@ def bench_ports(repeats: int, *, quick: bool = False) -> None:
             flush=True,
         )
     transport = open_transport("sim:")
-    trips = [seconds(greet, transport, 1.0) for _ in range(20 * repeats)]
+    trips = [seconds(request_info, transport, 1.0) for _ in range(20 * repeats)]
     transport.close()
     print(f"{'sim:':<14}{'':>24}{statistics.median(trips) * 1e6:>9.0f} us   HELLO and INFO")
     print(f"medians of {repeats}; round trips of {_ECHOED} bytes, medians of {20 * repeats}")

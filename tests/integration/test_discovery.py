@@ -8,13 +8,13 @@ import tty
 from types import SimpleNamespace
 
 import pytest
-from plugged import Plug
+from pluggable_pty import Plug
 
 from voxdisplay.cli import main
 from voxdisplay.cli import ports as command
 from voxdisplay.display import baud
-from voxdisplay.display.reconnect import Reconnect
-from voxdisplay.display.scan import probe_all
+from voxdisplay.display.reconnect import Reconnector
+from voxdisplay.display.scan import probe_ports
 from voxdisplay.transport import discovery
 from voxdisplay.transport.discovery import FoundPort, all_ports, find_port, serial_ports
 
@@ -79,10 +79,10 @@ def test_a_device_that_comes_back_at_another_port_is_found_there(known, tmp_path
     known(usb_serial(str(first), "A1"))
     with Plug(second) as plug:
         notes = []
-        reconnect = Reconnect(str(first), 20, note=notes.append)
+        reconnect = Reconnector(str(first), 20, note=notes.append)
         plug.plug(serial="X")
         known(usb_serial(str(first), "other"), usb_serial(str(second), "A1"))
-        transport = reconnect.wait(OSError("gone"), "X")
+        transport = reconnect.wait_for_device(OSError("gone"), "X")
         transport.close()
         assert transport.port == str(second)
         assert f"{second} is back" in notes[-1]
@@ -137,7 +137,7 @@ def test_probe_at_any_rate(capsys, monkeypatch):
 
 @pytest.mark.usefixtures("there")
 def test_without_probe_nothing_is_opened(capsys, monkeypatch):
-    monkeypatch.setattr(command, "probe_all", None)
+    monkeypatch.setattr(command, "probe_ports", None)
     assert main(["ports", "--json"]) == 0
     ports = json.loads(capsys.readouterr().out)["ports"]
     assert "answers" not in ports[0]
@@ -150,7 +150,7 @@ def test_a_port_that_hangs_when_it_is_opened_does_not_keep_the_rest(monkeypatch,
         "open_transport",
         lambda port, **rate: opened("" if port == "hangs" and never.wait(60) else port, **rate),
     )
-    answers = probe_all(["hangs", there[0]], baud=115200, timeout_s=0.2, slack_s=0.1)
+    answers = probe_ports(["hangs", there[0]], baud=115200, timeout_s=0.2, slack_s=0.1)
     assert answers["hangs"] == "it could not be opened in time"
     assert answers[there[0]].grid == (3, 5, 7)
     never.set()

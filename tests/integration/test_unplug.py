@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from carriers import eventually
 from conftest import DEADLINE_S, ROOT
-from plugged import Plug, open_descriptors
+from pluggable_pty import Plug, open_descriptors
 
 import voxdisplay as vd
 from firmware_sim.config import Config

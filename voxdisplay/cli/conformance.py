@@ -19,7 +19,7 @@ from voxdisplay.cli.output import (
     print_json,
     progress_bar,
 )
-from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
+from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at_rate
 
 if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
     from voxdisplay.conformance.announced_device import AnnouncedDevice
@@ -91,7 +91,7 @@ def conformance(
     if port is None:
         note("no --port: using the built-in emulator, sim:")
         port = DEFAULT_PORT
-    pipe = open_at(port, baud, opening_s, note)
+    pipe = open_at_rate(port, baud, opening_s, note)
     done = 0
     try:
         with progress_bar("checking") as progress:

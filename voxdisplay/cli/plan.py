@@ -21,7 +21,7 @@ from voxdisplay.cli.output import (
     print_json,
 )
 from voxdisplay.cli.scene_drawing import draw
-from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at
+from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at_rate
 from voxdisplay.display.plan import COMMON_LINES, EVERY_FEATURE, Line, Plan, Receiver, plan
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def plan_command(
 
 def _ask(port: str, baud: Baud | None) -> tuple[vd.DeviceInfo, int | None]:
     """Ask a display what it is; give the rate of its line, too, if that was given or found."""
-    transport = open_at(port, baud or DEFAULT_BAUD, _TIMEOUT_S, note)
+    transport = open_at_rate(port, baud or DEFAULT_BAUD, _TIMEOUT_S, note)
     found = getattr(transport, "baud", None) if baud == "auto" else baud
     with vd.open(transport) as display:
         return display.info, found

@@ -21,7 +21,7 @@ from voxdisplay.cli.output import (
     print_json,
 )
 from voxdisplay.display.baud import Baud
-from voxdisplay.display.scan import Answer, probe_all
+from voxdisplay.display.scan import ProbeResult, probe_ports
 from voxdisplay.transport.discovery import FoundPort, all_ports
 
 _SLACK_S = 2.0
@@ -51,12 +51,12 @@ def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
     With --probe, all are asked at the same time, each for --timeout.
     """
     found = all_ports()
-    answers: dict[str, Answer] = {}
+    answers: dict[str, ProbeResult] = {}
     if probe:
         if sys.stderr.isatty():
             note(f"asking {plural(len(found), 'port')}, for up to {timeout_s:g} s ...")
         names = [port.port for port in found]
-        answers = probe_all(names, baud=baud, timeout_s=timeout_s, slack_s=_SLACK_S)
+        answers = probe_ports(names, baud=baud, timeout_s=timeout_s, slack_s=_SLACK_S)
     if as_json:
         print_json({"ports": [_facts(port, answers.get(port.port)) for port in found]})
         return
@@ -72,7 +72,7 @@ def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
             click.echo(f"{'':<{width}}  {_said(answers[port.port])}")
 
 
-def _said(answer: Answer) -> str:
+def _said(answer: ProbeResult) -> str:
     if isinstance(answer, str):
         return f"no display: {answer}"
     name = f"{answer.name or 'a display'} {answer.firmware}".strip()
@@ -80,7 +80,7 @@ def _said(answer: Answer) -> str:
     return f"DISPLAY: {name}, {answer.grid} {answer.format.value}{number}"
 
 
-def _facts(port: FoundPort, answer: Answer | None) -> dict[str, Any]:
+def _facts(port: FoundPort, answer: ProbeResult | None) -> dict[str, Any]:
     facts = {**asdict(port), "kind": port.kind}
     if isinstance(answer, vd.DeviceInfo):
         device = {"name": answer.name, **device_json(answer), "serial": answer.serial}

@@ -112,14 +112,14 @@ class _Judged:
 
     def __init__(self) -> None:
         self.differing_voxels = 0
-        self._axes: dict[str, test_patterns.Finding] = {}
+        self._axes: dict[str, test_patterns.AxisFinding] = {}
 
-    def add(self, step: test_patterns.Step, page: Pixels) -> None:
+    def add(self, step: test_patterns.PatternFrame, page: Pixels) -> None:
         """Judge one page more. A wrong one is not made good by a right one."""
         meant = step.frame.array()
         differs = meant != page
         self.differing_voxels += int((differs.any(axis=-1) if differs.ndim == 4 else differs).sum())
-        for finding in test_patterns.findings(meant, page, step.axes):
+        for finding in test_patterns.compare_axes(meant, page, step.axes):
             before = self._axes.get(finding.axis)
             if before is None or before.right is None or finding.right is False:
                 self._axes[finding.axis] = finding
@@ -152,7 +152,7 @@ class _Judged:
         return "\n".join(lines)
 
 
-def _verdict(finding: test_patterns.Finding) -> str:
+def _verdict(finding: test_patterns.AxisFinding) -> str:
     if finding.right is None:
         return "cannot be told: on this display the pattern looks the same either way"
     if finding.right:
@@ -174,7 +174,9 @@ def _show(
     total = sum(info.grid) if name == "plane" else 1
     last = None
     with progress_bar("showing", hidden=quiet) as progress:
-        for number, step in enumerate(test_patterns.steps(name, info.grid, info.format, share)):
+        for number, step in enumerate(
+            test_patterns.pattern_frames(name, info.grid, info.format, share)
+        ):
             page = None
             try:
                 display.present(step.frame)
@@ -182,7 +184,7 @@ def _show(
                 if judged is None or "read" not in info.features:
                     raise
                 note(str(error))
-            if judged is not None and step.telling:
+            if judged is not None and step.verify:
                 page = display.read()
                 judged.add(step, np.asarray(page))
             last = step.frame, page

@@ -36,7 +36,7 @@ class ReferenceDecoder:
         self._op_at = 0
 
     def draw(self, payload: bytes) -> None:
-        """Draw the ops of one packet, or raise `Refused`."""
+        """Draw the ops of one packet, or raise `PacketRefused`."""
         self.begin_packet()
         self.draw_more(payload)
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
-from voxdisplay.display.handshake import greet
+from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.transport import Transport, open_transport
 
@@ -24,11 +24,11 @@ RATES: Final = (
     12_000_000, 8_000_000, 6_000_000, 4_000_000, 3_000_000, 2_000_000, 1_500_000, 1_000_000,
     921_600, 500_000, 460_800, 230_400, 115_200, 57_600, 38_400, 19_200, 9_600,
 )  # fmt: skip
-_EACH_S = 0.35  # long enough for two HELLOs, should the first one's answer begin with noise
-ALL_RATES_S: Final = len(RATES) * _EACH_S
+_RATE_TIMEOUT_S = 0.35  # long enough for two HELLOs, should the first one's answer begin with noise
+ALL_RATES_S: Final = len(RATES) * _RATE_TIMEOUT_S
 
 
-def open_at(
+def open_at_rate(
     port: str, baud: Baud, timeout_s: float, note: Callable[[str], None] = lambda _text: None
 ) -> Transport:
     """Open a port at a rate, or at the best one: see `open_at_best_rate`."""
@@ -101,7 +101,7 @@ def _answers_at(transport: SerialTransport, rate: int, refused: set[int]) -> boo
         refused.add(rate)
         return False
     try:
-        greet(transport, _EACH_S)
+        request_info(transport, _RATE_TIMEOUT_S)
     except TransportTimeout:
         return False
     return True

@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable
 from typing import Literal, TextIO
 
-from voxdisplay.display.baud import DEFAULT_BAUD, open_at
+from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.display import TIMEOUT_S, Display
-from voxdisplay.display.reconnect import Reconnect
+from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.transport import Transport
 
 
@@ -59,12 +59,12 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
 
     """
     note = note or (lambda _text: None)
-    transport = open_at(port, baud, timeout_s, note) if isinstance(port, str) else port
+    transport = open_at_rate(port, baud, timeout_s, note) if isinstance(port, str) else port
     try:
         reconnect = None
         if reconnect_s:
             rate = getattr(transport, "baud", DEFAULT_BAUD)
-            reconnect = Reconnect(transport.port, reconnect_s, baud=rate, note=note)
+            reconnect = Reconnector(transport.port, reconnect_s, baud=rate, note=note)
         return Display(
             transport, timeout_s=timeout_s, reconnect=reconnect, capture=capture, clock=clock
         )

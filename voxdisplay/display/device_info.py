@@ -89,7 +89,7 @@ def device_info(info: Info) -> DeviceInfo:
     )
 
 
-def check_same(before: DeviceInfo, now: DeviceInfo) -> None:
+def check_compatible(before: DeviceInfo, now: DeviceInfo) -> None:
     """Check that what was made for a device suits what is there now.
 
     Raises

@@ -1,7 +1,7 @@
 """A display as its user sees it: frames in, proof out.
 
 `Display` waits, blocking, in the caller's thread: the only one. It turns a `Connection` until a
-`Presenter` has shown what it was given, and compares. How bytes are made and pipes are kept alive
+`FrameQueue` has shown what it was given, and compares. How bytes are made and pipes are kept alive
 is the business of others.
 """
 
@@ -16,14 +16,26 @@ from typing import Self, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.display.connection import Clock, Connection, Renewed
+from voxdisplay.display.connection import Clock, Connection, Reconnected
 from voxdisplay.display.device_info import DeviceInfo, device_error
-from voxdisplay.display.frame_queue import Presenter
-from voxdisplay.display.receipt import WRONG_TWICE, Receipt, difference, wrong_digest
-from voxdisplay.display.reconnect import Reconnect
+from voxdisplay.display.frame_queue import FrameQueue
+from voxdisplay.display.receipt import (
+    WRONG_TWICE_HINT,
+    Receipt,
+    describe_difference,
+    describe_wrong_digest,
+)
+from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import DesyncError, IncompatibleDevice, LocalProtocolError
 from voxdisplay.frame import Frame
-from voxdisplay.link import Event, LinkCounters, PageRead, Refused, Shown, Told
+from voxdisplay.link import (
+    Event,
+    FrameShown,
+    LinkCounters,
+    PacketRefused,
+    PageReceived,
+    StatusReceived,
+)
 from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.transport import Transport
 from voxdisplay.wire.packet import Page
@@ -32,7 +44,7 @@ from voxdisplay.wire.spans import decode_spans
 __all__ = ["TIMEOUT_S", "Display", "Receipt"]
 
 TIMEOUT_S = 5.0
-_LAST_S = 2.0  # for a last dark picture
+_BLANK_TIMEOUT_S = 2.0  # for a last dark picture
 Progress = Callable[[int, int], None]
 
 
@@ -59,18 +71,18 @@ class Display:
         transport: Transport,
         *,
         timeout_s: float = TIMEOUT_S,
-        reconnect: Reconnect | None = None,
+        reconnect: Reconnector | None = None,
         capture: TextIO | None = None,
         clock: Clock = time.monotonic,
     ) -> None:
         self._clock = clock
         self._pages: list[Page] = []
-        self._told: Told | None = None
+        self._status: StatusReceived | None = None
         self._connection = Connection(
             transport, timeout_s=timeout_s, reconnect=reconnect, capture=capture, clock=clock
         )
-        self._presenter = Presenter(self._connection)
-        self._take_events()
+        self._queue = FrameQueue(self._connection)
+        self._handle_events()
 
     @property
     def info(self) -> DeviceInfo:
@@ -89,31 +101,31 @@ class Display:
 
     # -- waiting
 
-    def _turn(self, *, wait: bool = True) -> None:
+    def _pump(self, *, wait: bool = True) -> None:
         """Let the connection do what it can, and take what comes.
 
         It does not wait while there is something to be coded: then it does a part of that.
         """
-        self._presenter.code()
-        self._connection.turn(wait=wait and not self._presenter.coding)
-        self._take_events()
+        self._queue.encode()
+        self._connection.pump(wait=wait and not self._queue.encoding)
+        self._handle_events()
 
-    def _take_events(self) -> None:
+    def _handle_events(self) -> None:
         for event in self._connection.events():
-            self._take(event)
+            self._handle(event)
 
-    def _take(self, event: Event | Renewed) -> None:
+    def _handle(self, event: Event | Reconnected) -> None:
         match event:
-            case Shown(ticket, digest):
-                self._presenter.shown(ticket, digest)
-            case Renewed():
-                self._presenter.renewed()
-            case Told():
-                self._told = event
-            case PageRead(page):
+            case FrameShown(ticket, digest):
+                self._queue.note_shown(ticket, digest)
+            case Reconnected():
+                self._queue.note_reconnect()
+            case StatusReceived():
+                self._status = event
+            case PageReceived(page):
                 self._pages.append(page)
-            case Refused(error):
-                self._presenter.refused()
+            case PacketRefused(error):
+                self._queue.note_refusal()
                 raise device_error(error)
 
     # -- frames
@@ -141,7 +153,7 @@ class Display:
         """
         if keep:
             self.flush()
-            frame = self._kept().copy()
+            frame = self._displayed_frame().copy()
             if palette is not None:
                 raise ValueError("a frame that keeps what is on display keeps its palette, too")
             return frame
@@ -153,9 +165,9 @@ class Display:
             )
         return Frame(self.info.grid, self.info.format, palette=palette, own_palette=own)
 
-    def _kept(self) -> Frame:
+    def _displayed_frame(self) -> Frame:
         """Give what is on display, from memory or from the device."""
-        if known := self._presenter.known:
+        if known := self._queue.displayed:
             return known
         if "read" not in self.info.features:
             raise IncompatibleDevice(
@@ -163,12 +175,12 @@ class Display:
                 hint="present a whole frame first: display.frame() without keep",
             )
         link = self._connection.link
-        place = link.on_display
+        place = link.displayed
         frame = self.frame()
         frame.set(self.read())
         # What else its palette shows, nobody can tell: then it is no base for a difference.
-        if place == link.on_display and "palette" not in self.info.features:
-            self._presenter.know(frame.copy(), place)
+        if place == link.displayed and "palette" not in self.info.features:
+            self._queue.set_displayed(frame.copy(), place)
         return frame
 
     def present(
@@ -215,7 +227,7 @@ class Display:
                 hint="make frames by display.frame()",
             )
         if not wait:
-            self._presenter.present_newest(frame)
+            self._queue.replace_pending(frame)
             self.poll()
             return None
         self.flush()
@@ -225,15 +237,15 @@ class Display:
         began_s = self._clock()
         before = replace(self.counters)
         meant = frame.copy()
-        ticket = self._presenter.present(meant)
-        digest = self._shown_digest(ticket, progress)
+        ticket = self._queue.enqueue(meant)
+        digest = self._wait_until_shown(ticket, progress)
         repaired = None
         if digest is not None and digest != meant.digest():
             ticket, repaired = self._repair(meant, digest)
             digest = meant.digest()
-        self._presenter.prove(meant, ticket, digest)
+        self._queue.confirm(meant, ticket, digest)
         return Receipt(
-            frame=self._presenter.frames,
+            frame=self._queue.frames,
             voxels=len(meant.lit()[0]),
             packets=self.counters.packets - before.packets,
             wire_bytes=self.counters.wire_bytes - before.wire_bytes,
@@ -243,40 +255,42 @@ class Display:
             repaired=repaired,
         )
 
-    def _shown_digest(self, ticket: int, progress: Progress | None = None) -> int | None:
+    def _wait_until_shown(self, ticket: int, progress: Progress | None = None) -> int | None:
         """Wait until a frame is on display; give the device's digest."""
         link, total = self._connection.link, 1
-        while not self._presenter.is_shown(ticket):
-            self._turn()
-            total = max(total, link.payloads_in_all)
-            if progress and not self._presenter.coding:
-                progress(total - link.payloads_left, total)
-        return self._presenter.digest_of(ticket)
+        while not self._queue.is_shown(ticket):
+            self._pump()
+            total = max(total, link.payload_count)
+            if progress and not self._queue.encoding:
+                progress(total - link.unacknowledged_payloads, total)
+        return self._queue.take_digest(ticket)
 
     def _repair(self, frame: Frame, digest: int) -> tuple[int, str]:
         """Find out what the display shows instead, and send the frame again; give its ticket."""
-        self._presenter.forget()
+        self._queue.forget_displayed()
         meant = frame.digest()
-        what = wrong_digest(digest, meant)
+        what = describe_wrong_digest(digest, meant)
         if "read" in self.info.features:
-            differs = difference(frame.array(), self.read())
+            differs = describe_difference(frame.array(), self.read())
             what += f"; {differs or 'but its memory reads back as it was meant'}"
-        ticket = self._presenter.present(frame)
-        again = self._shown_digest(ticket)
+        ticket = self._queue.enqueue(frame)
+        again = self._wait_until_shown(ticket)
         if again != meant:
-            raise DesyncError(f"{what}; sent once more, it is {again or 0:08x}", hint=WRONG_TWICE)
+            raise DesyncError(
+                f"{what}; sent once more, it is {again or 0:08x}", hint=WRONG_TWICE_HINT
+            )
         return ticket, what
 
     def poll(self) -> None:
         """Do what can be done without waiting; for callers of ``present(wait=False)``."""
         self._check_open()
-        self._turn(wait=False)
+        self._pump(wait=False)
 
     def flush(self) -> None:
         """Wait until every frame that was handed over is on display, or was skipped."""
         self._check_open()
-        while self._presenter.busy:
-            self._turn()
+        while self._queue.busy:
+            self._pump()
 
     def clear(self) -> Receipt:
         """Make the display dark."""
@@ -296,11 +310,11 @@ class Display:
 
         """
         self._check_open()
-        self._told = None
-        self._connection.link.ask()
-        while self._told is None:
-            self._turn()
-        return self._told.digest
+        self._status = None
+        self._connection.link.request_status()
+        while self._status is None:
+            self._pump()
+        return self._status.digest
 
     def read(self, *, back: bool = False, progress: Progress | None = None) -> Pixels:
         """Read a page of the device's memory.
@@ -330,19 +344,19 @@ class Display:
                 hint="its digest still proves what it shows",
             )
         connection, link = self._connection, self._connection.link
-        link.forget_reads()  # of a call that was interrupted
+        link.cancel_reads()  # of a call that was interrupted
         self._pages.clear()
         total = self.info.grid.voxels
         values = np.zeros(total, dtype=np.uint32)
-        at, renewals = 0, connection.renewals
+        at, renewals = 0, connection.reconnects
         while at < total:
             link.read(at, total - at, back=back)
             while not self._pages:
-                self._turn()
-            if renewals != connection.renewals:  # its memory may be lost: from the start
+                self._pump()
+            if renewals != connection.reconnects:  # its memory may be lost: from the start
                 self.flush()
                 self._pages.clear()
-                at, renewals = 0, connection.renewals
+                at, renewals = 0, connection.reconnects
                 continue
             page = self._pages.pop()
             values[at : at + page.count] = decode_spans(page.ops, page.count, self.info.format)
@@ -376,7 +390,7 @@ class Display:
 
         """
         page = self.read(progress=progress)
-        if differs := difference(frame.array(), page):
+        if differs := describe_difference(frame.array(), page):
             raise DesyncError(f"what was read back is not the frame: {differs}")
         return page
 
@@ -409,9 +423,9 @@ class Display:
 
     def _blank(self) -> None:
         """Show a dark frame at once: a new session drops all that is on its way."""
-        self._connection.begin_again(_LAST_S)
-        self._presenter = Presenter(self._connection)
-        self._shown_digest(self._connection.link.present([]))
+        self._connection.restart(_BLANK_TIMEOUT_S)
+        self._queue = FrameQueue(self._connection)
+        self._wait_until_shown(self._connection.link.present([]))
 
     def __enter__(self) -> Self:
         return self

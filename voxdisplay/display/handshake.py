@@ -16,12 +16,12 @@ from voxdisplay.wire.packet import Info
 _LONGEST_WAIT_S = 0.25
 
 
-def new_session() -> int:
+def random_session() -> int:
     """Give the number of a session: at random, as protocol.md, section 5, would have it."""
     return 1 + secrets.randbelow(0xFFFF)
 
 
-def greet(transport: Transport, timeout_s: float) -> Info:
+def request_info(transport: Transport, timeout_s: float) -> Info:
     """Say HELLO until a device answers.
 
     Parameters
@@ -39,7 +39,7 @@ def greet(transport: Transport, timeout_s: float) -> Info:
         If the pipe ends.
 
     """
-    link = Link(new_session(), time.monotonic(), patience_s=timeout_s)
+    link = Link(random_session(), time.monotonic(), timeout_s=timeout_s)
     try:
         while link.info is None:
             if out := link.transmit(time.monotonic()):
@@ -47,11 +47,11 @@ def greet(transport: Transport, timeout_s: float) -> Info:
             wait_s = link.next_timeout(time.monotonic()) or 0.0
             link.receive(transport.read(min(wait_s, _LONGEST_WAIT_S)), time.monotonic())
     except TransportClosed as error:
-        raise said_before(error, link.stream.noise) from error
+        raise closed_before_info(error, link.stream.noise) from error
     return link.info
 
 
-def said_before(error: TransportClosed, noise: bytes) -> TransportClosed:
+def closed_before_info(error: TransportClosed, noise: bytes) -> TransportClosed:
     """Give the error for a pipe that ended before HELLO was answered: with what came instead."""
     if not noise:
         hint = "it had not answered HELLO: is it the display's port, and has no other program it?"

@@ -13,7 +13,7 @@ from typing import Final, Self
 
 from voxdisplay.display.device_info import DeviceInfo
 from voxdisplay.frame import Frame
-from voxdisplay.link.payload_size import FIRST_PAYLOAD, suited
+from voxdisplay.link.payload_size import INITIAL_PAYLOAD, clamp_payload
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.features import worth_using
@@ -74,13 +74,13 @@ class Receiver:
     """
 
     features: tuple[str, ...] = EVERY_FEATURE
-    payload_bytes: int = FIRST_PAYLOAD
+    payload_bytes: int = INITIAL_PAYLOAD
     refresh_hz: float = 0.0
 
     @classmethod
     def of(cls, said: DeviceInfo) -> Self:
         """Give the receiver that a device is."""
-        longest = suited(FIRST_PAYLOAD, said.max_payload_bytes, said.rx_buffer_bytes)
+        longest = clamp_payload(INITIAL_PAYLOAD, said.max_payload_bytes, said.rx_buffer_bytes)
         return cls(said.features, longest, said.refresh_hz)
 
 
@@ -177,7 +177,7 @@ def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
         op_bytes=sum(map(len, payloads)),
         wire_bytes=wire_bytes,
         answer_bytes=(len(payloads) + 1) * _ack_bytes(),
-        ops={name: OpCost(count[name], size[name]) for name in sorted(count, key=_place)},
+        ops={name: OpCost(count[name], size[name]) for name in sorted(count, key=_op_order)},
     )
 
 
@@ -189,6 +189,6 @@ def _ack_bytes() -> int:
     return len(packets.encode(ack))
 
 
-def _place(name: str) -> int:
+def _op_order(name: str) -> int:
     """Give the place of an op in the table of section 7: that of its value; unknown ones last."""
     return int(getattr(spec, f"OP_{name}", 256))

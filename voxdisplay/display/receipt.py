@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-WRONG_TWICE = "the device does not draw what protocol.md says, or its memory is faulty"
+WRONG_TWICE_HINT = "the device does not draw what protocol.md says, or its memory is faulty"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,12 @@ class Receipt:
     repaired: str | None = None
 
 
-def wrong_digest(digest: int, meant: int) -> str:
+def describe_wrong_digest(digest: int, meant: int) -> str:
     """Say that two digests differ, in one line."""
     return f"the display's digest is {digest:08x}, the frame's {meant:08x}"
 
 
-def difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:
+def describe_difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:
     """Say where two arrays [z, y, x] differ, in one line; nothing if they do not."""
     differs = meant != got
     if differs.ndim == 4:

@@ -9,15 +9,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from voxdisplay.display.handshake import greet
+from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import OpenError, TransportClosed, TransportError
 from voxdisplay.transport import Transport, open_transport
 from voxdisplay.transport.discovery import find_port, serial_ports
 
-_LOOK_S = 0.25
+_RETRY_INTERVAL_S = 0.25
 
 
-class Reconnect:
+class Reconnector:
     """The patience with one device that may be pulled out and plugged in again.
 
     Parameters
@@ -48,11 +48,11 @@ class Reconnect:
         self._found = find_port(port)  # as long as it is there
         self._lost_s: float | None = None
 
-    def settled(self) -> None:
+    def reset_deadline(self) -> None:
         """Note that the device works: the next loss has the whole time again."""
         self._lost_s = None
 
-    def wait(self, why: TransportError, serial: str) -> Transport:
+    def wait_for_device(self, why: TransportError, serial: str) -> Transport:
         """Wait until the device is back.
 
         Parameters
@@ -89,7 +89,7 @@ class Reconnect:
                 away_s = time.monotonic() - self._lost_s
                 self._note(f"{port} is back after {away_s:.1f} s; the picture is sent again")
                 return transport
-            time.sleep(max(0.0, min(_LOOK_S, deadline_s - time.monotonic())))
+            time.sleep(max(0.0, min(_RETRY_INTERVAL_S, deadline_s - time.monotonic())))
         also = "" if last is why else f" ({last})"
         raise TransportClosed(
             f"{why}, and it did not come back within {self._within_s:g} s{also}", hint=why.hint
@@ -104,7 +104,7 @@ class Reconnect:
     def _open(self, port: str, serial: str, timeout_s: float) -> Transport:
         transport = open_transport(port, baud=self._baud)
         try:
-            self._check_same(port, greet(transport, timeout_s).serial, serial)
+            self._check_same(port, request_info(transport, timeout_s).serial, serial)
         except BaseException:
             transport.close()
             raise

@@ -7,17 +7,17 @@ import time
 from collections.abc import Iterable
 from typing import TypeAlias
 
-from voxdisplay.display.baud import ALL_RATES_S, Baud, open_at
+from voxdisplay.display.baud import ALL_RATES_S, Baud, open_at_rate
 from voxdisplay.display.device_info import DeviceInfo, device_info
-from voxdisplay.display.handshake import greet
+from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import VoxDisplayError
 
-Answer: TypeAlias = DeviceInfo | str  # who is there, or why nobody is
+ProbeResult: TypeAlias = DeviceInfo | str  # who is there, or why nobody is
 
 
-def probe_all(
+def probe_ports(
     ports: Iterable[str], *, baud: Baud, timeout_s: float, slack_s: float
-) -> dict[str, Answer]:
+) -> dict[str, ProbeResult]:
     """Ask at all ports at once who is there.
 
     Parameters
@@ -36,7 +36,7 @@ def probe_all(
         What each device says of itself, or what is wrong, in the order of the ports.
 
     """
-    answers: dict[str, Answer] = dict.fromkeys(ports, "it could not be opened in time")
+    answers: dict[str, ProbeResult] = dict.fromkeys(ports, "it could not be opened in time")
 
     def ask(port: str) -> None:
         try:
@@ -55,8 +55,8 @@ def probe_all(
 
 
 def _probe(port: str, baud: Baud, timeout_s: float) -> DeviceInfo:
-    transport = open_at(port, baud, timeout_s)
+    transport = open_at_rate(port, baud, timeout_s)
     try:
-        return device_info(greet(transport, timeout_s))
+        return device_info(request_info(transport, timeout_s))
     finally:
         transport.close()

@@ -23,14 +23,14 @@ Voxels = NDArray[np.int64]
 RED, GREEN, BLUE = AXIS_COLORS = ((255, 0, 0), (0, 255, 0), (0, 0, 255))
 _WHITE, _GREY = (255, 255, 255), (96, 96, 96)
 # A side shorter than this has no room for ticks.
-_LEAST_FOR_TICKS = 8
+_MIN_SIDE_FOR_TICKS = 8
 
 NAMES = ("axes", "corners", "plane", "all")
 BRIGHTNESS = {"axes": 1.0, "corners": 1.0, "plane": 0.5, "all": 0.05}
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PatternFrame:
     """One frame of a pattern.
 
     Attributes
@@ -45,10 +45,15 @@ class Step:
 
     frame: Frame
     axes: str
-    telling: bool = True
+    verify: bool = True
 
 
-def steps(name: str, grid: Grid, format: PixelFormat, brightness: float) -> Iterator[Step]:  # noqa: A002 - the word of the command line
+def pattern_frames(
+    name: str,
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002 - the word of the command line
+    brightness: float,
+) -> Iterator[PatternFrame]:
     """Give the frames of a pattern, one of `NAMES`, in order.
 
     Parameters
@@ -60,22 +65,22 @@ def steps(name: str, grid: Grid, format: PixelFormat, brightness: float) -> Iter
         0 to 1. A format that has nothing so dark gives its darkest light.
 
     """
-    paint = _Paint(grid, format, brightness)
+    paint = _Painter(grid, format, brightness)
     match name:
         case "axes":
-            yield Step(paint.axes(), "xyz")
+            yield PatternFrame(paint.axes(), "xyz")
         case "corners":
-            yield Step(paint.corners(), "xyz")
+            yield PatternFrame(paint.corners(), "xyz")
         case "plane":
             for axis, side in enumerate(grid):
                 for at in range(side):
                     telling = at in {0, side // 2, side - 1}
-                    yield Step(paint.plane(axis, at), "xyz"[axis], telling)
+                    yield PatternFrame(paint.plane(axis, at), "xyz"[axis], telling)
         case _:
-            yield Step(paint.all(), "")
+            yield PatternFrame(paint.all(), "")
 
 
-class _Paint:
+class _Painter:
     """Makes frames of patterns."""
 
     def __init__(self, grid: Grid, format_: PixelFormat, brightness: float) -> None:
@@ -105,7 +110,7 @@ class _Paint:
         """Give one tick at the far end of x, two of y, three of z, across the axis."""
         across = 0 if axis == 2 else 2
         room = self._grid[across]
-        if self._grid[axis] < _LEAST_FOR_TICKS or room < 3:
+        if self._grid[axis] < _MIN_SIDE_FOR_TICKS or room < 3:
             return
         for number in range(axis + 1):
             tick = np.zeros((max(1, room // 10), 3), dtype=np.int64)
@@ -151,7 +156,7 @@ class _Paint:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class AxisFinding:
     """What a page says of one axis.
 
     Attributes
@@ -172,7 +177,7 @@ class Finding:
     shown: str | None
 
 
-def findings(meant: Pixels, got: Pixels, axes: str) -> list[Finding]:
+def compare_axes(meant: Pixels, got: Pixels, axes: str) -> list[AxisFinding]:
     """Compare a page that was read back with the pattern's.
 
     The page is compared with the pattern mirrored and swapped in all 48 ways, so that it can say
@@ -188,26 +193,28 @@ def findings(meant: Pixels, got: Pixels, axes: str) -> list[Finding]:
     """
     places, values = _lit(meant)
     whole = len(_lit(got)[0]) == len(places)
-    matches = [way for way in _WAYS if whole and _is_moved(places, values, meant, got, way)]
+    matches = [way for way in _AXIS_MAPS if whole and _is_moved(places, values, meant, got, way)]
     found = []
     for axis in axes:
         number = "xyz".index(axis)
         ends = {(way[0][number], way[1][number]) for way in matches}
         if not ends:
-            found.append(Finding(axis, right=False, shown=None))
+            found.append(AxisFinding(axis, right=False, shown=None))
         elif (number, False) not in ends:
             onto, mirrored = min(ends)
-            found.append(Finding(axis, right=False, shown=("-" if mirrored else "+") + "xyz"[onto]))
+            found.append(
+                AxisFinding(axis, right=False, shown=("-" if mirrored else "+") + "xyz"[onto])
+            )
         elif len(ends) > 1:
-            found.append(Finding(axis, right=None, shown=None))
+            found.append(AxisFinding(axis, right=None, shown=None))
         else:
-            found.append(Finding(axis, right=True, shown=f"+{axis}"))
+            found.append(AxisFinding(axis, right=True, shown=f"+{axis}"))
     return found
 
 
 # Onto which axis each of x, y, z comes, and whether it is mirrored there.
-_Way = tuple[tuple[int, ...], tuple[bool, ...]]
-_WAYS: list[_Way] = [
+_AxisMap = tuple[tuple[int, ...], tuple[bool, ...]]
+_AXIS_MAPS: list[_AxisMap] = [
     (onto, mirrored)
     for onto in itertools.permutations(range(3))
     for mirrored in itertools.product((False, True), repeat=3)
@@ -221,7 +228,7 @@ def _lit(page: Pixels) -> tuple[Voxels, Pixels]:
     return places[:, ::-1], page[lit]
 
 
-def _is_moved(places: Voxels, values: Pixels, meant: Pixels, got: Pixels, way: _Way) -> bool:
+def _is_moved(places: Voxels, values: Pixels, meant: Pixels, got: Pixels, way: _AxisMap) -> bool:
     """Tell whether a page is another whose axes have been swapped and mirrored."""
     sides, moved = meant.shape[2::-1], np.empty_like(places)
     for axis, (onto, mirrored) in enumerate(zip(*way, strict=True)):

@@ -11,21 +11,21 @@ from __future__ import annotations
 import math
 
 # On its way at any rate.
-LEAST_BYTES = 4096
+MIN_BYTES = 4096
 # One that is being sent, and one behind it.
-LEAST_PACKETS = 2
+MIN_PACKETS = 2
 # The rest of the window can be sent while a lost packet is on its way again. Of 10, 13, 16 and 20
 # the one that leaves most of a line with a bit error rate of 1e-4 (tools/bench_goodput.py).
-MOST_PACKETS = 13
+MAX_PACKETS = 13
 # How late the caller may be: processes wait for their turn.
-LATE_S = 0.02
+SCHEDULING_DELAY_S = 0.02
 # How long coding may take before it gives the first bytes of a frame.
-CODING_S = 0.06
+ENCODING_DELAY_S = 0.06
 # How fast a rate that is not reached any more is forgotten, with each packet delivered.
-_FADE = 1 / 64
+_DECAY = 1 / 64
 
 
-class Pace:
+class DeliveryRate:
     """The rate of delivery of one line and its round trip, and what follows from them."""
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Pace:
         self._round_trip_s = math.inf
         self._was_busy = False
 
-    def deliver(self, size: int, before: int, seconds: float) -> None:
+    def sample(self, size: int, before: int, seconds: float) -> None:
         """Count a packet that has arrived.
 
         Parameters
@@ -51,8 +51,8 @@ class Pace:
         self.delivered += size
         seconds = max(seconds, 1e-6)
         meanwhile = self.delivered - before
-        self._was_busy |= meanwhile >= LEAST_BYTES
-        self._rate = max(meanwhile / seconds, self._rate * (1 - _FADE))
+        self._was_busy |= meanwhile >= MIN_BYTES
+        self._rate = max(meanwhile / seconds, self._rate * (1 - _DECAY))
         self._round_trip_s = min(seconds, self._round_trip_s)
 
     @property
@@ -62,12 +62,12 @@ class Pace:
 
     def allows(self, packets: int, size: int) -> bool:
         """Tell whether so many packets of so many bytes in all may be on their way."""
-        if packets <= LEAST_PACKETS:
+        if packets <= MIN_PACKETS:
             return True
         busy = 1.25 * self._rate * self._round_trip_s if self._rate else 0.0
-        in_time = size <= max(LEAST_BYTES, busy + self._rate * LATE_S)
-        return in_time and (packets <= MOST_PACKETS or size <= busy)
+        in_time = size <= max(MIN_BYTES, busy + self._rate * SCHEDULING_DELAY_S)
+        return in_time and (packets <= MAX_PACKETS or size <= busy)
 
-    def runs_out(self, size: int) -> bool:
+    def drains_early(self, size: int) -> bool:
         """Tell whether so many bytes last no longer than what follows them takes to be coded."""
-        return size <= max(LEAST_BYTES, self._rate * CODING_S)
+        return size <= max(MIN_BYTES, self._rate * ENCODING_DELAY_S)

@@ -9,14 +9,14 @@ from voxdisplay.wire.packet import Error, Info, Page
 
 
 @dataclass(frozen=True, slots=True)
-class Ready:
+class SessionOpened:
     """A session is open."""
 
     info: Info
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class FrameShown:
     """A frame is on display. ``digest`` is the device's, or None if it gives none."""
 
     ticket: int
@@ -24,29 +24,31 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class StatusReceived:
     """The device was asked what is on display; ``digest`` is None if it gives none."""
 
     digest: int | None
 
 
 @dataclass(frozen=True, slots=True)
-class PageRead:
+class PageReceived:
     """Pixels came back."""
 
     page: Page
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class PacketRefused:
     """The device refused a packet; if it was a DATA, the session is over."""
 
     error: Error
 
 
 @dataclass(frozen=True, slots=True)
-class Restarted:
+class SessionLost:
     """The device has lost the session; a new one is being opened, and frames are sent again."""
 
 
-Event: TypeAlias = Ready | Shown | Told | PageRead | Refused | Restarted
+Event: TypeAlias = (
+    SessionOpened | FrameShown | StatusReceived | PageReceived | PacketRefused | SessionLost
+)

@@ -12,20 +12,28 @@ from collections.abc import Callable, Iterator
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
 from voxdisplay.link.counters import LinkCounters
-from voxdisplay.link.events import Event, PageRead, Ready, Refused, Restarted, Shown, Told
+from voxdisplay.link.events import (
+    Event,
+    FrameShown,
+    PacketRefused,
+    PageReceived,
+    SessionLost,
+    SessionOpened,
+    StatusReceived,
+)
 from voxdisplay.link.info_validation import check_info
-from voxdisplay.link.outgoing_frames import Frames, OnDisplay
-from voxdisplay.link.payload_size import suited
-from voxdisplay.link.readback import Reads
+from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
+from voxdisplay.link.payload_size import clamp_payload
+from voxdisplay.link.readback import ReadRequests
 from voxdisplay.link.sender import Sender
-from voxdisplay.link.session_opening import Greeting, no_answer
-from voxdisplay.link.silence_timer import Silence
+from voxdisplay.link.session_opening import SessionOpening, no_info_error
+from voxdisplay.link.silence_timer import SilenceTimer
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.packet_stream import PacketStream
 
-MOST_LATE_S = 0.25  # a caller that comes back later than this was away
-MOST_RESTARTS = 8  # without a frame shown
+MAX_CALL_DELAY_S = 0.25  # a caller that comes back later than this was away
+MAX_RESTARTS = 8  # without a frame shown
 
 
 class Link:
@@ -37,27 +45,27 @@ class Link:
         1..65535, at random.
     now : float
         Seconds on any steady clock; later calls take the same clock.
-    patience_s : float
+    timeout_s : float
         How long silence lasts before `TransportTimeout`; talk without progress, twice as long.
 
     """
 
-    def __init__(self, session: int, now: float, *, patience_s: float = 5.0) -> None:
+    def __init__(self, session: int, now: float, *, timeout_s: float = 5.0) -> None:
         self.info: packets.Info | None = None
         self.counters = LinkCounters()
         self.stream = PacketStream()
-        self._patience_s = patience_s
-        self._frames = Frames()
-        self._reads = Reads()
+        self._timeout_s = timeout_s
+        self._frames = OutgoingFrames()
+        self._reads = ReadRequests()
         self._sender = Sender(self._frames, self._reads, self.counters)
-        self._zeros = 0  # that came before the first session
+        self._zero_count = 0  # that came before the first session
         self._shown_ticket = 0  # in this session
         self._restarts = 0
-        self._greeting = Greeting(session, now)
-        self._silence = Silence(now, patience_s)
-        self._back_s = math.inf  # when the caller should be back
-        self._ask_at_once = False
-        self._curious = False  # the caller wants an answer to a STATUS
+        self._opening = SessionOpening(session, now)
+        self._timer = SilenceTimer(now, timeout_s)
+        self._call_due_s = math.inf  # when the caller should be back
+        self._poll_now = False
+        self._status_requested = False  # the caller wants an answer to a STATUS
 
     # -- what the caller wants
 
@@ -69,7 +77,7 @@ class Link:
     @property
     def idle(self) -> bool:
         """Whether nothing is on its way or waited for."""
-        return not (self._frames or self._reads or self._sender.unanswered)
+        return not (self._frames or self._reads or self._sender.outstanding)
 
     @property
     def backlog(self) -> int:
@@ -77,24 +85,24 @@ class Link:
         return len(self._frames)
 
     @property
-    def hungry(self) -> bool:
+    def needs_frame(self) -> bool:
         """Whether another frame is needed now for the line to stay busy: none is too early."""
-        return self._sender.pace.runs_out(self._frames.unsent_bytes)
+        return self._sender.delivery_rate.drains_early(self._frames.unsent_bytes)
 
     @property
-    def payloads_in_all(self) -> int:
+    def payload_count(self) -> int:
         """Payloads of all frames that have not been shown yet, as far as they are coded."""
-        return self._frames.payloads
+        return self._frames.payload_count
 
     @property
-    def payloads_left(self) -> int:
+    def unacknowledged_payloads(self) -> int:
         """Payloads that have not been received yet."""
-        return self._frames.payloads_left + self._sender.unanswered
+        return self._frames.unsent_payloads + self._sender.outstanding
 
     @property
     def bytes_per_s(self) -> float | None:
         """What the line has been seen to carry while it was busy; None if it was not yet."""
-        return self._sender.pace.bytes_per_s
+        return self._sender.delivery_rate.bytes_per_s
 
     @property
     def payload_bytes(self) -> int:
@@ -104,63 +112,66 @@ class Link:
         """
         if self.info is None:
             return spec.LIMIT_MIN_PAYLOAD
-        best = self._sender.loss.best_payload
-        return suited(best, self.info.max_payload, self.info.rx_buffer)
+        best = self._sender.loss_rate.best_payload
+        return clamp_payload(best, self.info.max_payload, self.info.rx_buffer)
 
     @property
-    def on_display(self) -> OnDisplay:
+    def displayed(self) -> PictureId:
         """What stands for the picture on display: it changes whenever that may have changed."""
         return self.counters.sessions, self._shown_ticket
 
     def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
-        """Queue a frame; give its ticket, which comes back in `Shown`. See `Frames.present`."""
+        """Queue a frame and return its ticket, which `FrameShown` carries.
+
+        See `OutgoingFrames.present`.
+        """
         return self._frames.present(payloads, clear=clear)
 
-    def begin(self) -> int:
-        """Queue a frame that is still being coded; give its ticket. See `Frames.begin`."""
-        return self._frames.begin()
+    def open_frame(self) -> int:
+        """Queue a frame that is still being encoded: see `OutgoingFrames.open_frame`."""
+        return self._frames.open_frame()
 
-    def supply(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
-        """Add payloads to a frame that was begun. See `Frames.supply`."""
-        self._frames.supply(ticket, payloads, last=last)
+    def append_payloads(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
+        """Add payloads to a frame that was begun. See `OutgoingFrames.append_payloads`."""
+        self._frames.append_payloads(ticket, payloads, last=last)
 
-    def withdraw(self) -> None:
-        """Give up a frame that is still being coded, if there is one. See `Frames.withdraw`."""
-        self._frames.withdraw()
+    def abandon_open_frame(self) -> None:
+        """Abandon a frame that is still being encoded: see `OutgoingFrames.abandon_open_frame`."""
+        self._frames.abandon_open_frame()
 
-    def present_on(
-        self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
+    def present_difference(
+        self, base: PictureId, payloads: list[bytes], whole: Callable[[], list[bytes]]
     ) -> int:
-        """Queue a difference from what is on display; give its ticket. See `Frames.present_on`."""
-        return self._frames.present_on(base, payloads, whole)
+        """Queue a difference from the displayed picture: see `OutgoingFrames`."""
+        return self._frames.present_difference(base, payloads, whole)
 
     def read(self, start: int, count: int, *, back: bool = False) -> None:
-        """Ask for pixels; `PageRead` brings them, or the first of them."""
+        """Ask for pixels; `PageReceived` brings them, or the first of them."""
         self._reads.add(start, count, back=back)
 
-    def forget_reads(self) -> None:
+    def cancel_reads(self) -> None:
         """Want no pixels any more that have been asked for."""
         self._reads.clear()
 
-    def ask(self) -> None:
-        """Ask what is on display now; `Told` brings it."""
-        self._curious = self._ask_at_once = True
+    def request_status(self) -> None:
+        """Ask what is on display now; `StatusReceived` brings it."""
+        self._status_requested = self._poll_now = True
 
     def _reopen(self, now: float) -> None:
         """Begin a new session; frames that are not shown yet are sent again, whole."""
         self._shown_ticket = 0
         self.info = None
-        self._sender.end()
-        self._ask_at_once = self._curious
-        self._silence.forget()
-        self._greeting = self._greeting.next(now)
+        self._sender.close_session()
+        self._poll_now = self._status_requested
+        self._timer.cancel_polls()
+        self._opening = self._opening.successor(now)
 
-    def renew(self, now: float) -> None:
+    def resume(self, now: float) -> None:
         """Begin a new session over a new pipe; frames that are not shown yet are sent again."""
         self.stream = PacketStream()
-        self._sender.change_line()
+        self._sender.reset_delivery_rate()
         self._reopen(now)
-        self._silence.rest(now)
+        self._timer.note_idle(now)
 
     # -- what goes out
 
@@ -174,75 +185,75 @@ class Link:
             lost too often.
 
         """
-        if (late_s := now - self._back_s) > MOST_LATE_S:
-            self._silence.excuse(late_s)
-        out = self._greet(now) if self.info is None else self._converse(now)
+        if (late_s := now - self._call_due_s) > MAX_CALL_DELAY_S:
+            self._timer.extend(late_s)
+        out = self._transmit_hello(now) if self.info is None else self._transmit_session(now)
         self.counters.wire_bytes += len(out)
         timeout_s = self.next_timeout(now)
-        self._back_s = math.inf if timeout_s is None else now + timeout_s
+        self._call_due_s = math.inf if timeout_s is None else now + timeout_s
         return out
 
-    def _converse(self, now: float) -> bytes:
+    def _transmit_session(self, now: float) -> bytes:
         if self._waiting:
-            self._silence.check(now)
+            self._timer.check(now)
         else:
-            self._silence.rest(now)
-        return b"".join(self._sender.outgoing(now, self.on_display)) + self._ask(now)
+            self._timer.note_idle(now)
+        return b"".join(self._sender.outgoing(now, self.displayed)) + self._transmit_poll(now)
 
-    def _greet(self, now: float) -> bytes:
-        if now >= self._silence.end_s:
+    def _transmit_hello(self, now: float) -> bytes:
+        if now >= self._timer.deadline_s:
             if self.counters.sessions:
-                raise self._silence.error(now)
-            raise no_answer(self._patience_s, self.stream, self._zeros)
-        return self._greeting.hello(now)
+                raise self._timer.timeout_error(now)
+            raise no_info_error(self._timeout_s, self.stream, self._zero_count)
+        return self._opening.hello(now)
 
     # -- silence
 
     @property
     def _blocked(self) -> bool:
         """Whether nothing more can be sent, and an answer that unblocks it might get lost."""
-        starves = self._sender.starved and not self._sender.on_the_way
-        return (starves or self._sender.hangs) and not self._silence.asking
+        starves = self._sender.out_of_credit and not self._sender.in_flight
+        return (starves or self._sender.window_stalled) and not self._timer.poll_outstanding
 
     @property
     def _waiting(self) -> bool:
         return bool(
-            self._sender.unanswered
-            or self._sender.starved
-            or (self._curious and self._silence.asking)
-            or self._frames.any_due
-            or self._reads.on_the_way
+            self._sender.outstanding
+            or self._sender.out_of_credit
+            or (self._status_requested and self._timer.poll_outstanding)
+            or self._frames.awaiting_swap
+            or self._reads.in_flight
         )
 
-    def _ask(self, now: float) -> bytes:
+    def _transmit_poll(self, now: float) -> bytes:
         """Give a STATUS if it is time for one."""
-        silence = self._silence
-        if not (self._waiting or self._curious):
+        silence = self._timer
+        if not (self._waiting or self._status_requested):
             return b""
-        due = silence.ask_due_s <= now
-        at_once = self._ask_at_once or self._blocked
-        self._ask_at_once = False
-        if silence.may_ask and (due or at_once):
+        due = silence.poll_due_s <= now
+        at_once = self._poll_now or self._blocked
+        self._poll_now = False
+        if silence.may_poll and (due or at_once):
             tag, wire = self._sender.status()
-            silence.ask(tag, now)
+            silence.note_poll(tag, now)
             self.counters.statuses += 1
             return b"\0" + wire  # the 00 costs no credit, and ends what a lost 00 has left open
         if due:  # nothing more may be asked; HELLO always may
             self._restart(now)
-            silence.forget(doubt=True)
-            return self._greet(now)
+            silence.cancel_polls(doubt=True)
+            return self._transmit_hello(now)
         return b""
 
     def next_timeout(self, now: float) -> float | None:
         """Seconds until `transmit` has something to do even if nothing comes; None: never."""
-        silence = self._silence
+        silence = self._timer
         if self.info is None:
-            return max(0.0, min(self._greeting.due_s, silence.end_s) - now)
-        if self._sender.goes_on:
+            return max(0.0, min(self._opening.due_s, silence.deadline_s) - now)
+        if self._sender.has_more:
             return 0.0
         if not self._waiting:
             return None
-        return max(0.0, min(silence.ask_due_s, silence.end_s) - now)
+        return max(0.0, min(silence.poll_due_s, silence.deadline_s) - now)
 
     # -- what comes in
 
@@ -256,10 +267,10 @@ class Link:
 
         """
         if not self.counters.sessions:
-            self._zeros += data.count(0)
+            self._zero_count += data.count(0)
         events: list[Event] = []
         for packet in self._packets(data):
-            events += self._take(packet, now)
+            events += self._handle(packet, now)
         return events
 
     def _packets(self, data: bytes) -> Iterator[packets.Packet]:
@@ -274,21 +285,21 @@ class Link:
             else:
                 return
 
-    def _take(self, packet: packets.Packet, now: float) -> Iterator[Event]:
+    def _handle(self, packet: packets.Packet, now: float) -> Iterator[Event]:
         info = self.info
         if info and not isinstance(packet, packets.Info):
-            self._silence.heard(now)
+            self._timer.note_packet(now)
         match packet:
-            case packets.Info() if packet.session == self._greeting.session:
-                yield from self._take_info(packet, now)
-            case packets.Ack() if info and packet.session == self._greeting.session:
-                yield from self._take_ack(info, packet, now)
+            case packets.Info() if packet.session == self._opening.session:
+                yield from self._handle_info(packet, now)
+            case packets.Ack() if info and packet.session == self._opening.session:
+                yield from self._handle_ack(info, packet, now)
             case packets.Page() if info:
-                yield from self._take_page(packet, now)
-            case packets.Error() if info and packet.session in (0, self._greeting.session):
-                yield from self._take_error(packet, now)
+                yield from self._handle_page(packet, now)
+            case packets.Error() if info and packet.session in (0, self._opening.session):
+                yield from self._handle_error(packet, now)
 
-    def _take_info(self, info: packets.Info, now: float) -> Iterator[Event]:
+    def _handle_info(self, info: packets.Info, now: float) -> Iterator[Event]:
         if self.info:
             if info.boot != self.info.boot:
                 yield self._restart(now)
@@ -297,60 +308,60 @@ class Link:
             check_info(info)
         self.info = info
         self.counters.sessions += 1
-        self._sender.begin(info.rx_buffer - self._greeting.unread_bytes)
-        self._silence.begin(now, info.refresh)
-        yield Ready(info)
+        self._sender.open_session(info.rx_buffer - self._opening.unread_bytes)
+        self._timer.open_session(now, info.refresh)
+        yield SessionOpened(info)
 
-    def _take_ack(self, info: packets.Info, ack: packets.Ack, now: float) -> Iterator[Event]:
+    def _handle_ack(self, info: packets.Info, ack: packets.Ack, now: float) -> Iterator[Event]:
         if ack.boot != info.boot:
             yield self._restart(now)
             return
-        silence = self._silence
+        silence = self._timer
         if ack.flags & spec.ACK_FLAG_ASKED:
-            silence.answered(ack.last, now)
-            if self._curious:
-                self._curious = False
-                silence.progress(now)
-                yield Told(_digest(info, ack))
+            silence.note_poll_answer(ack.last, now)
+            if self._status_requested:
+                self._status_requested = False
+                silence.note_progress(now)
+                yield StatusReceived(_digest(info, ack))
         round_trip_s = self._sender.acknowledge(ack, now)
         if round_trip_s is not None:
-            silence.progress(now)
-            silence.measure(round_trip_s)
-        self._ask_at_once |= self._sender.all_damaged and self._waiting
+            silence.note_progress(now)
+            silence.sample_round_trip(round_trip_s)
+        self._poll_now |= self._sender.all_in_flight_damaged and self._waiting
         yield from self._note_shown(info, ack, now)
 
     def _note_shown(self, info: packets.Info, ack: packets.Ack, now: float) -> Iterator[Event]:
-        ticket = self._frames.shown(ack.shown)
+        ticket = self._frames.take_shown(ack.shown)
         if ticket is None:
             return
-        self._silence.progress(now)
+        self._timer.note_progress(now)
         self._restarts = 0
         self._shown_ticket = ticket
-        yield Shown(ticket, _digest(info, ack))
+        yield FrameShown(ticket, _digest(info, ack))
 
-    def _take_page(self, page: packets.Page, now: float) -> Iterator[Event]:
-        if self._reads.answered(page):
-            self._silence.progress(now)
-            yield PageRead(page)
+    def _handle_page(self, page: packets.Page, now: float) -> Iterator[Event]:
+        if self._reads.take_answered(page):
+            self._timer.note_progress(now)
+            yield PageReceived(page)
 
-    def _take_error(self, error: packets.Error, now: float) -> Iterator[Event]:
+    def _handle_error(self, error: packets.Error, now: float) -> Iterator[Event]:
         if error.code == spec.CODE_NO_SESSION:
             yield self._restart(now)
         else:
             self._frames.clear()
             self._reads.clear()
             self._reopen(now)  # a refused DATA has ended the session
-            yield Refused(error)
+            yield PacketRefused(error)
 
-    def _restart(self, now: float) -> Restarted:
+    def _restart(self, now: float) -> SessionLost:
         self._restarts += 1
-        if self._restarts > MOST_RESTARTS:
+        if self._restarts > MAX_RESTARTS:
             raise TransportTimeout(
                 f"the device has lost the session {self._restarts} times without showing a frame",
                 hint="does it restart by itself? Look at its power supply",
             )
         self._reopen(now)
-        return Restarted()
+        return SessionLost()
 
 
 def _digest(info: packets.Info, ack: packets.Ack) -> int | None:

@@ -16,12 +16,12 @@ from voxdisplay.wire import spec
 
 _MODULUS = 256
 
-OnDisplay: TypeAlias = tuple[int, int]
+PictureId: TypeAlias = tuple[int, int]
 """Which picture is on display: how many sessions there were, and the ticket of its frame or 0."""
 
 
 @dataclass(slots=True)
-class QueuedFrame:
+class OutgoingFrame:
     """A frame that is to be shown: its payloads, and how many are in packets already.
 
     With a ``base`` they are but the difference from what that stands for, and ``whole`` gives all.
@@ -31,59 +31,59 @@ class QueuedFrame:
     ticket: int
     payloads: list[bytes]
     clear: bool
-    base: OnDisplay | None = None
-    whole: Callable[[], list[bytes]] = list
+    base: PictureId | None = None
+    full_payloads: Callable[[], list[bytes]] = list
     open: bool = False
     frame_id: int = -1
-    entered: int = 0
+    packetized: int = 0
     unsent_bytes: int = field(init=False)  # of payloads that are in no packet yet
 
     def __post_init__(self) -> None:
-        self.rewind()
+        self.reset()
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Begin again: nothing of it is in a packet."""
-        self.frame_id, self.entered = -1, 0
+        self.frame_id, self.packetized = -1, 0
         self.unsent_bytes = sum(map(len, self.payloads))
 
-    def supply(self, payloads: list[bytes]) -> None:
+    def append(self, payloads: list[bytes]) -> None:
         """Add payloads."""
         self.payloads += payloads
         self.unsent_bytes += sum(map(len, payloads))
 
     @property
-    def begun(self) -> bool:
+    def started(self) -> bool:
         """Whether it has a number, and packets."""
         return self.frame_id >= 0
 
     @property
-    def all_entered(self) -> bool:
+    def complete(self) -> bool:
         """Whether all of it is in packets: then the device will show it."""
-        return self.begun and not self.open and self.entered == len(self.payloads)
+        return self.started and not self.open and self.packetized == len(self.payloads)
 
     @property
-    def left(self) -> int:
+    def sendable(self) -> int:
         """Payloads that may enter now: of an open one the last may be that with COMMIT."""
-        return max(0, len(self.payloads) - self.open - self.entered)
+        return max(0, len(self.payloads) - self.open - self.packetized)
 
     @property
     def next_payload(self) -> bytes:
         """What the next packet brings, if any is left."""
-        return self.payloads[self.entered]
+        return self.payloads[self.packetized]
 
 
-class Frames:
+class OutgoingFrames:
     """The frames of one link, the oldest first."""
 
     def __init__(self) -> None:
-        self._queue: deque[QueuedFrame] = deque()
+        self._queue: deque[OutgoingFrame] = deque()
         self._tickets = 0
         self._next_id = 0
 
     def __len__(self) -> int:
         return len(self._queue)
 
-    def __iter__(self) -> Iterator[QueuedFrame]:
+    def __iter__(self) -> Iterator[OutgoingFrame]:
         return iter(self._queue)
 
     # -- in
@@ -99,13 +99,13 @@ class Frames:
             Whether the frame starts dark; otherwise as a copy of what is shown.
 
         """
-        return self._add(QueuedFrame(self._new_ticket(), payloads or [b""], clear))
+        return self._add(OutgoingFrame(self._new_ticket(), payloads or [b""], clear))
 
-    def begin(self) -> int:
+    def open_frame(self) -> int:
         """Queue a frame that starts dark and is still being coded; give its ticket."""
-        return self._add(QueuedFrame(self._new_ticket(), [], clear=True, open=True))
+        return self._add(OutgoingFrame(self._new_ticket(), [], clear=True, open=True))
 
-    def supply(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
+    def append_payloads(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
         """Add payloads to a frame that was begun; what is not queued any more takes none.
 
         Parameters
@@ -120,18 +120,18 @@ class Frames:
         """
         for frame in self._queue:
             if frame.ticket == ticket:
-                frame.supply(payloads if payloads or frame.payloads or not last else [b""])
+                frame.append(payloads if payloads or frame.payloads or not last else [b""])
                 frame.open = not last
 
-    def withdraw(self) -> None:
+    def abandon_open_frame(self) -> None:
         """Give up what came from `begin`, if its last payloads are still to come.
 
         What has been sent of it is followed by the next frame, and dropped (section 6, point 6).
         """
         self._queue = deque(frame for frame in self._queue if not frame.open)
 
-    def present_on(
-        self, base: OnDisplay, payloads: list[bytes], whole: Callable[[], list[bytes]]
+    def present_difference(
+        self, base: PictureId, payloads: list[bytes], whole: Callable[[], list[bytes]]
     ) -> int:
         """Queue a frame as its difference from a picture on display; give its ticket.
 
@@ -149,14 +149,14 @@ class Frames:
         """
         ticket = self._new_ticket()
         return self._add(
-            QueuedFrame(ticket, payloads or [b""], clear=False, base=base, whole=whole)
+            OutgoingFrame(ticket, payloads or [b""], clear=False, base=base, full_payloads=whole)
         )
 
     def _new_ticket(self) -> int:
         self._tickets += 1
         return self._tickets
 
-    def _add(self, frame: QueuedFrame) -> int:
+    def _add(self, frame: OutgoingFrame) -> int:
         self._queue.append(frame)
         return frame.ticket
 
@@ -168,23 +168,23 @@ class Frames:
         return sum(frame.unsent_bytes for frame in self._queue)
 
     @property
-    def payloads(self) -> int:
+    def payload_count(self) -> int:
         """Payloads of all frames, as far as they are coded."""
         return sum(len(frame.payloads) for frame in self._queue)
 
     @property
-    def payloads_left(self) -> int:
+    def unsent_payloads(self) -> int:
         """Payloads that are in no packet yet."""
-        return sum(len(frame.payloads) - frame.entered for frame in self._queue)
+        return sum(len(frame.payloads) - frame.packetized for frame in self._queue)
 
     @property
-    def any_due(self) -> bool:
+    def awaiting_swap(self) -> bool:
         """Whether the device has, or will have, all of a frame that it has not shown yet."""
-        return any(frame.all_entered for frame in self._queue)
+        return any(frame.complete for frame in self._queue)
 
     # -- out
 
-    def check_base(self, frame: QueuedFrame, on_display: OnDisplay | None) -> None:
+    def resolve_difference(self, frame: OutgoingFrame, on_display: PictureId | None) -> None:
         """Make a difference the whole frame if it cannot be sent as such.
 
         Parameters
@@ -197,39 +197,39 @@ class Frames:
         """
         fits = frame.base == on_display and frame is self._queue[0]
         if frame.base is not None and not fits:
-            frame.payloads, frame.clear, frame.base = frame.whole() or [b""], True, None
-            frame.rewind()
+            frame.payloads, frame.clear, frame.base = frame.full_payloads() or [b""], True, None
+            frame.reset()
 
-    def next_packet(self, frame: QueuedFrame, seq: int) -> packets.Data:
+    def next_packet(self, frame: OutgoingFrame, seq: int) -> packets.Data:
         """Give a frame's next packet; once that is in the window, `entered` is to be told."""
-        if not frame.begun:
+        if not frame.started:
             frame.frame_id = self._next_id
             self._next_id = (frame.frame_id + 1) % _MODULUS
-        last = not frame.open and frame.entered + 1 == len(frame.payloads)
+        last = not frame.open and frame.packetized + 1 == len(frame.payloads)
         flags = spec.DATA_FLAG_CLEAR * frame.clear | spec.DATA_FLAG_COMMIT * last
         return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=frame.next_payload)
 
-    def entered(self, frame: QueuedFrame) -> None:
+    def mark_packetized(self, frame: OutgoingFrame) -> None:
         """Note that a frame's next packet is in the window: it will arrive."""
         frame.unsent_bytes -= len(frame.next_payload)
-        frame.entered += 1
+        frame.packetized += 1
 
-    def shown(self, frame_id: int | None) -> int | None:
+    def take_shown(self, frame_id: int | None) -> int | None:
         """Take out the frame of a number that is shown, and all before it; give its ticket.
 
         None if there is no such frame, or it is not complete: then the number is an older frame's.
         """
-        if not any(frame.all_entered and frame.frame_id == frame_id for frame in self._queue):
+        if not any(frame.complete and frame.frame_id == frame_id for frame in self._queue):
             return None
         while (frame := self._queue.popleft()).frame_id != frame_id:
             pass
         return frame.ticket
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Begin a session: all frames are to be sent again, from their beginnings."""
         self._next_id = 0
         for frame in self._queue:
-            frame.rewind()
+            frame.reset()
 
     def clear(self) -> None:
         """Drop all frames."""

@@ -16,38 +16,38 @@ from voxdisplay.wire.packet import wire_size
 OVERHEAD_BYTES = spec.LIMIT_OVERHEAD + 2
 # What is believed before anything was sent: payloads of 1 KiB are within 1 % of the best for bit
 # error rates from 1e-9 to 1e-6. It weighs as much as so many bytes that were really sent.
-FIRST_PAYLOAD = 1024
+INITIAL_PAYLOAD = 1024
 _WEIGHT_BYTES = 1 << 16
 # Shorter ones would save bytes, but 32 of them do not keep a fast line busy.
-SHORTEST_PAYLOAD = 128
+MIN_PAYLOAD = 128
 # What is older than this counts half: lines get better and worse.
 _MEMORY_BYTES = 1 << 20
 _PACKETS_IN_BUFFER = 4  # so many must fit the device's buffer for the pipe to stay full
 _MODULUS = 1 << 16
 
 
-def suited(payload_bytes: int, max_payload: int, rx_buffer: int) -> int:
+def clamp_payload(payload_bytes: int, max_payload: int, rx_buffer: int) -> int:
     """Give what comes closest to a length of payloads and suits a device with such an INFO."""
     room = (rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER - wire_size(spec.LIMIT_OVERHEAD)
     return min(max(min(payload_bytes, room), spec.LIMIT_MIN_PAYLOAD), max_payload)
 
 
-class Loss:
+class LossRate:
     """The losses of one line."""
 
     def __init__(self) -> None:
         self._bytes = float(_WEIGHT_BYTES)
-        self._lost = _WEIGHT_BYTES * OVERHEAD_BYTES / FIRST_PAYLOAD**2
+        self._lost = _WEIGHT_BYTES * OVERHEAD_BYTES / INITIAL_PAYLOAD**2
         self._damaged: int | None = None
 
-    def sent(self, size: int) -> None:
+    def count_sent(self, size: int) -> None:
         """Count bytes that went out in packets."""
         self._bytes += size
         if self._bytes > _MEMORY_BYTES:
             self._bytes /= 2
             self._lost /= 2
 
-    def note_damage(self, count: int) -> int:
+    def count_damage(self, count: int) -> int:
         """Take the device's count of damaged segments (section 9.4); give how many are new.
 
         When it is told for the first time, all but one are of others who have used the line.
@@ -58,11 +58,11 @@ class Loss:
         self._lost += fresh
         return fresh
 
-    def forget_count(self) -> None:
+    def reset_damage_count(self) -> None:
         """Note that the device may count from 0 again: it may have started anew."""
         self._damaged = None
 
     @property
     def best_payload(self) -> int:
         """Bytes of payload that waste least, for all that is known."""
-        return max(SHORTEST_PAYLOAD, int(math.sqrt(OVERHEAD_BYTES * self._bytes / self._lost)))
+        return max(MIN_PAYLOAD, int(math.sqrt(OVERHEAD_BYTES * self._bytes / self._lost)))

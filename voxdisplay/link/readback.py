@@ -14,11 +14,11 @@ from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
-MOST_ON_THE_WAY = 64  # far fewer than there are tags: none comes round before its answer
+MAX_IN_FLIGHT = 64  # far fewer than there are tags: none comes round before its answer
 
 
 @dataclass(slots=True, eq=False)
-class Request:
+class ReadRequest:
     """A READ that waits for its PAGE."""
 
     start: int
@@ -34,35 +34,35 @@ class Request:
         return packets.Read(seq=tag, flags=flags, start=self.start, count=self.count)
 
 
-class Reads:
+class ReadRequests:
     """The requests of one link, the oldest first."""
 
     def __init__(self) -> None:
-        self._requests: list[Request] = []
+        self._requests: list[ReadRequest] = []
 
     def __len__(self) -> int:
         return len(self._requests)
 
     def add(self, start: int, count: int, *, back: bool) -> None:
         """Want pixels."""
-        self._requests.append(Request(start, count, back))
+        self._requests.append(ReadRequest(start, count, back))
 
     def clear(self) -> None:
         """Want nothing any more."""
         self._requests.clear()
 
     @property
-    def to_send(self) -> Iterator[Request]:
+    def sendable(self) -> Iterator[ReadRequest]:
         """Requests that are not on their way, and may be."""
         unsent = (request for request in self._requests if not request.ordinal)
-        return islice(unsent, max(0, MOST_ON_THE_WAY - self.on_the_way))
+        return islice(unsent, max(0, MAX_IN_FLIGHT - self.in_flight))
 
     @property
-    def on_the_way(self) -> int:
+    def in_flight(self) -> int:
         """How many have been sent, and wait for an answer."""
         return sum(request.ordinal > 0 for request in self._requests)
 
-    def send_again(self, taken: int) -> None:
+    def mark_lost(self, taken: int) -> None:
         """Send those again whose PAGE did not come before the answer to something later.
 
         Parameters
@@ -75,12 +75,12 @@ class Reads:
             if request.ordinal < taken:
                 request.ordinal = 0
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Begin a session: all are to be sent again."""
         for request in self._requests:
             request.ordinal = 0
 
-    def answered(self, page: packets.Page) -> bool:
+    def take_answered(self, page: packets.Page) -> bool:
         """Take out what a PAGE answers; tell whether that was anything.
 
         Raises
@@ -100,5 +100,5 @@ class Reads:
                 offset=4,
             )
         self._requests.remove(request)
-        self.send_again(request.ordinal)  # answers keep their order
+        self.mark_lost(request.ordinal)  # answers keep their order
         return True

@@ -18,95 +18,95 @@ _MODULUS = 256
 
 
 @dataclass(slots=True)
-class Flight:
+class OutstandingPacket:
     """A DATA packet that the device has not received yet, as far as we know."""
 
     wire: bytes
     ordinal: int = 0
     sent_s: float = 0.0
-    transmissions: int = 0
+    transmission_count: int = 0
     lost: bool = False
-    delivered: int = 0  # bytes that had arrived when it was sent
+    delivered_before: int = 0  # bytes that had arrived when it was sent
 
 
 @dataclass(frozen=True, slots=True)
-class _Mark:
+class _Transmission:
     """When something was sent, and where in the stream of bytes it ended."""
 
     ordinal: int
     end: int
 
 
-class Window:
+class SendWindow:
     """The sliding window over one session's DATA packets, and its credit."""
 
     def __init__(self, credit: int) -> None:
         self.next_seq = 0
-        self.flights: dict[int, Flight] = {}
+        self.outstanding: dict[int, OutstandingPacket] = {}
         self._base = 0  # the lowest number not received
         self._ordinal = 0
         self._position = 0
-        self._limit = credit  # absolute: bytes of the stream up to here fit
-        self._lost = 0  # how many of the flights are
+        self._credit_end = credit  # absolute: bytes of the stream up to here fit
+        self._lost_count = 0  # how many of the flights are
         # How many are not, and their bytes: asked for with each packet, so not counted anew.
-        self.on_the_way = (0, 0)
+        self.in_flight = (0, 0)
         self.taken = 0  # the newest ordinal that the device has taken
         self._data_taken = 0  # and of DATA
-        self._data_marks: dict[int, list[_Mark]] = {}  # of each transmission
-        self._tag_marks: dict[int, _Mark] = {}
+        self._data_transmissions: dict[int, list[_Transmission]] = {}  # of each transmission
+        self._tagged_transmissions: dict[int, _Transmission] = {}
 
     @property
     def has_room(self) -> bool:
         """Whether another sequence number fits the window."""
         return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
 
-    def fits(self, size: int) -> bool:
+    def has_credit(self, size: int) -> bool:
         """Tell whether credit allows another ``size`` bytes of DATA or READ.
 
         Four STATUS packets, and there are never more without answer, always fit the reserve.
         """
-        return self._position + size <= self._limit - spec.LIMIT_RESERVE
+        return self._position + size <= self._credit_end - spec.LIMIT_RESERVE
 
-    def lost(self) -> int | None:
+    def first_lost(self) -> int | None:
         """Give the oldest packet that is known to be lost, or None."""
-        if not self._lost:
+        if not self._lost_count:
             return None
-        order = sorted(self.flights, key=lambda seq: (seq - self._base) % _MODULUS)
-        return next((seq for seq in order if self.flights[seq].lost), None)
+        order = sorted(self.outstanding, key=lambda seq: (seq - self._base) % _MODULUS)
+        return next((seq for seq in order if self.outstanding[seq].lost), None)
 
     def add(self, wire: bytes) -> int:
         """Enter a new packet; give its sequence number's flight to `send` next."""
         seq = self.next_seq
-        self.flights[seq] = Flight(wire)
+        self.outstanding[seq] = OutstandingPacket(wire)
         self.next_seq = (seq + 1) % _MODULUS
         return seq
 
     def send(self, seq: int, now: float, delivered: int = 0) -> bytes:
         """Note that a packet goes out now, when so much had arrived; give its bytes."""
-        flight = self.flights[seq]
-        count, bytes_ = self.on_the_way
-        self.on_the_way = count + 1, bytes_ + len(flight.wire)
-        self._lost -= flight.lost
-        flight.delivered = delivered
-        mark = self._mark(len(flight.wire))
-        if not flight.transmissions:
-            self._data_marks[seq] = []  # the number has come round again
-        self._data_marks[seq].append(mark)
+        flight = self.outstanding[seq]
+        count, bytes_ = self.in_flight
+        self.in_flight = count + 1, bytes_ + len(flight.wire)
+        self._lost_count -= flight.lost
+        flight.delivered_before = delivered
+        mark = self._transmit(len(flight.wire))
+        if not flight.transmission_count:
+            self._data_transmissions[seq] = []  # the number has come round again
+        self._data_transmissions[seq].append(mark)
         flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
-        flight.transmissions += 1
+        flight.transmission_count += 1
         return flight.wire
 
     def send_tagged(self, tag: int, size: int) -> int:
         """Note that a STATUS or READ goes out now; give its ordinal."""
-        self._tag_marks[tag] = mark = self._mark(size)
+        self._tagged_transmissions[tag] = mark = self._transmit(size)
         return mark.ordinal
 
-    def _mark(self, size: int) -> _Mark:
+    def _transmit(self, size: int) -> _Transmission:
         self._ordinal += 1
         self._position += size
-        return _Mark(self._ordinal, self._position)
+        return _Transmission(self._ordinal, self._position)
 
-    def acknowledge(self, ack: Ack) -> list[Flight]:
+    def acknowledge(self, ack: Ack) -> list[OutstandingPacket]:
         """Take an ACK; give the packets that it reports as received.
 
         Raises
@@ -121,29 +121,29 @@ class Window:
                 section="9",
                 offset=1,
             )
-        received = [seq for seq in self.flights if self._is_received(seq, ack)]
-        done = [self.flights.pop(seq) for seq in received]
+        received = [seq for seq in self.outstanding if self._is_received(seq, ack)]
+        done = [self.outstanding.pop(seq) for seq in received]
         self._base = ack.next
-        if mark := self._named(ack):
-            self._limit = max(self._limit, mark.end + ack.credit)
+        if mark := self._transmission_of_last(ack):
+            self._credit_end = max(self._credit_end, mark.end + ack.credit)
             self.taken = max(self.taken, mark.ordinal)
-            for flight in self.flights.values():
+            for flight in self.outstanding.values():
                 flight.lost = flight.lost or flight.ordinal <= self.taken
-        sizes = [len(flight.wire) for flight in self.flights.values() if not flight.lost]
-        self.on_the_way = len(sizes), sum(sizes)
-        self._lost = len(self.flights) - len(sizes)
+        sizes = [len(flight.wire) for flight in self.outstanding.values() if not flight.lost]
+        self.in_flight = len(sizes), sum(sizes)
+        self._lost_count = len(self.outstanding) - len(sizes)
         return done
 
-    def _named(self, ack: Ack) -> _Mark | None:
+    def _transmission_of_last(self, ack: Ack) -> _Transmission | None:
         """Give what ``last`` names, or what was sent before it at the latest.
 
         A packet that was taken but dropped (section 6, point 6) and has been sent again has more
         than one transmission, and an ACK for damage repeats the ``last`` before.
         """
         if ack.flags & spec.ACK_FLAG_ASKED:
-            return self._tag_marks.get(ack.last)
-        marks = self._data_marks.get(ack.last, [])
-        if ack.last in self.flights:
+            return self._tagged_transmissions.get(ack.last)
+        marks = self._data_transmissions.get(ack.last, [])
+        if ack.last in self.outstanding:
             named = next((mark for mark in marks if mark.ordinal >= self._data_taken), None)
         else:  # received: it is not sent again after that
             named = marks[-1] if marks else None

@@ -9,7 +9,7 @@ from voxdisplay.wire.packet_stream import PacketStream
 HELLO_INTERVAL_S = 0.25
 
 
-class Greeting:
+class SessionOpening:
     """The opening of one session.
 
     Parameters
@@ -26,9 +26,9 @@ class Greeting:
         self._count = 0
         self._wire = packets.encode(packets.Hello(session=session))
 
-    def next(self, now: float) -> Greeting:
+    def successor(self, now: float) -> SessionOpening:
         """Give the opening of the session after this one."""
-        return Greeting(self.session % 0xFFFF + 1, now)
+        return SessionOpening(self.session % 0xFFFF + 1, now)
 
     def hello(self, now: float) -> bytes:
         """Give a HELLO if it is time for one."""
@@ -47,12 +47,12 @@ class Greeting:
         return (self._count - 1) * len(self._wire)
 
 
-def no_answer(patience_s: float, stream: PacketStream, zeros: int) -> TransportTimeout:
+def no_info_error(timeout_s: float, stream: PacketStream, zeros: int) -> TransportTimeout:
     """Give what is raised if nothing has answered for so long: with what came instead.
 
     Parameters
     ----------
-    patience_s : float
+    timeout_s : float
     stream : PacketStream
         Where all went that came.
     zeros : int
@@ -74,4 +74,4 @@ def no_answer(patience_s: float, stream: PacketStream, zeros: int) -> TransportT
     else:
         heard = "nothing came at all"
         hint = "is the display switched on, and this its port?"
-    return TransportTimeout(f"nothing answered HELLO within {patience_s:g} s; {heard}", hint=hint)
+    return TransportTimeout(f"nothing answered HELLO within {timeout_s:g} s; {heard}", hint=hint)

@@ -5,7 +5,7 @@ import dataclasses
 import document
 import numpy as np
 import pytest
-from piped import GRID, Pipe, assert_shows, changed, opened, payloads_of, random_frame
+from memory_pipe import GRID, Pipe, assert_shows, changed, open_display, payloads_of, random_frame
 
 import voxdisplay as vd
 from firmware_sim.config import Config
@@ -18,7 +18,7 @@ from voxdisplay.wire import packet as packets
 @pytest.mark.parametrize("format_", ["mono1", "index8", "rgb565", "rgb888"])
 @pytest.mark.parametrize("refresh", [0, 30_000])
 def test_present_read_and_clear(format_, refresh):
-    display, pipe = opened(pixel_format=format_, refresh=refresh)
+    display, pipe = open_display(pixel_format=format_, refresh=refresh)
     assert display.info.grid == GRID
     assert display.info.format.value == format_
     every = {"line", "box", "dots", "oct", "arc", "read", "digest"}
@@ -44,7 +44,7 @@ def test_present_read_and_clear(format_, refresh):
 
 
 def test_verify_says_where_the_page_differs():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = display.frame()
     frame.draw([(1, 2, 3), (16, 8, 4)], "red")
     display.present(frame)
@@ -55,13 +55,13 @@ def test_verify_says_where_the_page_differs():
 
 
 def test_the_text_of_a_device_cannot_steer_a_terminal():
-    display, _ = opened(name="\x1b[2Jcube\r", firmware="1\n2")
+    display, _ = open_display(name="\x1b[2Jcube\r", firmware="1\n2")
     assert display.info.name == "\N{REPLACEMENT CHARACTER}[2Jcube\N{REPLACEMENT CHARACTER}"
     assert display.info.firmware.isprintable()
 
 
 def test_progress_is_told():
-    display, _ = opened()
+    display, _ = open_display()
     told = []
     payloads = payloads_of(display, random_frame(display))
     display.present(random_frame(display), progress=lambda *place: told.append(place))
@@ -74,7 +74,7 @@ def test_progress_is_told():
 
 
 def test_a_frame_of_another_shape_or_format_is_refused_and_nothing_is_sent():
-    display, pipe = opened()
+    display, pipe = open_display()
     before = pipe.device.taken.copy()
     for frame in (vd.Frame((3, 5, 7)), vd.Frame(GRID, "index8")):
         with pytest.raises(vd.LocalProtocolError, match="the frame is"):
@@ -83,7 +83,7 @@ def test_a_frame_of_another_shape_or_format_is_refused_and_nothing_is_sent():
 
 
 def test_without_waiting_the_newest_frame_wins():
-    display, pipe = opened(refresh=1000)
+    display, pipe = open_display(refresh=1000)
     frames = [random_frame(display, seed, 0.9) for seed in range(6)]
     for frame in frames:
         assert display.present(frame, wait=False) is None
@@ -97,7 +97,7 @@ def test_without_waiting_the_newest_frame_wins():
 
 def test_no_more_than_two_frames_are_under_way():
     """A display that waits for its ticks never lags behind by what its buffer holds."""
-    display, pipe = opened(refresh=1000)
+    display, pipe = open_display(refresh=1000)
     frames = [random_frame(display, seed, 0.01) for seed in range(20)]
     for frame in frames:
         display.present(frame, wait=False)
@@ -107,7 +107,7 @@ def test_no_more_than_two_frames_are_under_way():
 
 
 def test_polling_shows_it_in_the_end():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = random_frame(display)
     display.present(frame, wait=False)
     for _ in range(50):
@@ -117,7 +117,7 @@ def test_polling_shows_it_in_the_end():
 
 
 def test_a_caller_that_is_away_for_long():
-    display, pipe = opened()
+    display, pipe = open_display()
     for seed in range(5):
         frame = random_frame(display, seed)
         display.present(frame, wait=False)
@@ -127,14 +127,14 @@ def test_a_caller_that_is_away_for_long():
 
 
 def test_a_device_without_features():
-    display, _ = opened(features=frozenset())
+    display, _ = open_display(features=frozenset())
     assert display.present(random_frame(display)).digest is None
     with pytest.raises(vd.IncompatibleDevice, match="cannot read"):
         display.read()
 
 
 def test_a_closed_display():
-    display, pipe = opened()
+    display, pipe = open_display()
     with display:
         pass
     display.close()
@@ -161,7 +161,7 @@ def test_a_device_that_cannot_be_served(fields, what):
     pipe = Pipe()
     pipe.answers = changed(info_with(**fields))
     with pytest.raises(vd.IncompatibleDevice, match=what):
-        opened(pipe)
+        open_display(pipe)
     assert pipe.closed == 1
 
 
@@ -170,13 +170,13 @@ def test_nothing_answers(noise):
     pipe = Pipe()
     pipe.answers = lambda _data: noise
     with pytest.raises(vd.TransportTimeout, match="pipe:: nothing answered HELLO within 2 s"):
-        opened(pipe)
+        open_display(pipe)
     assert pipe.closed == 1
     assert pipe.now <= 2.01
 
 
 def test_a_device_that_falls_silent():
-    display, pipe = opened()
+    display, pipe = open_display()
     display.clear()
     pipe.answers = lambda _data: b""
     began_s = pipe.now
@@ -186,7 +186,7 @@ def test_a_device_that_falls_silent():
 
 
 def test_a_device_that_restarts_gets_its_picture_again():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = random_frame(display)
     display.present(frame)
     pipe.bench.power_cycle()
@@ -205,7 +205,7 @@ def test_a_device_that_restarts_gets_its_picture_again():
     ],
 )
 def test_a_device_that_comes_back_as_another(config, what):
-    display, pipe = opened()
+    display, pipe = open_display()
     given = {"grid": GRID, "pixel_format": "rgb888", "max_payload": 128, "rx_buffer": 512}
     pipe.device = Device(Config(**given | config))
     with pytest.raises(vd.IncompatibleDevice, match=what):
@@ -219,7 +219,7 @@ def test_a_device_that_comes_back_as_another(config, what):
 @pytest.mark.parametrize("where", ["before_read", "before_write"])
 @pytest.mark.parametrize("moment", range(6))
 def test_an_interrupt_in_mid_present_leaves_it_usable(where, moment):
-    display, pipe = opened()
+    display, pipe = open_display()
     left = iter(range(moment, -1, -1))
 
     def interrupt():
@@ -241,7 +241,7 @@ def test_an_interrupt_in_mid_present_leaves_it_usable(where, moment):
 
 @pytest.mark.parametrize("wait", [True, False])
 def test_a_frame_whose_coding_is_interrupted_is_never_shown(wait):
-    display, pipe = opened()
+    display, pipe = open_display()
     shown = []
     pipe.device.on_swap = lambda: shown.append(pipe.bench.snapshot().digest)
     first, broken, last = (random_frame(display, seed) for seed in range(3))
@@ -266,18 +266,18 @@ def test_a_frame_whose_coding_is_interrupted_is_never_shown(wait):
 
 @pytest.mark.parametrize("wait", [True, False])
 def test_an_interrupt_before_anything_is_coded_leaves_no_frame_that_never_ends(wait):
-    display, pipe = opened()
+    display, pipe = open_display()
     link = display._connection.link
-    begin = link.begin
+    begin = link.open_frame
 
     def interrupted():
         begin()
         raise KeyboardInterrupt
 
-    link.begin = interrupted
+    link.open_frame = interrupted
     with pytest.raises(KeyboardInterrupt):
         display.present(random_frame(display, 1), wait=wait)
-    link.begin = begin
+    link.open_frame = begin
     turns = iter(range(99))
     pipe.before_read = lambda: next(turns)
     display.flush()
@@ -290,7 +290,7 @@ def test_an_interrupt_before_anything_is_coded_leaves_no_frame_that_never_ends(w
 
 @pytest.mark.parametrize("moment", [0, 1, 5, -1])
 def test_an_interrupt_while_a_packet_is_made_leaves_no_payload_out(monkeypatch, moment):
-    display, pipe = opened()
+    display, pipe = open_display()
     first, last = random_frame(display, 1, 0.9), random_frame(display, 2)
     left = iter(range(moment % len(payloads_of(display, first)), -1, -1))
     encode = packets.encode
@@ -310,7 +310,7 @@ def test_an_interrupt_while_a_packet_is_made_leaves_no_payload_out(monkeypatch, 
 
 
 def test_an_interrupted_read_does_not_disturb_the_next():
-    display, _ = opened()
+    display, _ = open_display()
     frame = random_frame(display, 1, 0.9)
     display.present(frame)
 
@@ -324,7 +324,7 @@ def test_an_interrupted_read_does_not_disturb_the_next():
 
 
 def test_a_device_that_breaks_the_protocol():
-    display, pipe = opened()
+    display, pipe = open_display()
     pipe.answers = lambda _data: document.on_wire(bytes.fromhex("80 00 00 01"))
     with pytest.raises(vd.RemoteProtocolError, match=r"protocol.md, section 9"):
         display.clear()
@@ -333,7 +333,7 @@ def test_a_device_that_breaks_the_protocol():
 
 
 def test_a_display_says_what_it_shows():
-    display, pipe = opened()
+    display, pipe = open_display()
     assert display.digest() == 0
     frame = display.frame()
     frame.draw([(1, 2, 3)])
@@ -346,5 +346,5 @@ def test_a_display_says_what_it_shows():
 
 
 def test_a_display_without_digest_says_nothing_of_what_it_shows():
-    display, _ = opened(features=frozenset({"read"}))
+    display, _ = open_display(features=frozenset({"read"}))
     assert display.digest() is None

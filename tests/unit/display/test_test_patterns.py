@@ -14,7 +14,7 @@ RGB = PixelFormat.RGB888
 
 
 def page(name, grid=GRID, format_=RGB, brightness=1.0):
-    (step,) = test_patterns.steps(name, grid, format_, brightness)
+    (step,) = test_patterns.pattern_frames(name, grid, format_, brightness)
     return step.frame.array()
 
 
@@ -43,14 +43,14 @@ def test_corners_are_labelled_by_colour():
 
 
 def test_the_plane_marches_along_each_axis():
-    frames = list(test_patterns.steps("plane", GRID, RGB, 1.0))
+    frames = list(test_patterns.pattern_frames("plane", GRID, RGB, 1.0))
     assert len(frames) == 3 + 5 + 7
     for number, (axis, at) in enumerate((a, i) for a in range(3) for i in range(GRID[a])):
         lit = np.argwhere(frames[number].frame.array()[..., axis])[:, ::-1]
         assert set(lit[:, axis]) == {at}
         assert len(lit) == GRID.voxels // GRID[axis]
-    assert [step.telling for step in frames[:3]] == [True, True, True]
-    assert [step.telling for step in frames[-7:]] == [True, False, False, True, False, False, True]
+    assert [step.verify for step in frames[:3]] == [True, True, True]
+    assert [step.verify for step in frames[-7:]] == [True, False, False, True, False, False, True]
 
 
 @pytest.mark.parametrize("format_", PixelFormat)
@@ -85,7 +85,7 @@ DEVICES = {
 def test_a_device_that_turns_the_axes_round_is_found_out(device, name, format_):
     memory, shown = DEVICES[device]
     meant = page(name, CUBE, format_)
-    found = test_patterns.findings(meant, memory(meant), "xyz")
+    found = test_patterns.compare_axes(meant, memory(meant), "xyz")
     assert tuple(finding.shown for finding in found) == shown
     assert [f.right for f in found] == [f"+{a}" == s for a, s in zip("xyz", shown, strict=True)]
 
@@ -94,26 +94,26 @@ def test_a_device_that_turns_the_axes_round_is_found_out(device, name, format_):
 def test_the_ticks_find_it_out_on_a_display_without_colours(device):
     memory, shown = DEVICES[device]
     meant = page("axes", CUBE, PixelFormat.MONO1)
-    found = test_patterns.findings(meant, memory(meant), "xyz")
+    found = test_patterns.compare_axes(meant, memory(meant), "xyz")
     assert tuple(finding.shown for finding in found) == shown
 
 
 def test_a_mirrored_axis_is_found_out_on_unequal_sides():
     meant = page("axes")
-    found = test_patterns.findings(meant, np.flip(meant, axis=1), "xyz")
+    found = test_patterns.compare_axes(meant, np.flip(meant, axis=1), "xyz")
     assert [(f.right, f.shown) for f in found] == [(True, "+x"), (False, "-y"), (True, "+z")]
 
 
 def test_a_page_that_is_something_else():
     meant = page("axes")
     for got in (np.zeros_like(meant), np.full_like(meant, 9), np.roll(meant, 1, axis=0)):
-        assert [(f.right, f.shown) for f in test_patterns.findings(meant, got, "xyz")] == [
+        assert [(f.right, f.shown) for f in test_patterns.compare_axes(meant, got, "xyz")] == [
             (False, None)
         ] * 3
 
 
 def test_what_the_pattern_cannot_tell_is_not_claimed():
     meant = page("corners", GRID, PixelFormat.MONO1)
-    assert [f.right for f in test_patterns.findings(meant, meant, "xyz")] == [None] * 3
+    assert [f.right for f in test_patterns.compare_axes(meant, meant, "xyz")] == [None] * 3
     thin = page("axes", Grid(4, 1, 4))
-    assert [f.right for f in test_patterns.findings(thin, thin, "xyz")] == [True, None, True]
+    assert [f.right for f in test_patterns.compare_axes(thin, thin, "xyz")] == [True, None, True]

@@ -1,102 +1,102 @@
 """How much may be on its way, and how long packets should be."""
 
 import pytest
-from rig import Rig, random_frame
+from link_rig import Rig, random_frame
 
-from voxdisplay.link.delivery_rate import LEAST_BYTES, LEAST_PACKETS, MOST_PACKETS, Pace
-from voxdisplay.link.payload_size import FIRST_PAYLOAD, OVERHEAD_BYTES, SHORTEST_PAYLOAD, Loss
+from voxdisplay.link.delivery_rate import MAX_PACKETS, MIN_BYTES, MIN_PACKETS, DeliveryRate
+from voxdisplay.link.payload_size import INITIAL_PAYLOAD, MIN_PAYLOAD, OVERHEAD_BYTES, LossRate
 
 
-def deliver(pace, count, size, *, at_once, trip_s):
+def deliver(rate, count, size, *, at_once, trip_s):
     """``count`` packets, ``at_once`` of them on their way at a time, each for ``trip_s``."""
     for _ in range(count):
-        pace.deliver(size, pace.delivered - (at_once - 1) * size, trip_s)
+        rate.sample(size, rate.delivered - (at_once - 1) * size, trip_s)
 
 
 def test_before_anything_is_known_little_is_on_its_way():
-    pace = Pace()
-    assert pace.allows(LEAST_PACKETS, 10**6)
-    assert pace.allows(4, LEAST_BYTES)
-    assert not pace.allows(4, LEAST_BYTES + 1)
+    rate = DeliveryRate()
+    assert rate.allows(MIN_PACKETS, 10**6)
+    assert rate.allows(4, MIN_BYTES)
+    assert not rate.allows(4, MIN_BYTES + 1)
 
 
 def test_a_slow_line_is_not_sent_more_than_it_carries_soon():
-    pace = Pace()
-    deliver(pace, 10, 1000, at_once=2, trip_s=0.2)  # 10 kB/s
-    assert not pace.allows(10, 10_000)
-    assert pace.allows(LEAST_PACKETS, 4000)
+    rate = DeliveryRate()
+    deliver(rate, 10, 1000, at_once=2, trip_s=0.2)  # 10 kB/s
+    assert not rate.allows(10, 10_000)
+    assert rate.allows(MIN_PACKETS, 4000)
 
 
 def test_a_fast_line_with_a_long_round_trip_is_kept_busy():
-    pace = Pace()
-    deliver(pace, 10, 1000, at_once=20, trip_s=0.02)  # 1 MB/s
-    assert pace.allows(24, 24_000)
-    assert not pace.allows(32, 64_000)
+    rate = DeliveryRate()
+    deliver(rate, 10, 1000, at_once=20, trip_s=0.02)  # 1 MB/s
+    assert rate.allows(24, 24_000)
+    assert not rate.allows(32, 64_000)
 
 
 def test_a_short_round_trip_leaves_room_in_the_window():
-    pace = Pace()
-    deliver(pace, 10, 200, at_once=5, trip_s=0.001)  # 1 MB/s, and 1 kB is on its way
-    assert pace.allows(MOST_PACKETS, MOST_PACKETS * 200)
-    assert not pace.allows(MOST_PACKETS + 1, (MOST_PACKETS + 1) * 200)
+    rate = DeliveryRate()
+    deliver(rate, 10, 200, at_once=5, trip_s=0.001)  # 1 MB/s, and 1 kB is on its way
+    assert rate.allows(MAX_PACKETS, MAX_PACKETS * 200)
+    assert not rate.allows(MAX_PACKETS + 1, (MAX_PACKETS + 1) * 200)
 
 
 def test_a_standing_queue_is_not_taken_for_a_long_line():
-    pace = Pace()
-    deliver(pace, 1, 1000, at_once=1, trip_s=0.004)
-    deliver(pace, 1000, 1000, at_once=30, trip_s=0.12)  # 250 kB/s all the while
-    assert not pace.allows(31, 31_000)
+    rate = DeliveryRate()
+    deliver(rate, 1, 1000, at_once=1, trip_s=0.004)
+    deliver(rate, 1000, 1000, at_once=30, trip_s=0.12)  # 250 kB/s all the while
+    assert not rate.allows(31, 31_000)
 
 
 def test_a_rate_that_is_gone_is_forgotten():
-    pace = Pace()
-    deliver(pace, 10, 1000, at_once=10, trip_s=0.001)
-    assert pace.allows(MOST_PACKETS, 200_000)
-    deliver(pace, 1000, 1000, at_once=2, trip_s=0.1)
-    assert not pace.allows(MOST_PACKETS, 10_000)
+    rate = DeliveryRate()
+    deliver(rate, 10, 1000, at_once=10, trip_s=0.001)
+    assert rate.allows(MAX_PACKETS, 200_000)
+    deliver(rate, 1000, 1000, at_once=2, trip_s=0.1)
+    assert not rate.allows(MAX_PACKETS, 10_000)
 
 
 def test_payloads_begin_at_1_kib_and_grow_while_nothing_is_lost():
-    loss = Loss()
-    assert loss.best_payload == FIRST_PAYLOAD
+    losses = LossRate()
+    assert losses.best_payload == INITIAL_PAYLOAD
     for _ in range(10_000):
-        loss.sent(1000)
-    assert loss.best_payload > 16 * FIRST_PAYLOAD
+        losses.count_sent(1000)
+    assert losses.best_payload > 16 * INITIAL_PAYLOAD
 
 
 @pytest.mark.parametrize("every_bytes", [30_000, 100_000, 1_000_000])
 def test_payloads_suit_the_losses(every_bytes):
-    loss = Loss()
+    losses = LossRate()
     for count in range(1, 200):
-        loss.sent(every_bytes)
-        loss.note_damage(count)
+        losses.count_sent(every_bytes)
+        losses.count_damage(count)
     best = (OVERHEAD_BYTES * every_bytes) ** 0.5
-    assert 0.7 * best < loss.best_payload < 1.4 * best
+    assert 0.7 * best < losses.best_payload < 1.4 * best
 
 
 def test_payloads_do_not_shrink_to_nothing():
-    loss = Loss()
+    losses = LossRate()
     for count in range(1000):
-        loss.sent(100)
-        loss.note_damage(3 * count)
-    assert loss.best_payload == SHORTEST_PAYLOAD
+        losses.count_sent(100)
+        losses.count_damage(3 * count)
+    assert losses.best_payload == MIN_PAYLOAD
 
 
 def test_damage_of_others_counts_once_and_the_count_wraps_around():
-    loss = Loss()
-    assert loss.note_damage(500) == 1
-    assert loss.note_damage(500) == 0
-    assert loss.note_damage(65_535) == 65_035
-    assert loss.note_damage(2) == 3
-    assert Loss().note_damage(0) == 0
+    losses = LossRate()
+    assert losses.count_damage(500) == 1
+    assert losses.count_damage(500) == 0
+    assert losses.count_damage(65_535) == 65_035
+    assert losses.count_damage(2) == 3
+    assert LossRate().count_damage(0) == 0
 
 
 def test_the_rate_is_told_once_the_line_was_busy():
-    pace = Pace()
-    deliver(pace, 3, 200, at_once=1, trip_s=0.02)
-    assert pace.bytes_per_s is None
-    deliver(pace, 10, 1000, at_once=5, trip_s=0.5)
-    assert pace.bytes_per_s == pytest.approx(10_000, rel=0.2)
+    rate = DeliveryRate()
+    deliver(rate, 3, 200, at_once=1, trip_s=0.02)
+    assert rate.bytes_per_s is None
+    deliver(rate, 10, 1000, at_once=5, trip_s=0.5)
+    assert rate.bytes_per_s == pytest.approx(10_000, rel=0.2)
 
 
 def test_a_device_that_starts_again_counts_damage_from_0():
@@ -111,5 +111,5 @@ def test_a_device_that_starts_again_counts_damage_from_0():
     rig.present(random_frame(rig.rng))
     rig.run()
     assert rig.restarts == 1
-    assert rig.link.payload_bytes >= before > SHORTEST_PAYLOAD
+    assert rig.link.payload_bytes >= before > MIN_PAYLOAD
     assert rig.link.counters.device_damaged < 10

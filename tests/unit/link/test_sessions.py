@@ -4,10 +4,10 @@ import dataclasses
 
 import document
 import pytest
-from by_hand import BOOT, INFO, SESSION, ack, opened, sent, told
+from scripted_link import BOOT, INFO, SESSION, ack, open_link, receive, transmit
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
-from voxdisplay.link import Link, Ready, Refused, Restarted, Shown
+from voxdisplay.link import FrameShown, Link, PacketRefused, SessionLost, SessionOpened
 from voxdisplay.link.info_validation import check_info
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
@@ -27,7 +27,7 @@ def test_hello_is_repeated_unchanged_until_it_is_answered():
     assert link.transmit(0.1) == b""
     assert link.next_timeout(0.1) == pytest.approx(0.15)
     assert link.transmit(0.25) == first
-    told(link, INFO, 0.3)
+    receive(link, INFO, 0.3)
     assert link.ready
     assert link.transmit(0.5) == b""
     assert link.next_timeout(0.5) is None
@@ -41,9 +41,9 @@ def test_hellos_that_may_still_be_in_the_buffer_cost_credit():
         link = Link(SESSION, 0.0)
         for now in range(hellos):
             link.transmit(float(now))
-        told(link, dataclasses.replace(INFO, rx_buffer=enough), 2.0)
+        receive(link, dataclasses.replace(INFO, rx_buffer=enough), 2.0)
         link.present([payload])
-        assert isinstance(sent(link, 2.0)[0], packets.Data) == fits
+        assert isinstance(transmit(link, 2.0)[0], packets.Data) == fits
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_hellos_that_may_still_be_in_the_buffer_cost_credit():
     ],
 )
 def test_a_hello_that_nobody_answers(came, said, hint):
-    link = Link(SESSION, 0.0, patience_s=1)
+    link = Link(SESSION, 0.0, timeout_s=1)
     link.receive(came, 0.5)
     link.transmit(0.9)
     with pytest.raises(TransportTimeout, match="answered HELLO within 1 s") as caught:
@@ -71,11 +71,11 @@ def test_before_a_session_all_but_info_is_dropped():
     link = Link(SESSION, 0.0)
     malformed = document.on_wire(bytes.fromhex("80 00 00 01 02"))
     assert link.receive(malformed, 0.0) == []
-    assert told(link, ack(), 0.0) == []
-    assert told(link, packets.Error(code=1, session=0, offset=0), 0.0) == []
-    assert told(link, dataclasses.replace(INFO, session=SESSION + 1), 0.0) == []
+    assert receive(link, ack(), 0.0) == []
+    assert receive(link, packets.Error(code=1, session=0, offset=0), 0.0) == []
+    assert receive(link, dataclasses.replace(INFO, session=SESSION + 1), 0.0) == []
     assert not link.ready
-    assert link.receive(malformed + packets.encode(INFO), 0.0) == [Ready(INFO)]
+    assert link.receive(malformed + packets.encode(INFO), 0.0) == [SessionOpened(INFO)]
 
 
 def test_an_info_that_is_too_short_breaks_the_protocol():
@@ -106,7 +106,7 @@ def test_an_info_that_contradicts_the_document(field, value, named):
         check_info(dataclasses.replace(INFO, **{field: value}))
     assert caught.value.section == "5"
     with pytest.raises(RemoteProtocolError, match=named):
-        told(Link(SESSION, 0.0), dataclasses.replace(INFO, **{field: value}), 0.0)
+        receive(Link(SESSION, 0.0), dataclasses.replace(INFO, **{field: value}), 0.0)
 
 
 def test_a_grid_of_too_many_voxels():
@@ -117,43 +117,43 @@ def test_a_grid_of_too_many_voxels():
 
 def test_the_least_receive_buffer_is_enough():
     """9.2: "large enough for 64 bytes and the longest packet as it is on the wire"."""
-    link = opened(max_payload=247, rx_buffer=254 + 1 + 1 + 64)
+    link = open_link(max_payload=247, rx_buffer=254 + 1 + 1 + 64)
     link.present([b"\xc0\x01" + b"\x81" * 245])
-    assert [len(packet.ops) for packet in sent(link, 0.0)] == [247]
+    assert [len(packet.ops) for packet in transmit(link, 0.0)] == [247]
 
 
 # -- what goes wrong
 
 
 def test_packets_of_another_session_are_dropped():
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
-    sent(link, 0.0)
-    assert told(link, ack(1, 0, session=SESSION + 1, flags=1), 0.1) == []
-    assert told(link, ack(1, 0, session=SESSION + 1, boot=1, flags=1), 0.1) == []
-    assert told(link, dataclasses.replace(INFO, session=SESSION + 1, boot=1), 0.1) == []
-    assert told(link, packets.Error(code=7, session=SESSION + 1, offset=3), 0.1) == []
+    transmit(link, 0.0)
+    assert receive(link, ack(1, 0, session=SESSION + 1, flags=1), 0.1) == []
+    assert receive(link, ack(1, 0, session=SESSION + 1, boot=1, flags=1), 0.1) == []
+    assert receive(link, dataclasses.replace(INFO, session=SESSION + 1, boot=1), 0.1) == []
+    assert receive(link, packets.Error(code=7, session=SESSION + 1, offset=3), 0.1) == []
     assert link.ready
     assert link.backlog == 1
 
 
 def test_the_hosts_own_packets_are_dropped_and_so_is_an_unknown_type():
-    link = opened()
+    link = open_link()
     for packet in (packets.Hello(session=SESSION), packets.Status(), packets.Data()):
-        assert told(link, packet, 0.0) == []
+        assert receive(link, packet, 0.0) == []
     assert link.receive(document.on_wire(b"\xc0\0\0later"), 0.0) == []
     assert link.stream.counters.unknown == 1
 
 
 def test_an_answer_to_what_was_not_asked():
-    link = opened()
-    assert told(link, ack(0, 99, flags=spec.ACK_FLAG_ASKED), 0.1) == []
-    assert sent(link, 0.2) == []
+    link = open_link()
+    assert receive(link, ack(0, 99, flags=spec.ACK_FLAG_ASKED), 0.1) == []
+    assert transmit(link, 0.2) == []
 
 
 def test_an_info_that_comes_twice_is_dropped():
-    link = opened()
-    assert told(link, INFO, 0.1) == []
+    link = open_link()
+    assert receive(link, INFO, 0.1) == []
     assert link.counters.sessions == 1
 
 
@@ -168,16 +168,16 @@ def test_an_info_that_comes_twice_is_dropped():
 )
 def test_a_device_that_has_restarted_gets_the_whole_frame_again(news):
     """12: "begins again with HELLO and a whole frame"."""
-    link = opened()
+    link = open_link()
     link.present([b"\xa0", b"\xa1"])
     link.read(0, 1)
-    before = sent(link, 0.0)
-    told(link, ack(1, 0), 0.1)
-    assert told(link, news, 0.2) == [Restarted()]
-    (hello,) = sent(link, 0.2)
+    before = transmit(link, 0.0)
+    receive(link, ack(1, 0), 0.1)
+    assert receive(link, news, 0.2) == [SessionLost()]
+    (hello,) = transmit(link, 0.2)
     assert hello.session == SESSION + 1
-    told(link, dataclasses.replace(INFO, session=SESSION + 1, boot=BOOT + 1), 0.3)
-    again = sent(link, 0.3)
+    receive(link, dataclasses.replace(INFO, session=SESSION + 1, boot=BOOT + 1), 0.3)
+    again = transmit(link, 0.3)
     assert again[:2] == before[:2]
     assert (again[2].start, again[2].count) == (0, 1)
 
@@ -185,20 +185,20 @@ def test_a_device_that_has_restarted_gets_the_whole_frame_again(news):
 def test_the_last_session_number_is_followed_by_the_first():
     """5: a session is "a number of the host's choice, not 0"."""
     link = Link(0xFFFF, 0.0)
-    told(link, dataclasses.replace(INFO, session=0xFFFF), 0.0)
-    told(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), 0.0)
-    assert [packet.session for packet in sent(link, 0.0)] == [1]
+    receive(link, dataclasses.replace(INFO, session=0xFFFF), 0.0)
+    receive(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), 0.0)
+    assert [packet.session for packet in transmit(link, 0.0)] == [1]
 
 
 def test_a_device_that_restarts_all_the_time():
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
 
     def restart():
         for k in range(20):
-            sent(link, float(k))
-            told(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), float(k))
-            told(link, dataclasses.replace(INFO, session=SESSION + 1 + k), float(k))
+            transmit(link, float(k))
+            receive(link, packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0), float(k))
+            receive(link, dataclasses.replace(INFO, session=SESSION + 1 + k), float(k))
 
     with pytest.raises(TransportTimeout, match="lost the session 9 times"):
         restart()
@@ -207,29 +207,29 @@ def test_a_device_that_restarts_all_the_time():
 @pytest.mark.parametrize("code", range(2, 15))
 @pytest.mark.parametrize("session", [0, SESSION])
 def test_what_a_device_refuses_is_told_and_a_session_begun(code, session):
-    link = opened()
+    link = open_link()
     link.present([b"\xe0"])
-    sent(link, 0.0)
+    transmit(link, 0.0)
     error = packets.Error(code=code, session=session, offset=3, text="no")
-    assert told(link, error, 0.1) == [Refused(error)]
+    assert receive(link, error, 0.1) == [PacketRefused(error)]
     assert (link.backlog, link.ready) == (0, False)
     # What was on its way behind it finds no session: that is no news.
     late = packets.Error(code=spec.CODE_NO_SESSION, session=0, offset=0)
-    assert told(link, late, 0.1) == []
-    assert [packet.session for packet in sent(link, 0.1)] == [SESSION + 1]
+    assert receive(link, late, 0.1) == []
+    assert [packet.session for packet in transmit(link, 0.1)] == [SESSION + 1]
 
 
 def test_a_malformed_packet_of_a_session_breaks_the_protocol_and_the_next_is_taken():
-    link = opened()
+    link = open_link()
     ticket = link.present([b"\xa0"])
-    sent(link, 0.0)
+    transmit(link, 0.0)
     malformed = document.on_wire(bytes.fromhex("80 00 00 01 02"))
     with pytest.raises(RemoteProtocolError, match="ACK"):
         link.receive(malformed + packets.encode(ack(1, 0, flags=1)), 0.1)
-    assert link.receive(b"", 0.1) == [Shown(ticket, 0)]
+    assert link.receive(b"", 0.1) == [FrameShown(ticket, 0)]
 
 
 def test_an_ack_for_what_was_never_sent_breaks_the_protocol():
-    link = opened()
+    link = open_link()
     with pytest.raises(RemoteProtocolError, match="next is 9"):
-        told(link, ack(9, 8), 0.0)
+        receive(link, ack(9, 8), 0.0)

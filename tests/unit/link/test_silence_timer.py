@@ -3,10 +3,10 @@
 import dataclasses
 
 import pytest
-from by_hand import BOOT, INFO, SESSION, ack, opened, sent, told
+from scripted_link import BOOT, INFO, SESSION, ack, open_link, receive, transmit
 
 from voxdisplay.errors import RemoteProtocolError, TransportTimeout
-from voxdisplay.link import Link, PageRead, Restarted, Shown, Told
+from voxdisplay.link import FrameShown, Link, PageReceived, SessionLost, StatusReceived
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
@@ -15,30 +15,30 @@ from voxdisplay.wire import spec
 
 def test_status_is_asked_ever_more_rarely_and_at_most_four_times():
     """9.3: "MUST have no more than 4 of them without answer at one time"."""
-    link = Link(SESSION, 0.0, patience_s=100)
-    sent(link, 0.0)
-    told(link, INFO, 0.0)
+    link = Link(SESSION, 0.0, timeout_s=100)
+    transmit(link, 0.0)
+    receive(link, INFO, 0.0)
     link.present([b"\xa0"])
     now, asked = 0.0, []
     while link.ready:
-        asked += [now for packet in sent(link, now) if isinstance(packet, packets.Status)]
+        asked += [now for packet in transmit(link, now) if isinstance(packet, packets.Status)]
         now += link.next_timeout(now)
     assert asked == pytest.approx([0.25, 0.75, 1.75, 3.75])
     assert now >= 7.75, "then it begins again with HELLO"
 
 
 def test_a_device_that_answers_nothing_but_hello_is_as_good_as_silent():
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
     now, hellos = 0.0, []
 
     def answer_hello():
         nonlocal now
         while now < 100:
-            for packet in sent(link, now):
+            for packet in transmit(link, now):
                 if isinstance(packet, packets.Hello):
                     hellos.append(now)
-                    told(link, dataclasses.replace(INFO, session=packet.session), now)
+                    receive(link, dataclasses.replace(INFO, session=packet.session), now)
             now += max(link.next_timeout(now) or 0.0, 0.001)
 
     with pytest.raises(
@@ -49,17 +49,17 @@ def test_a_device_that_answers_nothing_but_hello_is_as_good_as_silent():
 
 
 def test_an_answer_counts_for_the_questions_before_it_and_not_for_those_behind():
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
-    sent(link, 0.0)
+    transmit(link, 0.0)
     tags = []
     for now in (0.25, 0.75, 1.375):
-        (status,) = sent(link, now)
+        (status,) = transmit(link, now)
         tags.append(status.seq)
-    told(link, ack(0, tags[1], flags=spec.ACK_FLAG_ASKED), 1.4)
+    receive(link, ack(0, tags[1], flags=spec.ACK_FLAG_ASKED), 1.4)
     count, now = 0, 1.4
     while now < 4:
-        count += sum(isinstance(packet, packets.Status) for packet in sent(link, now))
+        count += sum(isinstance(packet, packets.Status) for packet in transmit(link, now))
         now += 0.01
         if not link.ready:
             break
@@ -67,14 +67,14 @@ def test_an_answer_counts_for_the_questions_before_it_and_not_for_those_behind()
 
 
 def test_a_caller_that_was_away_does_not_blame_the_device():
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
-    sent(link, 0.0)
+    transmit(link, 0.0)
     for now in (1000.0, 2000.0, 2000.01):
-        assert all(isinstance(packet, packets.Status) for packet in sent(link, now))
-    assert told(link, ack(1, 0, flags=1), 2000.02) == [Shown(1, 0)]
+        assert all(isinstance(packet, packets.Status) for packet in transmit(link, now))
+    assert receive(link, ack(1, 0, flags=1), 2000.02) == [FrameShown(1, 0)]
     link.present([b"\xa0"])
-    sent(link, 9000.0)
+    transmit(link, 9000.0)
     assert link.next_timeout(9000.0) <= 2.5, "nor has it learnt that the line is slow"
 
 
@@ -83,36 +83,36 @@ def test_a_caller_that_was_away_does_not_blame_the_device():
 
 def test_an_idle_link_may_be_asked_what_is_on_display():
     """However long nothing was to be said; and a lost STATUS is asked again."""
-    link = opened()
-    link.ask()
-    (status,) = sent(link, 100.0)
+    link = open_link()
+    link.request_status()
+    (status,) = transmit(link, 100.0)
     assert isinstance(status, packets.Status)
-    assert sent(link, 100.001) == []
-    (again,) = sent(link, 100.0 + link.next_timeout(100.0))
+    assert transmit(link, 100.001) == []
+    (again,) = transmit(link, 100.0 + link.next_timeout(100.0))
     assert again.seq != status.seq
     answer = ack(last=again.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
-    assert told(link, answer, 101.0) == [Told(77)]
-    assert told(link, answer, 101.0) == []
+    assert receive(link, answer, 101.0) == [StatusReceived(77)]
+    assert receive(link, answer, 101.0) == []
     assert link.next_timeout(101.0) is None
 
 
 def test_a_device_without_digest_is_asked_for_none():
-    link = opened(features=0)
-    link.ask()
-    (status,) = sent(link, 1.0)
+    link = open_link(features=0)
+    link.request_status()
+    (status,) = transmit(link, 1.0)
     answer = ack(last=status.seq, flags=spec.ACK_FLAG_ASKED, digest=77)
-    assert told(link, answer, 1.0) == [Told(None)]
+    assert receive(link, answer, 1.0) == [StatusReceived(None)]
 
 
 def test_a_question_outlives_the_session():
-    link = opened()
-    link.ask()
-    sent(link, 1.0)
-    (restarted,) = told(link, ack(boot=BOOT + 1), 1.0)
-    assert restarted == Restarted()
-    (hello,) = sent(link, 1.0)
-    told(link, dataclasses.replace(INFO, session=hello.session, boot=BOOT + 1), 1.0)
-    (status,) = sent(link, 1.0)
+    link = open_link()
+    link.request_status()
+    transmit(link, 1.0)
+    (restarted,) = receive(link, ack(boot=BOOT + 1), 1.0)
+    assert restarted == SessionLost()
+    (hello,) = transmit(link, 1.0)
+    receive(link, dataclasses.replace(INFO, session=hello.session, boot=BOOT + 1), 1.0)
+    (status,) = transmit(link, 1.0)
     assert isinstance(status, packets.Status)
 
 
@@ -121,77 +121,77 @@ def test_a_question_outlives_the_session():
 
 def test_a_page_that_does_not_match():
     for wrong in ({"start": 6}, {"count": 0}, {"count": 11}):
-        link = opened()
+        link = open_link()
         link.read(5, 10)
-        (read,) = sent(link, 0.0)
+        (read,) = transmit(link, 0.0)
         page = {"start": 5, "count": 10} | wrong
         with pytest.raises(RemoteProtocolError, match="PAGE covers") as caught:
-            told(link, packets.Page(seq=read.seq, **page), 0.1)
+            receive(link, packets.Page(seq=read.seq, **page), 0.1)
         assert caught.value.section == "10"
 
 
 def test_a_page_that_nobody_asked_for_is_dropped():
-    link = opened()
-    assert told(link, packets.Page(seq=1, start=0, count=1), 0.0) == []
+    link = open_link()
+    assert receive(link, packets.Page(seq=1, start=0, count=1), 0.0) == []
     link.read(0, 1)
-    (read,) = sent(link, 0.0)
-    assert told(link, packets.Page(seq=read.seq + 1, start=0, count=1), 0.0) == []
-    link.forget_reads()
-    assert told(link, packets.Page(seq=read.seq, start=0, count=1), 0.0) == []
+    (read,) = transmit(link, 0.0)
+    assert receive(link, packets.Page(seq=read.seq + 1, start=0, count=1), 0.0) == []
+    link.cancel_reads()
+    assert receive(link, packets.Page(seq=read.seq, start=0, count=1), 0.0) == []
     assert link.idle
 
 
 def test_a_page_says_nothing_of_data():
     """9.3: a packet is lost when an ACK shows it; the ACK of a DATA may come behind a PAGE."""
-    link = opened()
+    link = open_link()
     link.present([b"\xa0"])
     link.read(0, 1)
-    data, read = sent(link, 0.0)
-    told(link, packets.Page(seq=read.seq, start=0, count=1, ops=b"\xa0"), 0.0)
-    assert sent(link, 0.0) == []
-    assert told(link, ack(1, data.seq, flags=1), 0.0) == [Shown(1, 0)]
+    data, read = transmit(link, 0.0)
+    receive(link, packets.Page(seq=read.seq, start=0, count=1, ops=b"\xa0"), 0.0)
+    assert transmit(link, 0.0) == []
+    assert receive(link, ack(1, data.seq, flags=1), 0.0) == [FrameShown(1, 0)]
 
 
 def test_a_read_whose_page_does_not_come_is_sent_again():
-    link = opened()
+    link = open_link()
     link.read(3, 4, back=True)
-    (read,) = sent(link, 0.0)
+    (read,) = transmit(link, 0.0)
     assert (read.flags, read.start, read.count) == (spec.READ_FLAG_BACK, 3, 4)
-    (status,) = sent(link, 0.25)
-    told(link, ack(0, status.seq, flags=spec.ACK_FLAG_ASKED), 0.3)
-    (again,) = sent(link, 0.3)
+    (status,) = transmit(link, 0.25)
+    receive(link, ack(0, status.seq, flags=spec.ACK_FLAG_ASKED), 0.3)
+    (again,) = transmit(link, 0.3)
     assert (again.start, again.count, again.seq != read.seq) == (3, 4, True)
 
 
 def test_many_reads_take_no_tag_whose_answer_is_still_to_come():
     """Else the answer to a STATUS would be taken for one to a READ that was sent much later."""
-    link = opened(rx_buffer=1 << 16)
-    link.ask()
-    (status,) = sent(link, 0.0)
+    link = open_link(rx_buffer=1 << 16)
+    link.request_status()
+    (status,) = transmit(link, 0.0)
     for start in range(100):
         for count in (1, 2, 3):
             link.read(start, count)
-    reads = sent(link, 0.0)
+    reads = transmit(link, 0.0)
     answer = ack(last=status.seq, flags=spec.ACK_FLAG_ASKED, credit=1 << 16)
-    assert told(link, answer, 0.1) == [Told(0)]
+    assert receive(link, answer, 0.1) == [StatusReceived(0)]
     asked = []
     while reads:
         asked += [(read.start, read.count) for read in reads]
         for read in reads:
             page = packets.Page(seq=read.seq, start=read.start, count=read.count, ops=b"\xa0")
-            assert told(link, page, 0.1) == [PageRead(page)]
-        reads = sent(link, 0.1)
+            assert receive(link, page, 0.1) == [PageReceived(page)]
+        reads = transmit(link, 0.1)
     assert len(set(asked)) == len(asked) == 300
     assert link.idle
 
 
 def test_a_page_tells_that_those_asked_for_before_it_are_lost():
     """9: "answered in the order in which they are taken"."""
-    link = opened(rx_buffer=1 << 16)
+    link = open_link(rx_buffer=1 << 16)
     for k in range(3):
         link.read(k, 1)
-    first, second, third = sent(link, 0.0)
-    assert told(link, packets.Page(seq=second.seq, start=1, count=1, ops=b"\xa0"), 0.1)
-    (again,) = sent(link, 0.1)
+    first, second, third = transmit(link, 0.0)
+    assert receive(link, packets.Page(seq=second.seq, start=1, count=1, ops=b"\xa0"), 0.1)
+    (again,) = transmit(link, 0.1)
     assert (again.start, again.seq) == (0, third.seq + 1)
     assert again.seq != first.seq

@@ -2,7 +2,7 @@
 
 import document
 import pytest
-from piped import GRID, assert_shows, opened, random_frame
+from memory_pipe import GRID, assert_shows, open_display, random_frame
 
 import voxdisplay as vd
 from voxdisplay.wire import spec
@@ -23,7 +23,7 @@ def flags_sent(pipe):
 
 @pytest.mark.parametrize("format_", ["mono1", "index8", "rgb565", "rgb888"])
 def test_a_frame_that_keeps_what_is_on_display(format_):
-    display, pipe = opened(pixel_format=format_)
+    display, pipe = open_display(pixel_format=format_)
     before = random_frame(display)
     whole = display.present(before)
     flags = flags_sent(pipe)
@@ -39,7 +39,7 @@ def test_a_frame_that_keeps_what_is_on_display(format_):
 
 
 def test_any_frame_that_differs_little_goes_as_its_difference():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = random_frame(display)
     display.present(frame)
     flags = flags_sent(pipe)
@@ -57,7 +57,7 @@ def test_any_frame_that_differs_little_goes_as_its_difference():
 
 
 def test_without_waiting_too():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = random_frame(display)
     display.present(frame, wait=False)
     kept = display.frame(keep=True)
@@ -73,7 +73,7 @@ def test_without_waiting_too():
 
 
 def test_a_device_that_restarts_is_not_asked_to_keep_anything():
-    display, pipe = opened()
+    display, pipe = open_display()
     display.present(random_frame(display))
     frame = display.frame(keep=True)
     frame.draw([(3, 3, 3)], "lime")
@@ -87,10 +87,10 @@ def test_a_device_that_restarts_is_not_asked_to_keep_anything():
 
 
 def test_what_another_has_shown_is_read_back():
-    first, pipe = opened()
+    first, pipe = open_display()
     shown = random_frame(first)
     first.present(shown)
-    display, _ = opened(pipe)
+    display, _ = open_display(pipe)
     frame = display.frame(keep=True)
     assert (frame.array() == shown.array()).all()
     frame.draw([(3, 3, 3)], "lime")
@@ -102,7 +102,7 @@ def test_what_another_has_shown_is_read_back():
 
 @pytest.mark.parametrize("features", [frozenset(), frozenset({"digest"}), frozenset({"read"})])
 def test_what_is_not_known_is_not_made_up(features):
-    display, pipe = opened(features=features)
+    display, pipe = open_display(features=features)
     if "read" not in features:
         with pytest.raises(vd.IncompatibleDevice, match="not known what is on display") as caught:
             display.frame(keep=True)
@@ -119,7 +119,7 @@ def test_what_is_not_known_is_not_made_up(features):
 
 
 def test_a_difference_that_does_not_take_is_mended_by_the_whole():
-    display, pipe = opened()
+    display, pipe = open_display()
     display.present(random_frame(display))
     pipe.device.memory.front.put(7, b"\x01\x02\x03")  # and nobody has noticed
     frame = display.frame(keep=True)
@@ -130,7 +130,7 @@ def test_a_difference_that_does_not_take_is_mended_by_the_whole():
 
 
 def test_a_palette_needs_a_device_that_takes_one():
-    display, _ = opened(pixel_format="index8", features=frozenset({"diff", "digest"}))
+    display, _ = open_display(pixel_format="index8", features=frozenset({"diff", "digest"}))
     palette = display.frame().palette
     with pytest.raises(vd.IncompatibleDevice, match="no palette"):
         display.frame(palette=palette)
@@ -144,7 +144,7 @@ def test_a_palette_needs_a_device_that_takes_one():
 
 def test_a_palette_of_its_own():
     features = frozenset({"palette", "read", "digest"})
-    display, pipe = opened(pixel_format="index8", features=features)
+    display, pipe = open_display(pixel_format="index8", features=features)
     frame = display.frame()
     assert frame.draw([(x, 1, 2) for x in range(17)], ["#123456", "#abcdef"]).exact_color
     display.present(frame)
@@ -158,6 +158,6 @@ def test_a_palette_of_its_own():
     given = display.frame(palette=kept.palette)
     given.set(kept.array())
     display.present(given)
-    other, _ = opened(pipe)
+    other, _ = open_display(pipe)
     assert other.frame(keep=True).draw([(0, 0, 0)], "#010203").exact_color
     assert other.clear().digest == 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from voxdisplay.link.send_window import Window
+from voxdisplay.link.send_window import SendWindow
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
@@ -131,7 +131,7 @@ class Truth:
         room = rng.choice([0, 1, LONGEST, 1000, 10_000])
         buffer = spec.LIMIT_RESERVE + LONGEST + room
         self.device = Device(rng, buffer, rng.choice(["ring", "all", "little"]))
-        self.window = Window(buffer)
+        self.window = SendWindow(buffer)
         self.faults = rng.choice([0, 0.02, 0.1, 0.3])
         self.line = deque()  # of (transmission, what becomes of it)
         self.sent = []  # all transmissions
@@ -151,7 +151,7 @@ class Truth:
 
     def enter(self):
         """Enter a new packet, if window and credit have room for it."""
-        if not (self.window.has_room and self.window.fits(LONGEST)):
+        if not (self.window.has_room and self.window.has_credit(LONGEST)):
             return False
         number = len(self.times)
         if number == len(self._frame_of):
@@ -164,8 +164,8 @@ class Truth:
 
     def mend(self):
         """Send again what is lost, if credit has room for it."""
-        seq = self.window.lost()
-        if seq is None or not self.window.fits(len(self.window.flights[seq].wire)):
+        seq = self.window.first_lost()
+        if seq is None or not self.window.has_credit(len(self.window.outstanding[seq].wire)):
             return False
         self._send(seq)
         return True
@@ -218,12 +218,12 @@ class Truth:
         window, device = self.window, self.device
         assert window.taken <= device.taken
         on_the_line = {sent.ordinal for sent, _ in self.line}
-        for seq, flight in window.flights.items():
+        for seq, flight in window.outstanding.items():
             if flight.lost:
                 assert flight.ordinal not in on_the_line, "lost, and still on its way"
                 assert self._packets[seq] not in device.received, "lost, and received"
         free = device.promised - self.sent[-1].end - spec.LIMIT_RESERVE
-        assert not window.fits(free + 1), "more than was promised"
+        assert not window.has_credit(free + 1), "more than was promised"
 
     # -- turns
 
@@ -248,7 +248,7 @@ class Truth:
         """Let all arrive over a line without faults, in few turns; no new packet is sent."""
         self.faults = 0
         for _ in range(200):
-            if not (self.window.flights or self.line):
+            if not (self.window.outstanding or self.line):
                 return
             before = len(self.sent)
             while self.mend():

@@ -3,7 +3,7 @@
 import dataclasses
 
 import pytest
-from piped import assert_shows, changed, opened, random_frame
+from memory_pipe import assert_shows, changed, open_display, random_frame
 
 import voxdisplay as vd
 from voxdisplay.wire import packet as packets
@@ -11,7 +11,7 @@ from voxdisplay.wire import spec
 
 
 def test_a_page_that_differs_once_is_repaired():
-    display, pipe = opened()
+    display, pipe = open_display()
     frame = random_frame(display)
 
     def disturb():
@@ -29,7 +29,7 @@ def test_a_page_that_differs_once_is_repaired():
 
 @pytest.mark.parametrize("newer", [False, True])
 def test_a_page_that_differs_once_is_repaired_without_waiting_too(newer):
-    display, pipe = opened()
+    display, pipe = open_display()
     shown = []
 
     def disturb():
@@ -50,7 +50,7 @@ def test_a_page_that_differs_once_is_repaired_without_waiting_too(newer):
 
 
 def test_a_page_that_differs_again_and_again():
-    display, pipe = opened()
+    display, pipe = open_display()
     pipe.device.on_swap = lambda: pipe.device.memory.front.put(17, b"\x01\x02\x03")
     with pytest.raises(vd.DesyncError, match=r"1 voxels differ, the first at \(0, 1, 0\)"):
         display.present(random_frame(display))
@@ -59,7 +59,7 @@ def test_a_page_that_differs_again_and_again():
 
 
 def test_where_a_page_of_numbers_differs():
-    display, pipe = opened(pixel_format="index8")
+    display, pipe = open_display(pixel_format="index8")
     pipe.device.on_swap = lambda: pipe.device.memory.front.put(3 + 17 * 2, b"\x07")
     with pytest.raises(vd.DesyncError, match=r"first at \(3, 2, 0\): 7 instead of 0"):
         display.present(display.frame())
@@ -67,7 +67,7 @@ def test_where_a_page_of_numbers_differs():
 
 @pytest.mark.parametrize("features", [frozenset({"digest"}), frozenset({"digest", "read"})])
 def test_a_digest_that_lies(features):
-    display, pipe = opened(features=features)
+    display, pipe = open_display(features=features)
 
     def lie(packet):
         if isinstance(packet, packets.Ack):
@@ -84,7 +84,7 @@ def test_a_digest_that_lies(features):
 
 
 def test_a_refused_packet_and_then_another():
-    display, pipe = opened()
+    display, pipe = open_display()
     for _ in range(6):
         frame = random_frame(display)
         frame.coded = lambda *_device: iter([[b"\xe0\x00"]])
@@ -98,7 +98,7 @@ def test_a_refused_packet_and_then_another():
 
 
 def test_a_code_that_nobody_knows():
-    display, pipe = opened()
+    display, pipe = open_display()
     error = packets.encode(packets.Error(code=99, session=0, offset=0))
     pipe.answers = lambda data: error + data
     with pytest.raises(vd.DeviceError, match=r"an unknown code \(99\) at byte 0$"):

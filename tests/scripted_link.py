@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from voxdisplay.link import Link, Ready, Shown
+from voxdisplay.link import FrameShown, Link, SessionOpened
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire.packet_stream import PacketStream
 
@@ -18,26 +18,26 @@ def ack(following=0, last=255, **fields):
     return packets.Ack(seq=following, last=last, **given | {"damaged": 0} | fields)
 
 
-def sent(link, now):
+def transmit(link, now):
     """Packets that the link sends at a moment."""
     return list(PacketStream().feed(link.transmit(now)))
 
 
-def told(link, packet, now):
+def receive(link, packet, now):
     return link.receive(packets.encode(packet), now)
 
 
-def opened(**info):
+def open_link(**info):
     link = Link(SESSION, 0.0)
-    assert [type(packet) for packet in sent(link, 0.0)] == [packets.Hello]
+    assert [type(packet) for packet in transmit(link, 0.0)] == [packets.Hello]
     given = dataclasses.replace(INFO, **info)
-    assert told(link, given, 0.0) == [Ready(given)]
+    assert receive(link, given, 0.0) == [SessionOpened(given)]
     return link
 
 
-def on_display(link, number=0, now=0.0):
+def show_frame(link, number=0, now=0.0):
     """Show a frame of one packet, the first of a session; give what stands for it."""
     ticket = link.present([b"\xa0"])
-    sent(link, now)
-    assert told(link, ack(1, 0, frame=number, flags=1), now) == [Shown(ticket, 0)]
-    return link.on_display
+    transmit(link, now)
+    assert receive(link, ack(1, 0, frame=number, flags=1), now) == [FrameShown(ticket, 0)]
+    return link.displayed

@@ -16,7 +16,7 @@ from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from voxdisplay.frame import Frame
-from voxdisplay.link import Link, Restarted, Shown
+from voxdisplay.link import FrameShown, Link, SessionLost
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.packet_stream import PacketStream
@@ -95,9 +95,7 @@ class Line:
 class Rig:
     """Link, line and device. ``step`` goes to the next moment at which anything happens."""
 
-    def __init__(
-        self, *, seed=0, delay_s=0.001, jitter_s=0.0, byte_s=0.0, patience_s=5.0, **config
-    ):
+    def __init__(self, *, seed=0, delay_s=0.001, jitter_s=0.0, byte_s=0.0, timeout_s=5.0, **config):
         self.rng = random.Random(seed)
         self.now = 0.0
         config = {"grid": GRID, "pixel_format": "index8", "refresh": 0, "max_payload": 64} | config
@@ -107,7 +105,7 @@ class Rig:
         self.alive = True
         self.down = Line(delay_s, jitter_s, byte_s, self.rng)
         self.up = Line(delay_s, jitter_s, byte_s, self.rng)
-        self.link = Link(self.rng.randrange(1, 65536), self.now, patience_s=patience_s)
+        self.link = Link(self.rng.randrange(1, 65536), self.now, timeout_s=timeout_s)
         self.events = []
         self.sent = []  # packets, in order
         self._heard = PacketStream()
@@ -128,8 +126,8 @@ class Rig:
         """Present a frame as its difference from another, which is on display."""
         most = self.device.config.max_payload
         self._pages.add(frame.array().tobytes())
-        ticket = self.link.present_on(
-            self.link.on_display, frame.difference(base, most), lambda: frame.payloads(most)
+        ticket = self.link.present_difference(
+            self.link.displayed, frame.difference(base, most), lambda: frame.payloads(most)
         )
         self._tickets[ticket] = frame
         return ticket
@@ -141,7 +139,7 @@ class Rig:
 
     @property
     def shown(self):
-        return [event.ticket for event in self.events if isinstance(event, Shown)]
+        return [event.ticket for event in self.events if isinstance(event, FrameShown)]
 
     # -- time
 
@@ -217,12 +215,12 @@ class Rig:
     def assert_told(self, ticket):
         """The host was told that a frame is on display, with its digest, and of none twice."""
         assert len(set(self.shown)) == len(self.shown)
-        last = [event for event in self.events if isinstance(event, Shown)][-1]
+        last = [event for event in self.events if isinstance(event, FrameShown)][-1]
         assert (last.ticket, last.digest) == (ticket, self._tickets[ticket].digest())
 
     @property
     def restarts(self):
-        return sum(isinstance(event, Restarted) for event in self.events)
+        return sum(isinstance(event, SessionLost) for event in self.events)
 
     def _note_sent(self, out):
         for body in document.off_wire(out.replace(b"\0\0", b"\0").lstrip(b"\0")):

@@ -6,11 +6,11 @@ from collections import Counter
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rig import Faults, Rig, frames, random_frame
+from link_rig import Faults, Rig, frames, random_frame
 
 from firmware_sim.session import Session, Verdict
 from voxdisplay.errors import TransportTimeout
-from voxdisplay.link import PageRead, Refused
+from voxdisplay.link import PacketRefused, PageReceived
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
 from voxdisplay.wire.spans import decode_spans
@@ -51,7 +51,7 @@ def rig_of(seed, device):
     least = longest + -(-longest // 254) + 1 + spec.LIMIT_RESERVE
     config = {key: value for key, value in device.items() if key != "room"}
     # Where two answers of three are lost, 20 s of silence do happen.
-    return Rig(seed=seed, rx_buffer=least + device["room"], patience_s=60, **config)
+    return Rig(seed=seed, rx_buffer=least + device["room"], timeout_s=60, **config)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -114,7 +114,7 @@ def test_long_and_short_frames_on_a_slow_bad_line(seed, delay_s, byte_s, where):
     On a slow line ACKs come one by one: those from before something was sent again, behind it.
     """
     rig = Rig(
-        seed=seed, delay_s=delay_s, byte_s=byte_s, rx_buffer=5000, silent=seed % 9, patience_s=60
+        seed=seed, delay_s=delay_s, byte_s=byte_s, rx_buffer=5000, silent=seed % 9, timeout_s=60
     )
     if where != "up":
         rig.down.faults = Faults(seed, packet=0.05, flip=0.003)
@@ -173,8 +173,8 @@ def test_a_page_is_read_through_a_bad_line(seed, device, bad):
     while at < total:
         rig.events.clear()
         rig.link.read(at, total - at)
-        rig.run(lambda: any(isinstance(event, PageRead) for event in rig.events))
-        (page,) = (event.page for event in rig.events if isinstance(event, PageRead))
+        rig.run(lambda: any(isinstance(event, PageReceived) for event in rig.events))
+        (page,) = (event.page for event in rig.events if isinstance(event, PageReceived))
         values += decode_spans(page.ops, page.count, frame.format).tolist()
         at += page.count
     assert values == frame.format.values(frame.array()).tolist()
@@ -262,7 +262,7 @@ def test_a_device_without_digest_gives_none(features):
 @pytest.mark.parametrize("refresh", [0, 30_000, 150])
 @pytest.mark.parametrize("moment", [0, 1, 3, 8])
 def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
-    rig = Rig(refresh=refresh, patience_s=3)
+    rig = Rig(refresh=refresh, timeout_s=3)
     for _ in range(4):
         rig.present(random_frame(rig.rng))
     for _ in range(moment):
@@ -275,7 +275,7 @@ def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
 
 
 def test_a_device_that_dies_when_there_is_little_patience():
-    rig = Rig(patience_s=0.3)
+    rig = Rig(timeout_s=0.3)
     rig.present(random_frame(rig.rng))
     rig.run(lambda: rig.link.ready)
     rig.alive = False
@@ -284,7 +284,7 @@ def test_a_device_that_dies_when_there_is_little_patience():
 
 
 def test_a_device_that_talks_but_never_shows_anything():
-    rig = Rig(refresh=30_000, patience_s=3)  # and yet its ticks never come
+    rig = Rig(refresh=30_000, timeout_s=3)  # and yet its ticks never come
     rig._tick = lambda: None
     rig._tick_after = lambda _now: float("inf")
     rig.present(random_frame(rig.rng, density=0.02))
@@ -295,7 +295,7 @@ def test_a_device_that_talks_but_never_shows_anything():
 
 def test_a_device_that_is_slower_than_patience_is_waited_for():
     """A device that waits for its tick cannot answer: 6, point 6."""
-    rig = Rig(refresh=50, patience_s=2)  # a tick in 20 s
+    rig = Rig(refresh=50, timeout_s=2)  # a tick in 20 s
     drawn = [random_frame(rig.rng) for _ in range(3)]
     for frame in drawn:
         rig.present(frame)
@@ -308,7 +308,7 @@ def test_a_refused_frame_is_told_and_the_next_is_shown():
     rig = Rig()
     rig.refusals.add("OP")
     rig.link.present([b"\x07"])
-    rig.run(lambda: any(isinstance(event, Refused) for event in rig.events))
+    rig.run(lambda: any(isinstance(event, PacketRefused) for event in rig.events))
     for _ in range(2):
         frame = random_frame(rig.rng)
         ticket = rig.present(frame)

@@ -44,7 +44,7 @@ class Pipe:
         self.closed += 1
 
 
-def opened(pipe=None, **config):
+def open_display(pipe=None, **config):
     """Open a display on a device, or on a new one: (display, pipe)."""
     pipe = pipe or Pipe(**config)
     return vd.open(pipe, timeout_s=2.0, clock=lambda: pipe.now), pipe
