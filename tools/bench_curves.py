@@ -24,7 +24,7 @@ from paper_tables import paper_curve
 import voxdisplay as vd
 from voxdisplay.compute import kernel_backend
 from voxdisplay.curves import Bezier, Curve, Lissajous, TorusKnot
-from voxdisplay.curves.batch_evaluation import Curves
+from voxdisplay.curves.batch_evaluation import BatchEvaluator
 from voxdisplay.voxelization import measure
 
 Voxels = NDArray[np.int32]
@@ -86,19 +86,19 @@ def jobs(*, quick: bool) -> Iterator[Job]:
 
 def grid_plane(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, in numpy."""
-    kernel_backend.use(False)
+    kernel_backend.set_enabled(False)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
 def fast(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, compiled: the extra `fast`."""
-    kernel_backend.use(True)
+    kernel_backend.set_enabled(True)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
 def certified(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
     """Voxelise with this engine, in numpy, and prove it."""
-    kernel_backend.use(False)
+    kernel_backend.set_enabled(False)
     return [sequence.voxels for sequence in vd.voxelize_many(curves, certified=True)]
 
 
@@ -155,7 +155,7 @@ def sampled(
         nth = np.arange(of.size) - np.repeat(np.cumsum(count) - count, count)
         low, high = np.array([curve.t_range for curve in some]).T
         t = low[of] + (high - low)[of] * (nth / (count - 1)[of])
-        yield of, Curves(some).positions(of, t)
+        yield of, BatchEvaluator(some).positions(of, t)
 
 
 def from_points(
@@ -266,7 +266,7 @@ def bench_job(job: Job, tools: Sequence[str], repeats: int) -> None:
 
 def memory(curve: Curve) -> None:
     """Print how much memory this engine takes."""
-    kernel_backend.use(False)
+    kernel_backend.set_enabled(False)
     tracemalloc.start()
     sequence = vd.voxelize(curve)
     kept, peak = (size / len(sequence) for size in tracemalloc.get_traced_memory())

@@ -30,11 +30,11 @@ MANY = 150
 
 @contextmanager
 def kernels(choice: bool) -> Iterator[None]:
-    before = kernel_backend.use(choice)
+    before = kernel_backend.set_enabled(choice)
     try:
         yield
     finally:
-        kernel_backend.use(before)
+        kernel_backend.set_enabled(before)
 
 
 def same(curves: list[Curve], *, certified: bool = False) -> None:
@@ -109,13 +109,13 @@ def test_insertion(at: list[int]) -> None:
         assert np.array_equal(line, merged[0])
 
 
-@pytest.mark.parametrize(("worth", "loaded"), [(10, True), (1000, False)])
-def test_numba_is_imported_where_it_pays_and_not_before(worth: int, loaded: bool) -> None:
+@pytest.mark.parametrize(("break_even", "loaded"), [(10, True), (1000, False)])
+def test_numba_is_imported_where_it_pays_and_not_before(break_even: int, loaded: bool) -> None:
     script = f"""
 import sys
 import voxdisplay as vd
-from voxdisplay import compiled
-compiled.WORTH = {worth}
+from voxdisplay.compute import kernel_backend
+kernel_backend.BREAK_EVEN_SAMPLES = {break_even}
 sequence = vd.voxelize(vd.Parametric("40*cos(t)", "40*sin(t)", "0", t=(0, 3)))
 print("numba" in sys.modules, len(sequence))
 """
@@ -126,7 +126,7 @@ print("numba" in sys.modules, len(sequence))
 def test_an_interrupt_waits_for_the_compiler():
     done, before = [], signal.getsignal(signal.SIGINT)
 
-    @kernel_backend.interrupts_wait()
+    @kernel_backend.deferred_interrupts()
     def work():
         signal.raise_signal(signal.SIGINT)
         done.append("all of it")
@@ -139,7 +139,7 @@ def test_an_interrupt_waits_for_the_compiler():
 
 def test_without_an_interrupt_nothing_is_changed():
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(ValueError, match="its own"), kernel_backend.interrupts_wait():
+    with pytest.raises(ValueError, match="its own"), kernel_backend.deferred_interrupts():
         raise ValueError("its own")
     assert signal.getsignal(signal.SIGINT) is before
 
@@ -148,7 +148,7 @@ def test_in_another_thread_no_interrupt_can_come():
     done = []
 
     def work():
-        with kernel_backend.interrupts_wait():
+        with kernel_backend.deferred_interrupts():
             done.append(1)
 
     thread = threading.Thread(target=work)

@@ -23,37 +23,37 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 # How many samples of curves make it worth to load the kernels: they save 0.25 to 0.45 microseconds
 # for each, and loading them takes about a second.
-WORTH = 3_000_000
+BREAK_EVEN_SAMPLES = 3_000_000
 
 
-class _Choice:
+class _State:
     """Whether kernels are in use, and how much was done without."""
 
     use: bool | None = None  # not asked yet
     done = 0.0
 
 
-def prepare(samples: int, ahead: float = 1) -> None:
+def enable_if_worthwhile(samples: int, ahead: float = 1) -> None:
     """Load the kernels if they are worth it, before work on so many samples of curves.
 
     They are if this, times ``ahead``, what is to come, together with what was done without them
     would have paid for loading them.
     """
-    if _Choice.use is None:
-        if _Choice.done + samples * ahead > WORTH:
-            _Choice.use = _numba_works()
-        _Choice.done += samples
+    if _State.use is None:
+        if _State.done + samples * ahead > BREAK_EVEN_SAMPLES:
+            _State.use = _numba_works()
+        _State.done += samples
 
 
-def use(choice: bool | None) -> bool | None:
+def set_enabled(choice: bool | None) -> bool | None:
     """Say whether to use the kernels, None to wait for work; give what was said before."""
-    before, _Choice.use = _Choice.use, choice
+    before, _State.use = _State.use, choice
     return before
 
 
-def in_use() -> bool:
+def enabled() -> bool:
     """Tell whether kernels are in use."""
-    return bool(_Choice.use)
+    return bool(_State.use)
 
 
 def _numba_works() -> bool:
@@ -64,7 +64,7 @@ def _numba_works() -> bool:
     return True
 
 
-def twin(function: Callable[Given, Result]) -> Callable[Given, Result]:
+def with_kernel(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """Mark a function that has a compiled twin."""
     package = function.__module__.rpartition(".")[0]
     other: Callable[Given, Result] | None = None
@@ -72,10 +72,10 @@ def twin(function: Callable[Given, Result]) -> Callable[Given, Result]:
     @wraps(function)
     def either(*args: Given.args, **named: Given.kwargs) -> Result:
         nonlocal other
-        if not _Choice.use:
+        if not _State.use:
             return function(*args, **named)
         if other is None:  # it is compiled now, or what is kept of it loaded
-            with interrupts_wait():
+            with deferred_interrupts():
                 other = getattr(import_module(f"{package}.kernels"), function.__name__)
                 return other(*args, **named)
         return other(*args, **named)
@@ -84,7 +84,7 @@ def twin(function: Callable[Given, Result]) -> Callable[Given, Result]:
 
 
 @contextmanager
-def interrupts_wait() -> Iterator[None]:
+def deferred_interrupts() -> Iterator[None]:
     """Keep an interrupt until the end of what is done: the compiler loses it half-way.
 
     Where none can come there is nothing to do: Python gives them to its main thread only.

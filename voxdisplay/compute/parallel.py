@@ -17,37 +17,37 @@ import numpy as np
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
-_this = threading.local()
+_thread = threading.local()
 
 
-def processors() -> int:
+def cpu_count() -> int:
     """Tell how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):  # not on all systems
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def in_order(function: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[Result]:
+def ordered_map(function: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[Result]:
     """Give what a function gives for parts, in their order; the first error in it is raised.
 
     Within a part nothing is divided any further. A part must be worth some hundred microseconds,
     and the function must bear being called from several threads at once; and twice for a part.
     """
-    workers = min(processors(), len(parts))
-    if workers < 2 or getattr(_this, "works", False):
+    workers = min(cpu_count(), len(parts))
+    if workers < 2 or getattr(_thread, "works", False):
         yield from map(function, parts)
         return
     with ExitStack() as stack:
         try:
             from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - most work is small
 
-            pool = stack.enter_context(ThreadPoolExecutor(workers, initializer=_begin))
+            pool = stack.enter_context(ThreadPoolExecutor(workers, initializer=_init_worker))
             results = pool.map(function, parts)
         except RuntimeError:  # no thread may begin: there are too many, or the program is ending
             results = map(function, parts)
         yield from results
 
 
-def _begin() -> None:
-    _this.works = True
+def _init_worker() -> None:
+    _thread.works = True
     np.seterr(all="ignore")  # what a caller has set does not reach its threads

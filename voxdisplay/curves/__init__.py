@@ -1,18 +1,10 @@
-"""WHAT to draw: curves as values. Nothing here knows voxels, colours or displays."""
+"""One-dimensional objects: curves as values. Must not know voxels, colours or displays."""
 
+from voxdisplay.curves.circular import Arc, Circle, Ellipse, Helix
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.parametric import Parametric
-from voxdisplay.curves.primitives import (
-    Arc,
-    Circle,
-    Ellipse,
-    Helix,
-    Lissajous,
-    Points,
-    Polyline,
-    Segment,
-    TorusKnot,
-)
+from voxdisplay.curves.periodic import Lissajous, TorusKnot
+from voxdisplay.curves.polyline import Points, Polyline, Segment
 from voxdisplay.curves.splines import Bezier, BSpline, CatmullRom
 from voxdisplay.curves.transformed import Transformed
 

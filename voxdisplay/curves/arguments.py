@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from voxdisplay.compute.array_types import Floats
 
 
-LARGEST = 1e100
+MAX_MAGNITUDE = 1e100
 """No display is larger, and products of a few such numbers do not overflow."""
 
 
@@ -41,7 +41,7 @@ def finite(name: str, value: SupportsFloat) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise ArgumentError(name, f"is not finite: {number}")
-    if abs(number) > LARGEST:
+    if abs(number) > MAX_MAGNITUDE:
         raise ArgumentError(name, f"is too large: {number:g}")
     return number
 
@@ -76,8 +76,8 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
         raise ArgumentError(
             name, f"has shape {numbers.shape}, not ({want}{',' * (len(shape) == 1)})"
         )
-    if not (np.abs(numbers) <= LARGEST).all():
-        first = tuple(np.argwhere(~(np.abs(numbers) <= LARGEST))[0])
+    if not (np.abs(numbers) <= MAX_MAGNITUDE).all():
+        first = tuple(np.argwhere(~(np.abs(numbers) <= MAX_MAGNITUDE))[0])
         finite(name + "".join(f"[{i}]" for i in first), numbers[first])
     return numbers
 

@@ -1,8 +1,8 @@
-"""Evaluating many curves at once.
+"""Evaluation of many curves in one call.
 
-Curves of one family have one formula and differ in its numbers only: thousands of short ones are
-then a few array operations, where they would be thousands of calls. Each gets the very points that
-its own ``position`` gives, to the last bit. Knows no formulas: those are the curves' own.
+Curves of one family share a formula and differ in its numbers only: a thousand short ones take a
+few array operations instead of a thousand calls. Each gets the very points that its own
+``position`` returns, to the last bit. Must not know formulas: those are the curves' own.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Evaluate, Floats, Ints
 from voxdisplay.curves.curve import Curve
 
-Common = TypeVar("Common")
+Value = TypeVar("Value")
 
-# Points per call: what is computed for so many stays in a core's cache.
-CALL = 1 << 14
-# So many calls are worth threads.
-MANY = 8
+# Points per call, so that intermediate arrays stay in a core's cache.
+BLOCK_SIZE = 1 << 14
+# Fewer blocks are not worth threads.
+MIN_PARALLEL_BLOCKS = 8
 # Smaller families are not worth the arrays that hold them.
-SMALLEST = 4
+MIN_FAMILY_SIZE = 4
 
 
-class Curves:
-    """Curves that are evaluated together.
+class BatchEvaluator:
+    """Evaluator of a list of curves, grouped by family.
 
     Parameters
     ----------
@@ -40,80 +40,81 @@ class Curves:
 
     def __init__(self, curves: Sequence[Curve]) -> None:
         self._curves = curves
-        # Those that are alike, by the first of them: one formula, one degree.
-        self._kinds = _kinds(curves)
+        self._groups = _group_by_family(curves)
         self._evaluate: list[Evaluate] = []
-        self._family = np.full(len(curves), -1)  # which of these; -1: none
-        self._member = np.zeros(len(curves), dtype=np.int64)  # which of its curves
-        for first, members in self._kinds:
-            if first.family is not None and len(members) >= SMALLEST:
+        self._family = np.full(len(curves), -1)  # index into _evaluate; -1: evaluated alone
+        self._member = np.zeros(len(curves), dtype=np.int64)  # index within the family
+        for first, members in self._groups:
+            if first.family is not None and len(members) >= MIN_FAMILY_SIZE:
                 self._family[members] = len(self._evaluate)
                 self._member[members] = np.arange(len(members))
-                self._evaluate.append(first.together([curves[index] for index in members]))
+                self._evaluate.append(first.batch_evaluator([curves[index] for index in members]))
 
-        self._alike = len(self._evaluate) == 1 and bool((self._family == 0).all())
+        self._one_family = len(self._evaluate) == 1 and bool((self._family == 0).all())
 
-    def of_each(self, get: Callable[[Curve], Common]) -> list[Common]:
-        """Give something of each curve that those of a family have in common."""
-        if len(self._kinds) == 1:
-            return [get(self._kinds[0][0])] * len(self._curves)
+    def map_curves(self, get: Callable[[Curve], Value]) -> list[Value]:
+        """Return ``get(curve)`` for each curve, called once per family: all members share it."""
+        if len(self._groups) == 1:
+            return [get(self._groups[0][0])] * len(self._curves)
         found = {}
-        for first, members in self._kinds:
+        for first, members in self._groups:
             found.update(dict.fromkeys(members, get(first)))
         return [found[index] for index in range(len(self._curves))]
 
     def positions(self, curve: Ints, t: Floats) -> Floats:
-        """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,)."""
+        """Return the points P(t), (3, n), of the curves with these (ascending) indices, (n,)."""
         if not self._evaluate:
             return self._one_by_one(curve, t)
         points = np.empty((3, t.size))
-        if self._alike:
-            for low in range(0, t.size, CALL):
-                high = low + CALL
+        if self._one_family:
+            for low in range(0, t.size, BLOCK_SIZE):
+                high = low + BLOCK_SIZE
                 points[:, low:high] = self._evaluate[0](curve[low:high], t[low:high])
             return points
         family = self._family[curve]
         for number, evaluate in enumerate(self._evaluate):
-            mine = np.flatnonzero(family == number)
-            for low in range(0, mine.size, CALL):
-                some = mine[low : low + CALL]
-                points[:, some] = evaluate(self._member[curve[some]], t[some])
+            own = np.flatnonzero(family == number)
+            for low in range(0, own.size, BLOCK_SIZE):
+                block = own[low : low + BLOCK_SIZE]
+                points[:, block] = evaluate(self._member[curve[block]], t[block])
         alone = np.flatnonzero(family < 0)
         points[:, alone] = self._one_by_one(curve[alone], t[alone])
         return points
 
     def _one_by_one(self, curve: Ints, t: Floats) -> Floats:
-        if 0 < t.size <= CALL and curve[0] == curve[-1]:
-            alone = self._curves[int(curve[0])]
-            if alone.reentrant:  # one of ours: what it gives is as it should be, and nobody else's
-                return alone.position(t)
+        if 0 < t.size <= BLOCK_SIZE and curve[0] == curve[-1]:
+            single = self._curves[int(curve[0])]
+            if single.thread_safe:  # of this package: its result is a fresh array of this shape
+                return single.position(t)
         points = np.empty((3, t.size))
         if not t.size:
             return points
         edges = np.flatnonzero(curve[1:] != curve[:-1]) + 1 if curve[0] < curve[-1] else curve[:0]
         for start, stop in pairwise([0, *edges.tolist(), t.size]):
             own = self._curves[curve[start]]
-            fill = partial(_fill, own, t[start:stop], points[:, start:stop])
-            parts = range(0, stop - start, CALL)
-            apart = len(parts) >= MANY and own.reentrant
-            for _ in (parallel.in_order if apart else map)(fill, parts):
+            fill = partial(_evaluate_block, own, t[start:stop], points[:, start:stop])
+            blocks = range(0, stop - start, BLOCK_SIZE)
+            in_threads = len(blocks) >= MIN_PARALLEL_BLOCKS and own.thread_safe
+            for _ in (parallel.ordered_map if in_threads else map)(fill, blocks):
                 pass
         return points
 
 
-def _kinds(curves: Sequence[Curve]) -> list[tuple[Curve, Sequence[int]]]:
-    """Give the curves that are one family, by the first of them, and those that are of none."""
+def _group_by_family(curves: Sequence[Curve]) -> list[tuple[Curve, Sequence[int]]]:
+    """Return groups of curves of one class and family, by their first; others stand alone."""
     classes, families = list(map(type, curves)), [curve.family for curve in curves]
     everyone = range(len(curves))
     if len(set(classes)) == 1 and len(set(families)) == 1 and families[0] is not None:
         return [(curves[0], everyone)]
-    kinds = defaultdict(list)
+    groups = defaultdict(list)
     for index in everyone:
         family = families[index]
-        kinds[classes[index], index if family is None else (family,)].append(index)
-    return [(curves[members[0]], members) for members in kinds.values()]
+        groups[classes[index], index if family is None else (family,)].append(index)
+    return [(curves[members[0]], members) for members in groups.values()]
 
 
-def _fill(curve: Curve, t: Floats, points: Floats, low: int) -> None:
-    high = low + CALL
-    points[:, low:high] = curve.position(t[low:high])
+def _evaluate_block(curve: Curve, t: Floats, points: Floats, low: int) -> None:
+    high = low + BLOCK_SIZE
+    block = t[low:high]
+    # A curve of somebody else's may work in place: it gets an array of its own.
+    points[:, low:high] = curve.position(block if curve.thread_safe else block.copy())

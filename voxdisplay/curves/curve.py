@@ -1,18 +1,22 @@
-"""What a curve is, to everything that draws one.
+"""Abstract base class of curves: a continuous map from a parameter range into voxel space.
 
-A curve is a continuous map from a parameter range into voxel space. It knows no voxels, no
-colours and no display: only where it is.
+A curve must not know voxels, colours or displays.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.curves.representation import short_repr
+
+NO_BREAKS: Floats = np.empty(0)
+NO_BREAKS.flags.writeable = False
 
 
 class Curve(ABC):
@@ -27,46 +31,57 @@ class Curve(ABC):
         The range (a, b), finite, a < b.
     closed : bool or None
         Whether P(a) and P(b) are joined. None: found from the end points.
-    breaks : (k,) float64 array
-        Parameters inside the range, ascending, where the direction may turn sharply (the vertices
-        of a polyline). A hint for sampling; never needed for correctness.
     family : hashable
-        What curves of one class have in common that `together` takes, which have one ``degree``,
-        too, and are ``reentrant`` or not. None: nothing, evaluate it by itself.
+        Key of curves that `batch_evaluator` takes together: equal for curves of one class with
+        the same formula, the same ``degree`` and the same ``thread_safe``. None: evaluated alone.
 
     """
 
     t_range: tuple[float, float]
     closed: bool | None = None
-    breaks: Floats = np.empty(0)
     family: Hashable = None
+    _arguments: Mapping[str, object] = {}
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
-        # What it inherits from behind its position would speak of another formula, and prove
-        # another curve.
+        # A subclass that overrides `position` must not inherit bounds, a degree or a batch
+        # evaluator of the formula it replaced: they would prove another curve.
         owners = {name: owner for owner in reversed(cls.__mro__) for name in vars(owner)}
         order = cls.__mro__.index
-        for name in ("degree", "reentrant", "together", "enclosure"):
+        for name in _OF_THE_FORMULA:
             if order(owners["position"]) < order(owners[name]):
                 setattr(cls, name, vars(Curve)[name])
 
+    def __repr__(self) -> str:
+        arguments = self._arguments or {"t_range": getattr(self, "t_range", None)}
+        shown = [f"{k}={short_repr(v)}" for k, v in arguments.items() if v is not None]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    @cached_property
+    def breaks(self) -> Floats:
+        """Parameters inside the range, (k,) ascending, where the direction may turn sharply.
+
+        The vertices of a polyline, for example. A hint for sampling, never needed for
+        correctness. May be assigned.
+        """
+        return NO_BREAKS
+
     @property
     def degree(self) -> int | None:
-        """That of the polynomials of t that x, y and z are, between breaks; None: they are not.
+        """Degree of x, y and z as polynomials of t between breaks; None if they are none.
 
-        A hint for sampling: a curve that turns rarely needs no close look.
+        A hint for sampling: a polynomial of low degree turns rarely and needs few samples.
         """
         return None
 
     @property
-    def reentrant(self) -> bool:
-        """Whether it may be asked where it is from several threads at once."""
+    def thread_safe(self) -> bool:
+        """Whether `position` may be called from several threads at once."""
         return False
 
     @abstractmethod
     def position(self, t: Floats) -> Floats:
-        """Give the points at t.
+        """Return the points at t.
 
         Parameters
         ----------
@@ -81,12 +96,12 @@ class Curve(ABC):
         """
 
     def derivative(self, t: Floats) -> Floats | None:  # noqa: ARG002 - for those that have one
-        """Give dP/dt at t as a (3, n) float64 array, or None when it is not known."""
+        """Return dP/dt at t as a (3, n) float64 array, or None when it is not known."""
         return None
 
     @staticmethod
-    def together(curves: Sequence[Any]) -> Evaluate:
-        """Prepare to evaluate curves of one family at once.
+    def batch_evaluator(curves: Sequence[Any]) -> Evaluate:
+        """Return a function that evaluates curves of one family together.
 
         Parameters
         ----------
@@ -97,23 +112,23 @@ class Curve(ABC):
         -------
         callable
             ``(which, t)`` -> (3, n) points: for each of n parameters, the position of the curve
-            with that index, (n,) int64; to the bit what its ``position`` gives.
+            with that index, (n,) int64; to the bit what its ``position`` returns.
 
         """
 
         def evaluate(which: Ints, t: Floats) -> Floats:
             points = np.empty((3, t.size))
             for index in np.unique(which):
-                mine = which == index
-                points[:, mine] = curves[index].position(t[mine])
+                own = which == index
+                points[:, own] = curves[index].position(t[own])
             return points
 
         return evaluate
 
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats] | None:  # noqa: ARG002 - as above
-        """Give boxes that hold all of the curve between pairs of parameters.
+        """Return boxes that hold all of the curve between pairs of parameters.
 
-        What makes voxels provable: see `voxelize.certify`.
+        Certified voxelisation rests on them: see `voxelization.certify`.
 
         Parameters
         ----------
@@ -123,9 +138,12 @@ class Curve(ABC):
         Returns
         -------
         (3, n), (3, n) float64 arrays, or None
-            Bounds of P(t) for all real t from t_lo to t_hi, as exact arithmetic would give it.
+            Bounds of P(t) for all real t from t_lo to t_hi, as exact arithmetic would have it.
             One or both nan where nothing is known, as where the curve may have no point. None if
             the curve has no bounds at all.
 
         """
         return None
+
+
+_OF_THE_FORMULA = ("degree", "thread_safe", "batch_evaluator", "enclosure")

@@ -1,7 +1,7 @@
-"""The compiled twins of functions of this package: see `voxdisplay.compute.kernel_backend`.
+"""Compiled kernels of this package: see `voxdisplay.compute.kernel_backend`.
 
-What is computed, and in what order, is what numpy does in their place, so that all bits agree.
-Several threads may be in them at once.
+They compute what the numpy functions of the same name do, in the same order, so that all bits
+agree, and may run in several threads at once.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import numpy as np
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import jit
 
-# Points worked on at once: they stay in the innermost cache.
+# Points per inner loop, which stay in the innermost cache.
 BLOCK = 128
 
 
 @jit
-def beziers(control: Floats, which: Ints, t: Floats) -> Floats:
-    """Evaluate Bezier curves with control points (degree + 1, 3, curves): `splines.beziers`."""
+def evaluate_beziers(control: Floats, which: Ints, t: Floats) -> Floats:
+    """Evaluate Bezier curves as `splines.evaluate_beziers` does."""
     size, order = t.size, control.shape[0]
     points = np.empty((3, size))
     layer, rest = np.empty((order, BLOCK)), np.empty(BLOCK)

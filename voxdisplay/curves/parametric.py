@@ -129,12 +129,12 @@ class Parametric(Curve):
             formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
             for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
         ]
-        self._position = program.rows(formulas)
+        self._position = program.compile_rows(formulas)
         self._derivative = _stacked(slopes)
 
     @property
-    def reentrant(self) -> bool:
-        """Whether it is given by expressions, see `Curve.reentrant`: callables may not bear it."""
+    def thread_safe(self) -> bool:
+        """True if it is given by expressions; nothing is known of callables."""
         return bool(self._formulas)
 
     def position(self, t: Floats) -> Floats:
@@ -142,10 +142,10 @@ class Parametric(Curve):
         return self._position(t)
 
     @staticmethod
-    def together(curves: Sequence[Parametric]) -> Evaluate:
-        """Prepare to evaluate formulas that differ in numbers only, see `Curve.together`."""
+    def batch_evaluator(curves: Sequence[Parametric]) -> Evaluate:
+        """Prepare to evaluate formulas that differ in numbers only, see `Curve.batch_evaluator`."""
         formulas = zip(*(curve._formulas for curve in curves), strict=True)
-        rows = [program.together(row) for row in formulas]
+        rows = [program.batch_evaluator(row) for row in formulas]
         return lambda which, t: np.stack([row(which, t) for row in rows])
 
     def derivative(self, t: Floats) -> Floats | None:
@@ -166,8 +166,8 @@ class Parametric(Curve):
         for row, formula in enumerate(self._formulas):
             values = formula.enclosure(Interval(t_lo, t_hi))
             low[row], high[row] = values.lo, values.hi
-            if values.partial is not False:
-                low[row, values.partial & wide] = np.nan
+            if values.may_be_undefined is not False:
+                low[row, values.may_be_undefined & wide] = np.nan
         return low, high
 
 

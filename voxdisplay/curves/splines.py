@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.compute.array_types import Evaluate, Floats, Ints
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.array_types import Evaluate, Floats
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.span_bounds import Box, control_box, enclose_spans
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
+
+    from voxdisplay.compute.array_types import Ints
 
 MAX_DEGREE = 64
 """Highest degree of a Bezier curve or B-spline; the work grows with its square."""
@@ -38,7 +40,7 @@ class Bezier(Curve):
     """
 
     t_range = (0.0, 1.0)
-    reentrant = True
+    thread_safe = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
@@ -46,35 +48,39 @@ class Bezier(Curve):
         _check_degree("points", len(self._points) - 1)
         self.family = len(self._points)
         self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
+        self._arguments = {"points": self._points, "closed": closed}
 
     @property
     def degree(self) -> int:
-        """How often t is multiplied by itself, at most."""
+        """Degree of the polynomials: one less than the number of control points."""
         return len(self._points) - 1
 
+    @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
-        """Give the points at t, (n,), as a (3, n) float64 array."""
+        """Return the points at t, (n,), as a (3, n) float64 array."""
         return _de_casteljau(self._points[:, :, None], t)
 
+    @np.errstate(all="ignore")
     def derivative(self, t: Floats) -> Floats:
-        """Give dP/dt at t, (n,), as a (3, n) float64 array."""
+        """Return dP/dt at t, (n,), as a (3, n) float64 array."""
         return _de_casteljau(self._slopes[:, :, None], t)
 
+    @np.errstate(all="ignore")
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
-        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi, (n,)."""
         knots = np.repeat((0.0, 1.0), len(self._points) - 1)[:, None]
         return control_box(interval(self._points[:, :, None]), knots, t_lo, t_hi)
 
     @staticmethod
-    def together(curves: Sequence[Bezier]) -> Evaluate:
-        """Prepare to evaluate curves of one degree at once, see `Curve.together`."""
+    def batch_evaluator(curves: Sequence[Bezier]) -> Evaluate:
+        """Return an evaluator of Bezier curves of one degree: see `Curve.batch_evaluator`."""
         rows = np.concatenate([curve._points for curve in curves])
         points = np.ascontiguousarray(rows.reshape(len(curves), -1, 3).transpose(1, 2, 0))
-        return lambda which, t: beziers(points, which, t)
+        return lambda which, t: evaluate_beziers(points, which, t)
 
 
-@twin
-def beziers(control: Floats, which: Ints, t: Floats) -> Floats:
+@with_kernel
+def evaluate_beziers(control: Floats, which: Ints, t: Floats) -> Floats:
     """Evaluate Bezier curves of one degree, with control points (degree + 1, 3, curves)."""
     return _de_casteljau(control.take(which, axis=2), t)
 
@@ -108,7 +114,7 @@ class BSpline(Curve):
 
     """
 
-    reentrant = True
+    thread_safe = True
 
     def __init__(
         self,
@@ -146,11 +152,13 @@ class BSpline(Curve):
         length = self._knots[p + 1 : -1] - self._knots[1 : -p - 1]
         self._slopes = p * np.diff(control, axis=0) / np.where(length, length, 1.0)[:, None]
 
+    @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
-        """Give the points at t, (n,), as a (3, n) float64 array."""
+        """Return the points at t, (n,), as a (3, n) float64 array."""
         points = _de_boor(self._points, self._knots, self._degree, t)
         return np.asarray(points[:3] / points[3]) if self._rational else points
 
+    @np.errstate(all="ignore")
     def derivative(self, t: Floats) -> Floats:
         """Give dP/dt at t, (n,), as a (3, n) float64 array; at a kink, of what comes after it."""
         slopes = _de_boor(self._slopes, self._knots[1:-1], self._degree - 1, t)
@@ -159,8 +167,9 @@ class BSpline(Curve):
         points = _de_boor(self._points, self._knots, self._degree, t)
         return np.asarray((slopes[:3] - points[:3] / points[3] * slopes[3]) / points[3])
 
+    @np.errstate(all="ignore")
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
-        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi, (n,)."""
         inner = self._knots[self._degree : len(self._points) + 1]
         return enclose_spans(np.unique(inner), t_lo, t_hi, self._box)
 
@@ -235,7 +244,7 @@ class CatmullRom(Curve):
 
     """
 
-    reentrant = True
+    thread_safe = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
@@ -264,8 +273,9 @@ class CatmullRom(Curve):
         stops = np.linalg.norm(self._slopes[1:-1], axis=1) <= 1e-9 * steps[1:-2, 0]
         self.breaks = self._t[1:-1][stops]
 
+    @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
-        """Give the points at t, (n,), as a (3, n) float64 array."""
+        """Return the points at t, (n,), as a (3, n) float64 array."""
         a, b, slope_a, slope_b, h, f = self._span(t)
         g = 1 - f
         return (
@@ -275,14 +285,16 @@ class CatmullRom(Curve):
             - f * f * g * h * slope_b
         )
 
+    @np.errstate(all="ignore")
     def derivative(self, t: Floats) -> Floats:
-        """Give dP/dt at t, (n,), as a (3, n) float64 array."""
+        """Return dP/dt at t, (n,), as a (3, n) float64 array."""
         a, b, slope_a, slope_b, h, f = self._span(t)
         g = 1 - f
         return 6 * f * g * (b - a) / h + g * (1 - 3 * f) * slope_a + f * (3 * f - 2) * slope_b
 
+    @np.errstate(all="ignore")
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
-        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n)."""
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi, (n,)."""
         return enclose_spans(self._t, t_lo, t_hi, self._box)
 
     def _box(self, i: Ints, t_lo: Floats, t_hi: Floats) -> Box:

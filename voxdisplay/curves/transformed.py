@@ -1,4 +1,4 @@
-"""A curve, scaled and moved."""
+"""A curve, scaled and moved. Knows nothing of the curve inside but `Curve`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
+
+    from voxdisplay.compute.array_types import Ints
 
 
 class Transformed(Curve):
@@ -37,29 +39,33 @@ class Transformed(Curve):
         self.closed = curve.closed
         self.breaks = curve.breaks
         if curve.family is not None:
-            self.family = (type(curve).together, curve.family)
+            self.family = (type(curve).batch_evaluator, curve.family)
+        self._arguments = {"curve": curve, "scale": self.scale, "offset": self.offset}
 
     @property
     def degree(self) -> int | None:
-        """That of the curve inside, see `Curve.degree`."""
+        """`Curve.degree` of the curve inside."""
         return self.curve.degree
 
     @property
-    def reentrant(self) -> bool:
-        """Whether the curve inside is, see `Curve.reentrant`."""
-        return self.curve.reentrant
+    def thread_safe(self) -> bool:
+        """`Curve.thread_safe` of the curve inside."""
+        return self.curve.thread_safe
 
+    @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
-        """Give the points at t, (n,), as a (3, n) float64 array."""
+        """Return the points at t, (n,), as a (3, n) float64 array."""
         return self.scale * self.curve.position(t) + self.offset[:, None]
 
+    @np.errstate(all="ignore")
     def derivative(self, t: Floats) -> Floats | None:
-        """Give dP/dt at t, (n,), as a (3, n) float64 array, or None when it is not known."""
+        """Return dP/dt at t, (n,), as a (3, n) float64 array, or None when it is not known."""
         slope = self.curve.derivative(t)
         return None if slope is None else self.scale * slope
 
+    @np.errstate(all="ignore")
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats] | None:
-        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n), or None."""
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi, or None."""
         inner = self.curve.enclosure(t_lo, t_hi)
         if inner is None:
             return None
@@ -67,9 +73,14 @@ class Transformed(Curve):
         return outer.lo, outer.hi
 
     @staticmethod
-    def together(curves: Sequence[Transformed]) -> Evaluate:
-        """Prepare to evaluate transformed curves of one family at once, see `Curve.together`."""
-        inner = type(curves[0].curve).together([curve.curve for curve in curves])
+    def batch_evaluator(curves: Sequence[Transformed]) -> Evaluate:
+        """Return an evaluator of transformed curves of one family: see `Curve.batch_evaluator`."""
+        inner = type(curves[0].curve).batch_evaluator([curve.curve for curve in curves])
         scale = np.array([curve.scale for curve in curves])
         offset = np.stack([curve.offset for curve in curves], axis=1)
-        return lambda which, t: scale[which] * inner(which, t) + offset[:, which]
+
+        @np.errstate(all="ignore")
+        def evaluate(which: Ints, t: Floats) -> Floats:
+            return np.asarray(scale[which] * inner(which, t) + offset[:, which])
+
+        return evaluate

@@ -55,12 +55,12 @@ class Interval:
 
     lo: Floats
     hi: Floats
-    partial: Any = False
+    may_be_undefined: Any = False
 
     __array_ufunc__ = None  # so that arrays leave operations with intervals to the intervals
 
     @property
-    def fixed(self) -> bool:
+    def is_point(self) -> bool:
         """Whether it was made of numbers: bounds are the same array."""
         return self.lo is self.hi
 
@@ -94,7 +94,7 @@ def interval(value: Interval | ArrayLike) -> Interval:
     return Interval(number, number)
 
 
-def _outward(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
+def _widen(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
     """Move bounds apart. Bounds that overflowed are bounds of numbers, which have a size."""
     lo, hi = np.minimum(lo, _LARGEST), np.maximum(hi, -_LARGEST)
     return Interval(
@@ -109,7 +109,7 @@ def _outward(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
 
 def negate(a: Interval) -> Interval:
     """Give -a."""
-    return Interval(-a.hi, -a.lo, a.partial)
+    return Interval(-a.hi, -a.lo, a.may_be_undefined)
 
 
 def _sum(lo: Floats, hi: Floats, partial: Any) -> Interval:
@@ -120,59 +120,63 @@ def _sum(lo: Floats, hi: Floats, partial: Any) -> Interval:
 
 def add(a: Interval, b: Interval) -> Interval:
     """Give a + b."""
-    return _sum(a.lo + b.lo, a.hi + b.hi, a.partial | b.partial)
+    return _sum(a.lo + b.lo, a.hi + b.hi, a.may_be_undefined | b.may_be_undefined)
 
 
 def subtract(a: Interval, b: Interval) -> Interval:
     """Give a - b."""
-    return _sum(a.lo - b.hi, a.hi - b.lo, a.partial | b.partial)
+    return _sum(a.lo - b.hi, a.hi - b.lo, a.may_be_undefined | b.may_be_undefined)
 
 
 def multiply(a: Interval, b: Interval) -> Interval:
     """Give a b. An interval times itself (the same object) is its square."""
     if a is b:
         return _whole_power(a, 2.0)
-    if a.fixed:
+    if a.is_point:
         a, b = b, a
-    lo, hi = _spanned(a.lo * b.lo, a.hi * b.lo)
-    if not b.fixed:
-        others = _spanned(a.lo * b.hi, a.hi * b.hi)
+    lo, hi = _ordered(a.lo * b.lo, a.hi * b.lo)
+    if not b.is_point:
+        others = _ordered(a.lo * b.hi, a.hi * b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
-    return _outward(lo, hi, a.partial | b.partial, _EXACT)
+    return _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _EXACT)
 
 
 def divide(a: Interval, b: Interval) -> Interval:
     """Give a / b; nothing is known where b has 0 inside."""
     bottom = np.where((b.lo > 0) | (b.hi < 0), b.lo, np.nan)
-    lo, hi = _spanned(a.lo / bottom, a.hi / bottom)
-    if not b.fixed:
-        others = _spanned(a.lo / b.hi, a.hi / b.hi)
+    lo, hi = _ordered(a.lo / bottom, a.hi / bottom)
+    if not b.is_point:
+        others = _ordered(a.lo / b.hi, a.hi / b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
-    return _outward(lo, hi, a.partial | b.partial, _EXACT)
+    return _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _EXACT)
 
 
-def _spanned(one: Floats, other: Floats) -> tuple[Floats, Floats]:
+def _ordered(one: Floats, other: Floats) -> tuple[Floats, Floats]:
     return np.minimum(one, other), np.maximum(one, other)
 
 
 def absolute(a: Interval) -> Interval:
     """Give |a|."""
-    return Interval(_nearest(a), np.maximum(np.abs(a.lo), np.abs(a.hi)), a.partial)
+    return Interval(_least_magnitude(a), np.maximum(np.abs(a.lo), np.abs(a.hi)), a.may_be_undefined)
 
 
-def _nearest(a: Interval) -> Floats:
+def _least_magnitude(a: Interval) -> Floats:
     """Give the least |x| of the x in a."""
     return np.maximum(np.maximum(a.lo, -a.hi), 0.0)
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
     """Give the smaller of a and b."""
-    return Interval(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi), a.partial | b.partial)
+    return Interval(
+        np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi), a.may_be_undefined | b.may_be_undefined
+    )
 
 
 def maximum(a: Interval, b: Interval) -> Interval:
     """Give the greater of a and b."""
-    return Interval(np.maximum(a.lo, b.lo), np.maximum(a.hi, b.hi), a.partial | b.partial)
+    return Interval(
+        np.maximum(a.lo, b.lo), np.maximum(a.hi, b.hi), a.may_be_undefined | b.may_be_undefined
+    )
 
 
 # ---------------------------------------------------------------------------- powers
@@ -185,47 +189,47 @@ def power(a: Interval, b: Interval) -> Interval:
     exponents there is a value only for bases above 0, and for 0 if the exponent is positive;
     bases below 0 under a varying exponent have values here and there, of which nothing is known.
     """
-    if b.fixed and b.lo.ndim == 0:
+    if b.is_point and b.lo.ndim == 0:
         exponent = float(b.lo)
         if exponent.is_integer():
             return _whole_power(a, exponent)
-        a = _restricted(a, 0.0, np.inf)
+        a = _clip_to_domain(a, 0.0, np.inf)
     # The power is monotone in base and exponent, each if the other is held: so it is least and
     # greatest at corners. To numpy nan**0 and 1**nan are 1: what is unknown must be kept out.
     known = ((a.lo > 0) | ((a.lo == 0) & (b.lo > 0))) & ~np.isnan(b.lo + a.hi + b.hi)
-    lo, hi = _spanned(a.lo**b.lo, a.hi**b.lo)
-    if not b.fixed:
-        others = _spanned(a.lo**b.hi, a.hi**b.hi)
+    lo, hi = _ordered(a.lo**b.lo, a.hi**b.lo)
+    if not b.is_point:
+        others = _ordered(a.lo**b.hi, a.hi**b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
     lo, hi = np.where(known, lo, np.nan), np.where(known, hi, np.nan)
-    out = _outward(lo, hi, a.partial | b.partial, _ASSUMED)
-    return Interval(np.maximum(out.lo, 0.0), out.hi, out.partial)
+    out = _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _ASSUMED)
+    return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def _whole_power(a: Interval, exponent: float) -> Interval:
     if exponent == 0:
         one = np.where(np.isnan(a.lo), np.nan, 1.0)
-        return Interval(one, one, a.partial)
+        return Interval(one, one, a.may_be_undefined)
     if exponent < 0:
         return divide(interval(1.0), _whole_power(a, -exponent))
     if exponent % 2 == 1:
-        return _outward(a.lo**exponent, a.hi**exponent, a.partial, _ASSUMED)
+        return _widen(a.lo**exponent, a.hi**exponent, a.may_be_undefined, _ASSUMED)
     size = absolute(a)
     if exponent == 2:  # a product
-        out = _outward(size.lo * size.lo, size.hi * size.hi, a.partial, _EXACT)
+        out = _widen(size.lo * size.lo, size.hi * size.hi, a.may_be_undefined, _EXACT)
     else:
-        out = _outward(size.lo**exponent, size.hi**exponent, a.partial, _ASSUMED)
-    return Interval(np.maximum(out.lo, 0.0), out.hi, out.partial)
+        out = _widen(size.lo**exponent, size.hi**exponent, a.may_be_undefined, _ASSUMED)
+    return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def sqrt(a: Interval) -> Interval:
     """Give the square root of what is not negative in a."""
-    a = _restricted(a, 0.0, np.inf)
-    out = _outward(np.sqrt(a.lo), np.sqrt(a.hi), a.partial, _EXACT)
-    return Interval(np.maximum(out.lo, 0.0), out.hi, out.partial)
+    a = _clip_to_domain(a, 0.0, np.inf)
+    out = _widen(np.sqrt(a.lo), np.sqrt(a.hi), a.may_be_undefined, _EXACT)
+    return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
-def _restricted(a: Interval, low: float, high: float) -> Interval:
+def _clip_to_domain(a: Interval, low: float, high: float) -> Interval:
     """Cut a down to what is from low to high; nothing is known where there is nothing left."""
     outside = (a.lo < low) | (a.hi > high)
     if not outside.any():
@@ -233,67 +237,72 @@ def _restricted(a: Interval, low: float, high: float) -> Interval:
     empty = (a.hi < low) | (a.lo > high)
     lo = np.where(empty, np.nan, np.clip(a.lo, low, high))
     hi = np.where(empty, np.nan, np.clip(a.hi, low, high))
-    return Interval(lo, hi, a.partial | outside)
+    return Interval(lo, hi, a.may_be_undefined | outside)
 
 
 # ---------------------------------------------------------------------------- functions
 
 
-def _rising(
+def _increasing(
     function: Callable[[Floats], Floats], a: Interval, low: float = -np.inf, high: float = np.inf
 ) -> Interval:
     """Bound a function that rises, from low to high."""
-    out = _outward(function(a.lo), function(a.hi), a.partial, _ASSUMED)
-    return Interval(np.maximum(out.lo, low), np.minimum(out.hi, high), out.partial)
+    out = _widen(function(a.lo), function(a.hi), a.may_be_undefined, _ASSUMED)
+    return Interval(np.maximum(out.lo, low), np.minimum(out.hi, high), out.may_be_undefined)
 
 
 def exp(a: Interval) -> Interval:
     """Give e**a."""
-    return _rising(np.exp, a, low=0.0)
+    return _increasing(np.exp, a, low=0.0)
 
 
 def log(a: Interval) -> Interval:
     """Give the natural logarithm of what is positive in a."""
-    return _rising(np.log, _restricted(a, 0.0, np.inf))
+    return _increasing(np.log, _clip_to_domain(a, 0.0, np.inf))
 
 
 def sinh(a: Interval) -> Interval:
     """Give the hyperbolic sine."""
-    return _rising(np.sinh, a)
+    return _increasing(np.sinh, a)
 
 
 def cosh(a: Interval) -> Interval:
     """Give the hyperbolic cosine."""
-    return _rising(np.cosh, absolute(a), low=1.0)
+    return _increasing(np.cosh, absolute(a), low=1.0)
 
 
 def tanh(a: Interval) -> Interval:
     """Give the hyperbolic tangent."""
-    return _rising(np.tanh, a, -1.0, 1.0)
+    return _increasing(np.tanh, a, -1.0, 1.0)
 
 
 def asin(a: Interval) -> Interval:
     """Give the arc sine of what is from -1 to 1 in a."""
-    return _rising(np.arcsin, _restricted(a, -1.0, 1.0))
+    return _increasing(np.arcsin, _clip_to_domain(a, -1.0, 1.0))
 
 
 def acos(a: Interval) -> Interval:
     """Give the arc cosine of what is from -1 to 1 in a."""
-    a = _restricted(a, -1.0, 1.0)
-    out = _outward(np.arccos(a.hi), np.arccos(a.lo), a.partial, _ASSUMED)
-    return Interval(np.maximum(out.lo, 0.0), out.hi, out.partial)
+    a = _clip_to_domain(a, -1.0, 1.0)
+    out = _widen(np.arccos(a.hi), np.arccos(a.lo), a.may_be_undefined, _ASSUMED)
+    return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def atan(a: Interval) -> Interval:
     """Give the arc tangent."""
-    return _rising(np.arctan, a)
+    return _increasing(np.arctan, a)
 
 
 def hypot(a: Interval, b: Interval) -> Interval:
     """Give sqrt(a**2 + b**2)."""
     a, b = absolute(a), absolute(b)
-    out = _outward(np.hypot(a.lo, b.lo), np.hypot(a.hi, b.hi), a.partial | b.partial, _ASSUMED)
-    return Interval(np.maximum(out.lo, 0.0), out.hi, out.partial)
+    out = _widen(
+        np.hypot(a.lo, b.lo),
+        np.hypot(a.hi, b.hi),
+        a.may_be_undefined | b.may_be_undefined,
+        _ASSUMED,
+    )
+    return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def atan2(y: Interval, x: Interval) -> Interval:
@@ -307,15 +316,18 @@ def atan2(y: Interval, x: Interval) -> Interval:
     for corner in corners[1:]:
         lo, hi = np.minimum(lo, corner), np.maximum(hi, corner)
     jumps = (y.lo <= 0) & (y.hi >= 0) & (x.lo <= 0)
-    out = _outward(
-        np.where(jumps, -_PI, lo), np.where(jumps, _PI, hi), y.partial | x.partial, _ASSUMED
+    out = _widen(
+        np.where(jumps, -_PI, lo),
+        np.where(jumps, _PI, hi),
+        y.may_be_undefined | x.may_be_undefined,
+        _ASSUMED,
     )
     # The comparisons above are false for bounds that are not numbers; corners tell.
     unknown = np.isnan(lo)
     if not unknown.any():
         return out
     return Interval(
-        np.where(unknown, np.nan, out.lo), np.where(unknown, np.nan, out.hi), out.partial
+        np.where(unknown, np.nan, out.lo), np.where(unknown, np.nan, out.hi), out.may_be_undefined
     )
 
 
@@ -327,37 +339,39 @@ _WAVE = _ASSUMED * _ULP
 
 def sin(a: Interval) -> Interval:
     """Give the sine."""
-    return _wave(np.sin, a, 0.25)
+    return _sinusoid(np.sin, a, 0.25)
 
 
 def cos(a: Interval) -> Interval:
     """Give the cosine."""
-    return _wave(np.cos, a, 0.0)
+    return _sinusoid(np.cos, a, 0.0)
 
 
-def _wave(function: Callable[[Floats], Floats], a: Interval, crest: float) -> Interval:
+def _sinusoid(function: Callable[[Floats], Floats], a: Interval, crest: float) -> Interval:
     """Bound sine or cosine, which is 1 at the angle ``crest`` and -1 half a turn later, in turns.
 
     Between crests and troughs it is monotone, and so is least and greatest at the ends.
     """
-    if a.fixed:
+    if a.is_point:
         there = function(a.lo)
         lo, hi = there - _WAVE, there + _WAVE
     else:
-        lo, hi = _spanned(function(a.lo), function(a.hi))
-        lo = np.where(_may_hold_whole(a, 2 * np.pi, crest + 0.5), -1.0, lo - _WAVE)
-        hi = np.where(_may_hold_whole(a, 2 * np.pi, crest), 1.0, hi + _WAVE)
-    return Interval(np.maximum(lo, -1.0), np.minimum(hi, 1.0), a.partial)
+        lo, hi = _ordered(function(a.lo), function(a.hi))
+        lo = np.where(_may_contain_integer(a, 2 * np.pi, crest + 0.5), -1.0, lo - _WAVE)
+        hi = np.where(_may_contain_integer(a, 2 * np.pi, crest), 1.0, hi + _WAVE)
+    return Interval(np.maximum(lo, -1.0), np.minimum(hi, 1.0), a.may_be_undefined)
 
 
 def tan(a: Interval) -> Interval:
     """Give the tangent; nothing is known where a may have a pole inside."""
     lo, hi = np.tan(a.lo), np.tan(a.hi)
-    pole = _may_hold_whole(a, np.pi, 0.5)
-    return _outward(np.where(pole, np.nan, lo), np.where(pole, np.nan, hi), a.partial, _ASSUMED)
+    pole = _may_contain_integer(a, np.pi, 0.5)
+    return _widen(
+        np.where(pole, np.nan, lo), np.where(pole, np.nan, hi), a.may_be_undefined, _ASSUMED
+    )
 
 
-def _may_hold_whole(a: Interval, period: float, shift: float) -> Any:
+def _may_contain_integer(a: Interval, period: float, shift: float) -> Any:
     """Tell where a / period - shift may have a whole number inside; period is 2 pi or pi.
 
     The quotient's error is under (|q| + 1) 2^-52 for a quotient q: half an ulp each for the

@@ -87,7 +87,7 @@ class Expression:
 
     def value(self, t: Floats) -> Floats:
         """Evaluate at t, (n,) float64, to (n,) float64; not finite where there is no value."""
-        return rows([self])(t).ravel()
+        return compile_rows([self])(t).ravel()
 
     def derivative(self, t: Floats) -> Floats:
         """Give the derivative at t, (n,) float64; not finite where the rules find none.
@@ -110,9 +110,9 @@ class Expression:
             return self.fold(t, interval, lambda operation, x: operation.enclosure(*x))
 
 
-def rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
+def compile_rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
     """Prepare to evaluate k expressions at t, (n,) float64, to (k, n): as `Expression.value`."""
-    programs = [_plain(each.program) for each in expressions]
+    programs = [_flatten(each.program) for each in expressions]
 
     @np.errstate(all="ignore")
     def evaluate(t: Floats) -> Floats:
@@ -124,7 +124,7 @@ def rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
     return evaluate
 
 
-def together(expressions: Sequence[Expression]) -> Evaluate:
+def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
     """Prepare to evaluate expressions of one template at once.
 
     Returns
@@ -142,7 +142,7 @@ def together(expressions: Sequence[Expression]) -> Evaluate:
         column[0] if same else column
         for column, same in zip(numbers.T, (bits == bits[0]).all(axis=0), strict=True)
     ]
-    plain = _plain(programs[0])
+    plain = _flatten(programs[0])
 
     @np.errstate(all="ignore")
     def evaluate(which: Ints, t: Floats) -> Floats:
@@ -155,7 +155,7 @@ def together(expressions: Sequence[Expression]) -> Evaluate:
     return evaluate
 
 
-def _plain(program: tuple[Step, ...]) -> list[tuple[int, Any]]:
+def _flatten(program: tuple[Step, ...]) -> list[tuple[int, Any]]:
     """Give the steps of a program as `_run` takes them: how many operands, and what to do."""
     return [
         (step.arity, step.value)

@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 
 from voxdisplay.compute.array_types import Floats, Ints
-from voxdisplay.compute.kernel_backend import twin
-from voxdisplay.curves.curve import Curve
+from voxdisplay.compute.kernel_backend import with_kernel
+from voxdisplay.curves.curve import NO_BREAKS
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.curve_batch import AXES, Batch, Samples
 
@@ -119,7 +119,7 @@ def first_look(batch: Batch) -> Samples:
     t = batch.first[piece] + (batch.last - batch.first)[piece] * look
     t[np.append(piece[1:] != piece[:-1], True)] = batch.last
     breaks = [curve.breaks for curve in batch.curves]
-    if any(each.size for each in breaks if each is not Curve.breaks):
+    if any(each.size for each in breaks if each is not NO_BREAKS):
         piece, t = _with_breaks(batch, piece, t, breaks)
     fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
     if not fresh.all():  # a break was there, or a range has fewer parameters than it has looks
@@ -137,7 +137,7 @@ def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> 
     return piece[order], t[order]
 
 
-@twin
+@with_kernel
 @np.errstate(all="ignore")
 def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""

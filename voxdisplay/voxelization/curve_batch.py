@@ -16,7 +16,7 @@ from operator import attrgetter
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
-from voxdisplay.curves.batch_evaluation import Curves
+from voxdisplay.curves.batch_evaluation import BatchEvaluator
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import insert, spread
@@ -96,19 +96,19 @@ class Batch:
                 f"{self.name(index)}the range of t must be finite and ascending, "
                 f"not {self.first[index]} to {self.last[index]}"
             )
-        self._together = Curves(self.curves)
+        self._together = BatchEvaluator(self.curves)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
     @property
-    def reentrant(self) -> bool:
+    def thread_safe(self) -> bool:
         """Whether `evaluate` may be called from several threads at once."""
-        return all(self._together.of_each(attrgetter("reentrant")))
+        return all(self._together.map_curves(attrgetter("thread_safe")))
 
     @property
     def degrees(self) -> list[int | None]:
         """Those of the curves, see `Curve.degree`."""
-        return self._together.of_each(attrgetter("degree"))
+        return self._together.map_curves(attrgetter("degree"))
 
     def name(self, index: int) -> str:
         """Give the beginning of a message about a curve: nothing if it is the only one."""

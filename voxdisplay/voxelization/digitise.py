@@ -58,12 +58,12 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     while (begin := len(sequences)) < len(curves):
         end = min(begin + size * batches, len(curves))
         # Many short array operations in numpy would only wait for each other.
-        apart = kernel_backend.in_use() and all(map(attrgetter("reentrant"), curves[begin:end]))
-        do = parallel.in_order if apart else map
+        apart = kernel_backend.enabled() and all(map(attrgetter("thread_safe"), curves[begin:end]))
+        do = parallel.ordered_map if apart else map
         for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
             sequences += fresh
         voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
-        at_once = parallel.processors()
+        at_once = parallel.cpu_count()
         batches = at_once * (BATCHES if apart else 1)
         size = min(CURVES, VOXELS // at_once * (end - begin) // voxels + 1)
     return sequences
@@ -72,7 +72,7 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
 def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
     begin = perf_counter()
     samples = settle(batch, first_look(batch))
-    kernel_backend.prepare(samples.t.size, ahead)
+    kernel_backend.enable_if_worthwhile(samples.t.size, ahead)
     boxes = enclose(batch, samples) if certified else None
     if boxes:
         samples = settle(batch, see(batch, samples, boxes))

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from voxdisplay.compute.array_types import Floats, Ints
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.adaptive_sampling import refine
 from voxdisplay.voxelization.curve_batch import Batch, Samples
 from voxdisplay.voxelization.index_ranges import insert
@@ -91,7 +91,7 @@ def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
     return Crossings(Events(*events), better, gain)
 
 
-@twin
+@with_kernel
 def choose_corners(crossings: Crossings, knots: Samples) -> Events:
     """Prefer the better corners where neighbours stay neighbours; ends of pieces are added."""
     crossings = _with_ends(crossings, knots)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Ints
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.kernel_backend import with_kernel
 
 Arrays = tuple[NDArray[Any], ...]
 
@@ -36,7 +36,7 @@ def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
         begin = end
 
 
-@twin
+@with_kernel
 def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
     """Put columns between those of arrays, (M,) or (3, M): before the ones ``at``, ascending."""
     size = arrays[0].shape[-1]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Floats, Ints
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.curve_batch import Batch, Samples
 from voxdisplay.voxelization.index_ranges import blocks, spread
 from voxdisplay.voxelization.root_finding import TOLERANCE, cross
@@ -81,8 +81,8 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     parts = [(0, knots.t.size)]
     if knots.t.size > BLOCK:
         parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
-    apart = len(parts) >= MANY and batch.reentrant
-    found = list((parallel.in_order if apart else map)(crossings_of, parts))
+    apart = len(parts) >= MANY and batch.thread_safe
+    found = list((parallel.ordered_map if apart else map)(crossings_of, parts))
     crossings = found[0]
     if len(found) > 1:
         events = Events(
@@ -102,7 +102,7 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
     return crossings
 
 
-@twin
+@with_kernel
 @np.errstate(all="ignore")
 def slopes_at(knots: Samples) -> Floats:
     """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
@@ -126,7 +126,7 @@ def slopes_at(knots: Samples) -> Floats:
     return slopes
 
 
-@twin
+@with_kernel
 @np.errstate(all="ignore")
 def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
@@ -228,7 +228,7 @@ def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends
     return bracket, (np.where(after, miss[off], at_low), np.where(after, at_high, miss[off]))
 
 
-@twin
+@with_kernel
 @np.errstate(all="ignore")
 def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
     """Look for the corners of the crossed faces that are nearest to the tangents.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.index_ranges import spread
 from voxdisplay.voxelization.voxel_events import OTHER, Events, near
@@ -32,7 +32,7 @@ def without_repeats(events: Events) -> Events:
     return events.take(np.concatenate(([True], ~same))) if same.any() else events
 
 
-@twin
+@with_kernel
 def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 

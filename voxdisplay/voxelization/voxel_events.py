@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.compute.kernel_backend import twin
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.index_ranges import insert
 
 Voxels = NDArray[np.int32]
@@ -75,7 +75,7 @@ def near(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
     return np.asarray(close[0] & close[1] & close[2])
 
 
-@twin
+@with_kernel
 def torn(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
     """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
     apart = (piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:])

@@ -12,7 +12,7 @@ import pytest
 import voxdisplay as vd
 from voxdisplay.compute import kernel_backend, parallel
 from voxdisplay.curves import Bezier, Circle, Curve, Segment, Transformed
-from voxdisplay.curves.batch_evaluation import CALL, MANY, Curves
+from voxdisplay.curves.batch_evaluation import BLOCK_SIZE, MIN_PARALLEL_BLOCKS, BatchEvaluator
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization import voxelize, voxelize_many
 
@@ -23,8 +23,8 @@ DIGITISE = import_module("voxdisplay.voxelization.digitise")
 
 @pytest.fixture(autouse=True)
 def three_processors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parallel, "processors", lambda: 3)
-    monkeypatch.setattr(kernel_backend, "in_use", lambda: True)  # what batches are done apart for
+    monkeypatch.setattr(parallel, "cpu_count", lambda: 3)
+    monkeypatch.setattr(kernel_backend, "enabled", lambda: True)  # what batches are done apart for
 
 
 def beziers(count: int) -> list[Curve]:
@@ -33,7 +33,7 @@ def beziers(count: int) -> list[Curve]:
 
 
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parallel, "processors", lambda: 1)
+    monkeypatch.setattr(parallel, "cpu_count", lambda: 1)
 
 
 def test_parts_are_done_at_once_and_come_in_order() -> None:
@@ -43,31 +43,31 @@ def test_parts_are_done_at_once_and_come_in_order() -> None:
         meet.wait()
         return part * part
 
-    assert list(parallel.in_order(square, range(9))) == [part * part for part in range(9)]
+    assert list(parallel.ordered_map(square, range(9))) == [part * part for part in range(9)]
 
 
 def test_a_part_is_not_divided() -> None:
     def idents(_: int) -> set[int]:
-        inner = parallel.in_order(lambda _: threading.get_ident(), range(5))
+        inner = parallel.ordered_map(lambda _: threading.get_ident(), range(5))
         return {threading.get_ident(), *inner}
 
-    found = list(parallel.in_order(idents, range(6)))
+    found = list(parallel.ordered_map(idents, range(6)))
     assert all(len(each) == 1 for each in found)
     assert {threading.get_ident()} not in found
 
 
 def test_one_part_or_one_processor_needs_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     here = threading.get_ident()
-    assert list(parallel.in_order(lambda _: threading.get_ident(), [0])) == [here]
+    assert list(parallel.ordered_map(lambda _: threading.get_ident(), [0])) == [here]
     alone(monkeypatch)
-    assert list(parallel.in_order(lambda _: threading.get_ident(), range(4))) == [here] * 4
+    assert list(parallel.ordered_map(lambda _: threading.get_ident(), range(4))) == [here] * 4
 
 
 @pytest.mark.parametrize("begun", [0, 1])
 def test_where_no_thread_may_begin_all_is_done_in_this_one(
     monkeypatch: pytest.MonkeyPatch, begun: int
 ) -> None:
-    monkeypatch.setattr(parallel, "processors", lambda: 3)
+    monkeypatch.setattr(parallel, "cpu_count", lambda: 3)
     start, left = threading.Thread.start, iter(range(begun))
 
     def refused(thread: threading.Thread) -> None:
@@ -76,7 +76,7 @@ def test_where_no_thread_may_begin_all_is_done_in_this_one(
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", refused)
-    assert list(parallel.in_order(lambda part: part * part, [3, 5, 7])) == [9, 25, 49]
+    assert list(parallel.ordered_map(lambda part: part * part, [3, 5, 7])) == [9, 25, 49]
 
 
 def test_what_is_done_when_the_program_ends_is_done_without_threads() -> None:
@@ -106,14 +106,14 @@ def test_the_first_error_in_order_is_raised() -> None:
             raise ValueError(part)
         return part
 
-    results = parallel.in_order(fail, range(30))
+    results = parallel.ordered_map(fail, range(30))
     assert next(results) == 0
     with pytest.raises(ValueError, match=r"^1$"):
         next(results)
 
 
 def test_there_is_at_least_one_processor() -> None:
-    assert parallel.processors() >= 1
+    assert parallel.cpu_count() >= 1
 
 
 def test_batches_are_the_same_on_any_number_of_processors(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,11 +131,11 @@ def test_batches_are_done_apart_where_it_is_worth_it(
     worth: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(DIGITISE, "CURVES", 4)
-    monkeypatch.setattr(kernel_backend, "in_use", lambda: worth)
+    monkeypatch.setattr(kernel_backend, "enabled", lambda: worth)
     asked: set[int] = set()
 
     class Own(Segment):
-        reentrant = True
+        thread_safe = True
 
         def position(self, t: np.ndarray) -> np.ndarray:
             asked.add(threading.get_ident())
@@ -150,7 +150,7 @@ def test_a_long_curve_is_the_same_on_any_number_of_processors(
     curve: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("voxdisplay.voxelization.plane_crossings.BLOCK", 50)
-    monkeypatch.setattr("voxdisplay.curves.batch_evaluation.CALL", 30)
+    monkeypatch.setattr("voxdisplay.curves.batch_evaluation.BLOCK_SIZE", 30)
     long = {
         "formula": vd.Parametric("99*cos(t)", "99*sin(t)", "50*sin(3*t)", t=(0, 6)),
         "circle": Circle((70, 70, 70), 60),
@@ -215,8 +215,8 @@ def test_what_may_not_be_asked_from_several_threads_is_not(monkeypatch: pytest.M
 
     called = vd.Parametric(position, t=(0, 1))
     own = Own((0, 0, 0), (1, 1, 1))
-    assert not any(each.reentrant for each in (called, own, Transformed(own, 2.0)))
-    assert all(each.reentrant for each in (*beziers(1), Transformed(Circle((0, 0, 0), 1), 2.0)))
+    assert not any(each.thread_safe for each in (called, own, Transformed(own, 2.0)))
+    assert all(each.thread_safe for each in (*beziers(1), Transformed(Circle((0, 0, 0), 1), 2.0)))
     voxelize_many([called, own, Transformed(own, 2.0)] * 12)
     assert asked == {threading.get_ident()}
 
@@ -225,14 +225,14 @@ def test_many_points_of_one_curve_are_found_at_once(monkeypatch: pytest.MonkeyPa
     meet = threading.Barrier(2, timeout=PATIENCE_S)
 
     class Meeting(Segment):
-        reentrant = True
+        thread_safe = True
 
         def position(self, t: np.ndarray) -> np.ndarray:
             meet.wait()  # breaks if there is nobody else to ask
             return super().position(t)
 
-    monkeypatch.setattr(parallel, "processors", lambda: 2)
-    curves = Curves([Meeting((0, 0, 0), (9, 9, 9))])
-    t = np.linspace(0, 1, MANY * CALL)
+    monkeypatch.setattr(parallel, "cpu_count", lambda: 2)
+    curves = BatchEvaluator([Meeting((0, 0, 0), (9, 9, 9))])
+    t = np.linspace(0, 1, MIN_PARALLEL_BLOCKS * BLOCK_SIZE)
     points = curves.positions(np.zeros(t.size, dtype=np.int64), t)
     assert np.array_equal(points, Segment((0, 0, 0), (9, 9, 9)).position(t))

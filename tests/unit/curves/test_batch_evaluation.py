@@ -23,7 +23,7 @@ from voxdisplay.curves import (
     TorusKnot,
     Transformed,
 )
-from voxdisplay.curves.batch_evaluation import CALL, SMALLEST, Curves
+from voxdisplay.curves.batch_evaluation import BLOCK_SIZE, MIN_FAMILY_SIZE, BatchEvaluator
 from voxdisplay.voxelization import voxelize, voxelize_many
 
 Make = Callable[[np.random.Generator], Curve]
@@ -78,10 +78,10 @@ def test_a_family_is_where_its_curves_are(name: str) -> None:
     members = family(name, 20)
     assert members[0].family is not None
     assert len({curve.family for curve in members}) == 1
-    which = np.repeat(np.arange(20), rng.integers(0, 2 * CALL // 20, 20))
+    which = np.repeat(np.arange(20), rng.integers(0, 2 * BLOCK_SIZE // 20, 20))
     low, high = np.array([curve.t_range for curve in members])[which].T
     t = low + (high - low) * rng.uniform(size=which.size)
-    together = type(members[0]).together(members)(which, t)
+    together = type(members[0]).batch_evaluator(members)(which, t)
     assert together.shape == (3, which.size)
     for index, curve in enumerate(members):
         mine = which == index
@@ -90,7 +90,7 @@ def test_a_family_is_where_its_curves_are(name: str) -> None:
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_a_family_is_voxelised_as_its_curves_are(name: str) -> None:
-    members = family(name, 2 * SMALLEST)
+    members = family(name, 2 * MIN_FAMILY_SIZE)
     for curve, many in zip(members, voxelize_many(members), strict=True):
         alone = voxelize(curve)
         assert np.array_equal(alone.voxels, many.voxels)
@@ -100,13 +100,13 @@ def test_a_family_is_voxelised_as_its_curves_are(name: str) -> None:
 def test_families_and_strangers_mix() -> None:
     rng = np.random.default_rng(3)
     strangers = [TorusKnot(2, 3, (20, 20, 20), 9, 4) for _ in range(5)]
-    mixed = [family(name, SMALLEST + 1) for name in ("cubic", "waves", "segment", "circle")]
-    few = family("helix", SMALLEST - 1)
+    mixed = [family(name, MIN_FAMILY_SIZE + 1) for name in ("cubic", "waves", "segment", "circle")]
+    few = family("helix", MIN_FAMILY_SIZE - 1)
     curves = [each for each in chain(*zip_longest(strangers, *mixed, few)) if each is not None]
-    which = np.sort(np.concatenate((rng.integers(0, len(curves), 500), [3] * (CALL + 1))))
+    which = np.sort(np.concatenate((rng.integers(0, len(curves), 500), [3] * (BLOCK_SIZE + 1))))
     low, high = np.array([curve.t_range for curve in curves])[which].T
     t = low + (high - low) * rng.uniform(size=which.size)
-    positions = Curves(curves).positions(which, t)
+    positions = BatchEvaluator(curves).positions(which, t)
     for index, curve in enumerate(curves):
         mine = which == index
         assert np.array_equal(positions[:, mine], curve.position(t[mine]))
@@ -127,8 +127,8 @@ def test_a_class_with_its_own_position_leaves_the_family() -> None:
         def position(self, t: np.ndarray) -> np.ndarray:
             return super().position(t) + 5
 
-    curves = [Shifted((0, 0, 0), (9, 4, i)) for i in range(SMALLEST)]
-    curves += [Segment((0, 0, 0), (9, 4, i)) for i in range(SMALLEST)]
+    curves = [Shifted((0, 0, 0), (9, 4, i)) for i in range(MIN_FAMILY_SIZE)]
+    curves += [Segment((0, 0, 0), (9, 4, i)) for i in range(MIN_FAMILY_SIZE)]
     for curve, sequence in zip(curves, voxelize_many(curves), strict=True):
         assert np.array_equal(sequence.voxels[0], np.floor(curve.position(np.zeros(1))[:, 0]))
 
@@ -155,6 +155,6 @@ def test_what_a_family_has_in_common_is_asked_of_one_and_given_to_each():
     curves = [*plain, Bent(3), Bent(5), Parametric("t", "t", "t", t=(0, 1)), Bezier(points)]
     curves.append(Parametric(lambda t: (t, t, t), t=(0, 1)))
     for some in (curves, [curves[0], curves[3]], curves[4:6], curves[::-1]):
-        together = Curves(some)
-        for name in ("degree", "reentrant"):
-            assert together.of_each(attrgetter(name)) == [getattr(curve, name) for curve in some]
+        together = BatchEvaluator(some)
+        for name in ("degree", "thread_safe"):
+            assert together.map_curves(attrgetter(name)) == [getattr(curve, name) for curve in some]

@@ -448,10 +448,10 @@ def test_another_position_counts_wherever_it_is_inherited_from() -> None:
 
     for kind in (Waves, Same):
         curve = kind(ZIGZAG)
-        assert (curve.degree, curve.reentrant) == (None, False)
+        assert (curve.degree, curve.thread_safe) == (None, False)
         assert curve.enclosure(np.zeros(1), np.ones(1)) is None
         t = np.linspace(0, 1, 5)
-        at_once = kind.together([curve] * 4)(np.arange(5) % 4, t)
+        at_once = kind.batch_evaluator([curve] * 4)(np.arange(5) % 4, t)
         assert np.array_equal(at_once, curve.position(t))
     assert Named(ZIGZAG).degree == len(ZIGZAG) - 1
-    assert Named(ZIGZAG).reentrant
+    assert Named(ZIGZAG).thread_safe

@@ -138,7 +138,7 @@ def test_constant_powers(start, width, exponent):
     if not known(box):
         assert exponent < 0  # the base is too near to 0
         return
-    assert bool(np.any(box.partial)) == bool(exponent % 1 and pair[0] < 0)
+    assert bool(np.any(box.may_be_undefined)) == bool(exponent % 1 and pair[0] < 0)
     lo, hi = (mpmath.mpf(end) for end in bounds(box))
     for share in np.linspace(0, 1, 9):
         base = mpmath.mpf(inside(pair, float(share)))
@@ -215,8 +215,8 @@ def test_what_is_not_known_stays_so(source, lo, hi, use):
 )
 def test_parts_without_a_value_are_marked(source):
     expression = parse(source)
-    assert expression.enclosure(spread(-0.5, 0.5)).partial.tolist() == [True]
-    assert not np.any(expression.enclosure(spread(0.25, 0.5)).partial)
+    assert expression.enclosure(spread(-0.5, 0.5)).may_be_undefined.tolist() == [True]
+    assert not np.any(expression.enclosure(spread(0.25, 0.5)).may_be_undefined)
 
 
 @pytest.mark.parametrize("at", [0.5, 1.5, 7.5, 1e5 + 0.5, 2.0**40 + 0.5])

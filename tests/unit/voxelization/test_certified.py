@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from space_curves import Function
 
 import voxdisplay as vd
-from voxdisplay.compute.kernel_backend import use
+from voxdisplay.compute.kernel_backend import set_enabled
 from voxdisplay.curves import Transformed
 from voxdisplay.voxelization import measure, voxelize, voxelize_many
 from voxdisplay.voxelization.certify import COVERAGE, END_ERROR, ERROR, Certificate, certify
@@ -245,7 +245,7 @@ def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypat
 def test_tips_are_left_whatever_curve_comes_before(compiled):
     if compiled:
         pytest.importorskip("numba")
-    before = use(compiled)
+    before = set_enabled(compiled)
     try:
         there = [(0.5, 0.5, 0.5), (0.5, 1.5, 0.5)]
         back = vd.Polyline([*there, there[0]])
@@ -253,7 +253,7 @@ def test_tips_are_left_whatever_curve_comes_before(compiled):
         _, beside, _ = voxelize_many([vd.Segment(*there)] + [back] * 2, certified=True)
         assert np.array_equal(alone.voxels, beside.voxels)
     finally:
-        use(before)
+        set_enabled(before)
 
 
 def test_nothing_is_proven_of_the_march():

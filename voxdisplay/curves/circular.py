@@ -1,0 +1,223 @@
+"""Circles and their kin: ellipse, arc, helix. Angles are radians. Knows formulas only.
+
+All have exact derivatives and enclosures.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.curves import arguments
+from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.orthonormal_basis import orthonormal_basis
+from voxdisplay.expressions.interval import Interval, cos, sin
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+
+class _Helical(Curve):
+    """P(t) = center + cos(t) a + sin(t) b + t rise: uniform rotation and translation."""
+
+    family = "helical"
+    thread_safe = True
+
+    def __init__(
+        self,
+        center: ArrayLike,
+        a: Floats,
+        b: Floats,
+        *,
+        t_range: tuple[float, float] = (0.0, math.tau),
+        rise: Floats | None = None,
+        closed: bool | None = True,
+    ) -> None:
+        self.t_range = t_range
+        self.closed = closed
+        self._center = arguments.vector("center", center)[:, None]
+        self._a, self._b = a[:, None], b[:, None]
+        self._rise = np.zeros((3, 1)) if rise is None else rise[:, None]
+
+    @np.errstate(all="ignore")
+    def position(self, t: Floats) -> Floats:
+        """Return the points at t, (n,), as a (3, n) float64 array."""
+        return _helical_position(self._center, self._a, self._b, self._rise, t)
+
+    @staticmethod
+    def batch_evaluator(curves: Sequence[_Helical]) -> Evaluate:
+        """Return an evaluator of helical curves: see `Curve.batch_evaluator`."""
+        center = np.concatenate([curve._center for curve in curves], axis=1)
+        a = np.concatenate([curve._a for curve in curves], axis=1)
+        b = np.concatenate([curve._b for curve in curves], axis=1)
+        rise = np.concatenate([curve._rise for curve in curves], axis=1)
+
+        @np.errstate(all="ignore")
+        def evaluate(which: Ints, t: Floats) -> Floats:
+            return _helical_position(center[:, which], a[:, which], b[:, which], rise[:, which], t)
+
+        return evaluate
+
+    @np.errstate(all="ignore")
+    def derivative(self, t: Floats) -> Floats:
+        """Return dP/dt at t, (n,), as a (3, n) float64 array."""
+        return self._b * np.cos(t) - self._a * np.sin(t) + self._rise
+
+    @np.errstate(all="ignore")
+    def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi, (n,)."""
+        t = Interval(t_lo, t_hi)
+        box = self._center + self._a * cos(t) + self._b * sin(t) + self._rise * t
+        return box.lo, box.hi
+
+
+def _helical_position(center: Floats, a: Floats, b: Floats, rise: Floats, t: Floats) -> Floats:
+    return center + a * np.cos(t) + b * np.sin(t) + rise * t
+
+
+class Ellipse(_Helical):
+    """An ellipse: center + cos(t) axes[0] + sin(t) axes[1], 0 <= t <= 2 pi.
+
+    Parameters
+    ----------
+    center : (3,) array
+    axes : (2, 3) array
+        Two half axes. They need not be perpendicular (conjugate half diameters), nor independent.
+    closed : bool, optional
+
+    """
+
+    def __init__(self, center: ArrayLike, axes: ArrayLike, *, closed: bool = True) -> None:
+        a, b = half_axes = arguments.array("axes", axes, (2, 3))
+        super().__init__(center, a, b, closed=closed)
+        self._arguments = {"center": self._center[:, 0], "axes": half_axes}
+
+
+class Circle(_Helical):
+    """A circle; t is the angle, see `orthonormal_basis` for where it begins.
+
+    Parameters
+    ----------
+    center : (3,) array
+    radius : float
+    normal : (3,) array, optional
+        Perpendicular to the circle's plane, of any length. The circle runs counter-clockwise when
+        seen against it.
+    closed : bool, optional
+
+    """
+
+    def __init__(
+        self,
+        center: ArrayLike,
+        radius: float,
+        normal: ArrayLike = (0, 0, 1),
+        *,
+        closed: bool = True,
+    ) -> None:
+        radius = arguments.positive("radius", radius)
+        u, v, _ = orthonormal_basis("normal", normal)
+        super().__init__(center, radius * u, radius * v, closed=closed)
+        self._arguments = {"center": self._center[:, 0], "radius": radius, "normal": normal}
+
+
+class Arc(_Helical):
+    """A part of a circle, from the angle start to the angle end, which may be the smaller.
+
+    Parameters
+    ----------
+    center, radius, normal
+        As of `Circle`.
+    start, end : float
+        Angles in radians. The curve runs clockwise when end < start.
+    closed : bool, optional
+
+    """
+
+    def __init__(
+        self,
+        center: ArrayLike,
+        radius: float,
+        start: float,
+        end: float,
+        normal: ArrayLike = (0, 0, 1),
+        *,
+        closed: bool | None = None,
+    ) -> None:
+        radius = arguments.positive("radius", radius)
+        start, end = arguments.finite("start", start), arguments.finite("end", end)
+        if start == end:
+            raise arguments.ArgumentError("end", f"must differ from start: both are {start:g}")
+        u, v, _ = orthonormal_basis("normal", normal)
+        turn = math.copysign(1.0, end - start)  # clockwise: t is minus the angle
+        t_range = arguments.parameter_range("angle", turn * start, turn * end)
+        super().__init__(center, radius * u, turn * radius * v, t_range=t_range, closed=closed)
+        self._arguments = {
+            "center": self._center[:, 0],
+            "radius": radius,
+            "start": start,
+            "end": end,
+            "normal": normal,
+            "closed": closed,
+        }
+
+
+class Helix(_Helical):
+    """A helix; t is the angle, see `orthonormal_basis` for where it begins.
+
+    Parameters
+    ----------
+    center : (3,) array
+        The point of the axis beside which the helix begins.
+    radius : float
+    pitch : float
+        Advance along the axis in one turn. Negative: against the axis, left-handed.
+    turns : float
+        Number of turns, above 0, not necessarily whole.
+    axis : (3,) array, optional
+        Direction of the axis, of any length.
+    start : float, optional
+        Angle at which it begins, in radians.
+    closed : bool, optional
+
+    """
+
+    def __init__(
+        self,
+        center: ArrayLike,
+        radius: float,
+        pitch: float,
+        turns: float,
+        axis: ArrayLike = (0, 0, 1),
+        *,
+        start: float = 0.0,
+        closed: bool | None = None,
+    ) -> None:
+        radius = arguments.positive("radius", radius)
+        start = arguments.finite("start", start)
+        end = start + math.tau * arguments.positive("turns", turns)
+        u, v, n = orthonormal_basis("axis", axis)
+        rise = arguments.finite("pitch", pitch) / math.tau * n
+        origin = arguments.vector("center", center)
+        super().__init__(
+            origin - start * rise,
+            radius * u,
+            radius * v,
+            t_range=arguments.parameter_range("angle", start, end),
+            rise=rise,
+            closed=closed,
+        )
+        self._arguments = {
+            "center": origin,
+            "radius": radius,
+            "pitch": pitch,
+            "turns": turns,
+            "axis": axis,
+            "start": start,
+            "closed": closed,
+        }
