@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from plain_decoder import Plain
+from plain_decoder import PlainDecoder
 
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid as DeviceGrid
@@ -68,11 +68,11 @@ def _fewest_cuts(steps, longest):
     return best[-1]
 
 
-def plain(payloads, grid, pixel_format, base=None):
+def decode_plainly(payloads, grid, pixel_format, base=None):
     """A plain decoder after the payloads, each in a packet of its own, on a page of values."""
     mono = pixel_format is PixelFormat.MONO1
     page = None if base is None else [int(value) for value in base]
-    decoder = Plain(grid, pixel_format.bytes, pixel_format.full, mono=mono, page=page)
+    decoder = PlainDecoder(grid, pixel_format.bytes, pixel_format.full, mono=mono, page=page)
     for payload in payloads:
         decoder.draw(payload)
     return decoder

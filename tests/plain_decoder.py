@@ -10,7 +10,7 @@ import itertools
 OCT_CHILDREN = [(c & 1, c >> 1 & 1, c >> 2) for c in range(8)]
 
 
-class Plain:
+class PlainDecoder:
     """A page, and what payloads make of it. Keeps account of ops, and of what was written."""
 
     def __init__(self, grid, pixel_bytes, full, *, mono=False, page=None):

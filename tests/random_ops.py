@@ -7,7 +7,7 @@ from itertools import product
 from firmware_sim.memory import DEFAULT_PALETTE, FORMATS
 
 
-class Plain:
+class VoxelwiseDecoder:
     """Decoder of section 7, voxel by voxel."""
 
     def __init__(self, grid: tuple[int, int, int], name: str) -> None:
@@ -88,7 +88,7 @@ def leb(op: int, count: int) -> bytes:
             return bytes(out)
 
 
-def random_ops(rng: random.Random, plain: Plain, name: str) -> bytes:
+def random_ops(rng: random.Random, plain: VoxelwiseDecoder, name: str) -> bytes:
     """Draw at random, with a plain decoder beside; return the ops."""
     out = b""
     for _ in range(rng.randrange(1, 12)):
@@ -125,27 +125,27 @@ def random_ops(rng: random.Random, plain: Plain, name: str) -> bytes:
     return out + rng.choice((b"", b"\0", b"\0\0\0"))
 
 
-def random_pixel(rng: random.Random, plain: Plain) -> int:
+def random_pixel(rng: random.Random, plain: VoxelwiseDecoder) -> int:
     return rng.randrange(2 if plain.mono else 256**plain.size)
 
 
-def random_place(rng: random.Random, plain: Plain) -> bytes:
+def random_place(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
     plain.cursor = rng.randrange(plain.volume)
     return coordinates(plain, plain.at(plain.cursor))
 
 
-def random_dot(rng: random.Random, plain: Plain) -> bytes:
+def random_dot(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
     place = random_place(rng, plain)
     plain.voxels[plain.cursor] = plain.pen
     return place
 
 
-def coordinates(plain: Plain, place: Sequence[int]) -> bytes:
+def coordinates(plain: VoxelwiseDecoder, place: Sequence[int]) -> bytes:
     width = 1 if max(plain.grid) <= 256 else 2
     return b"".join(axis.to_bytes(width, "little") for axis in place)
 
 
-def random_brick(rng: random.Random, plain: Plain) -> bytes:
+def random_brick(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
     """Section 7.4, node by node, along one voxel at least that is on the grid."""
     level = rng.randrange(5)
     seed = plain.at(rng.randrange(plain.volume))
@@ -180,7 +180,7 @@ def random_brick(rng: random.Random, plain: Plain) -> bytes:
     return out
 
 
-def random_run(rng: random.Random, plain: Plain, kind: str, count: int) -> bytes:
+def random_run(rng: random.Random, plain: VoxelwiseDecoder, kind: str, count: int) -> bytes:
     if kind == "skip":
         plain.cursor += count
         return leb(0x80, count)
@@ -204,7 +204,7 @@ def random_run(rng: random.Random, plain: Plain, kind: str, count: int) -> bytes
     return leb(0xC0, count) + b"".join(v.to_bytes(plain.size, "little") for v in values)
 
 
-def random_chain(rng: random.Random, plain: Plain) -> tuple[int, bytes] | None:
+def random_chain(rng: random.Random, plain: VoxelwiseDecoder) -> tuple[int, bytes] | None:
     nx, ny, _ = plain.grid
     place = [plain.cursor % nx, plain.cursor // nx % ny, plain.cursor // nx // ny]
     octant = rng.randrange(24)

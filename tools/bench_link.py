@@ -25,7 +25,7 @@ from voxdisplay.curves import Bezier, Curve, Helix, Lissajous, TorusKnot
 from voxdisplay.frame import Frame
 from voxdisplay.link import Link
 from voxdisplay.wire import chains, packet, spans, voxel_sets
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 
 SEED = 22
 PAYLOAD = 1024
@@ -319,8 +319,8 @@ def bench_speeds(repeats: int, side: int) -> None:
     """Print the speed of each stage by itself, beside memcpy."""
     grid = vd.Frame((side, side, side), "mono1").grid
     bits = sum(1 << bit for bit in range(4))
-    mono = Coding(grid, vd.Frame((1, 1, 1), "mono1").format, PAYLOAD, bits)
-    dense = Coding(grid, vd.Frame((1, 1, 1), "index8").format, PAYLOAD, 1 << 4)
+    mono = EncoderConfig(grid, vd.Frame((1, 1, 1), "mono1").format, PAYLOAD, bits)
+    dense = EncoderConfig(grid, vd.Frame((1, 1, 1), "index8").format, PAYLOAD, 1 << 4)
     voxels = np.concatenate(
         [s.voxels for s in vd.voxelize_many(beziers(side, 10 * side, side / 2))]
     )
@@ -333,7 +333,7 @@ def bench_speeds(repeats: int, side: int) -> None:
     print(f"\n{'stage':<40}{'seconds':>10}")
     rates = [
         ("STEP, Beziers", lambda: chains.encode_chains(voxels, pens, mono), len(voxels), "voxels"),
-        ("OCT, sphere shell", lambda: voxel_sets.encode_bricks(shell, shell * 0 + 1, mono),
+        ("OCT, sphere shell", lambda: voxel_sets.encode_set_payloads(shell, shell * 0 + 1, mono),
          len(shell), "voxels"),
         ("SKIP/RUN/LIT/DIFF, head", lambda: spans.encode_spans(head, dense), len(head), "voxels"),
         ("reading back: LIT of a PAGE",
@@ -344,7 +344,11 @@ def bench_speeds(repeats: int, side: int) -> None:
     rows = [(name, work_s(work, repeats), amount, what) for name, work, amount, what in rates]
     coded = {
         "Beziers": (chains.encode_chains(voxels, pens, mono), len(voxels), mono),
-        "sphere shell": (voxel_sets.encode_bricks(shell, shell * 0 + 1, mono), len(shell), mono),
+        "sphere shell": (
+            voxel_sets.encode_set_payloads(shell, shell * 0 + 1, mono),
+            len(shell),
+            mono,
+        ),
         "head": (spans.encode_spans(head, dense), len(head), dense),
     }
     for name, (ops, amount, coding) in coded.items():
@@ -354,7 +358,7 @@ def bench_speeds(repeats: int, side: int) -> None:
         print(f"{name:<40}{seconds:10.5f}{amount / seconds / 1e6:10.2f} M {what}/s")
 
 
-def decode_s(payloads: list[bytes], coding: Coding) -> float:
+def decode_s(payloads: list[bytes], coding: EncoderConfig) -> float:
     """Give the processor time in which the emulator takes a frame: delimiting, CRC, and drawing."""
     shape, pixel = tuple(coding.grid), coding.format.value
     device = Device(Config(grid=shape, pixel_format=pixel, refresh=0))

@@ -18,16 +18,22 @@ from numpy.typing import ArrayLike, NDArray
 from voxdisplay import voxelization
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import MissingExtra
-from voxdisplay.raster.color import Color, as_colors, spread
+from voxdisplay.raster.color import Color, as_colors, interpolate_colors
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
-from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, lit
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
 from voxdisplay.wire import spec
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
-from voxdisplay.wire.encoding_selection import Content, Items, encode, encode_page, join_items
-from voxdisplay.wire.op_encoding import Coding
-from voxdisplay.wire.palette_ops import color_pieces
-from voxdisplay.wire.payload_splitting import Pieces
+from voxdisplay.wire.encoding_selection import (
+    OrderedVoxels,
+    PageUpdate,
+    concatenate_ordered,
+    encode_raw_if_faster,
+    encode_update,
+)
+from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.palette_ops import color_blocks
+from voxdisplay.wire.payload_splitting import OpBlocks
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +89,8 @@ class Frame:
         self.format = PixelFormat(format)
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
         self._shared = False  # with a copy
-        self._items: list[Items] = []
-        self._settled = False  # the painter's order: they are all seen
+        self._items: list[OrderedVoxels] = []
+        self._all_visible = False  # the painter's order: they are all seen
         self._has_base = False
         self._lit: tuple[NDArray[np.int64], Values] | None = None
         if palette is not None and self.format is not PixelFormat.INDEX8:
@@ -95,18 +101,18 @@ class Frame:
 
     def copy(self) -> Frame:
         """Give another frame of the same picture; quick, until one of the two is drawn on."""
-        self._seen(dark=True)  # once for both
+        self._visible(dark=True)  # once for both
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
         twin._items = list(self._items)  # noqa: SLF001 - of its own kind
-        if self._items and sum(map(len, self._items)) > _WORN * len(self.lit()[0]):
+        if self._items and sum(map(len, self._items)) > _OVERDRAW_LIMIT * len(self.lit()[0]):
             # Most of what was drawn is covered: the picture alone is less to keep.
             twin._items, twin._has_base = [], True  # noqa: SLF001
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
         self._shared = twin._shared = True  # noqa: SLF001
         return twin
 
-    def _change(self) -> None:
+    def _prepare_change(self) -> None:
         """Get ready to be changed: the picture of a copy stays as it is."""
         if self._shared:
             self._raster = self._raster.copy()
@@ -136,8 +142,8 @@ class Frame:
         if isinstance(what, Curve):
             what = voxelization.voxelize(what)
         if isinstance(what, voxelization.Sequence):
-            return self._add(what.voxels, as_colors(color), _corners(what))
-        return self._add(_as_voxels(what), as_colors(color), _NONE)
+            return self._add(what.voxels, as_colors(color), _corner_rows(what))
+        return self._add(_as_voxels(what), as_colors(color), _NO_INDICES)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves, in order: the same as `draw` on each, but found together."""
@@ -148,9 +154,9 @@ class Frame:
     def _add(
         self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
     ) -> Drawing:
-        self._change()
+        self._prepare_change()
         # One colour is looked up once.
-        rgb = colors if len(colors) == 1 else spread(colors, len(voxels))
+        rgb = colors if len(colors) == 1 else interpolate_colors(colors, len(voxels))
         found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
         exact = np.array_equal(self._colors_of(found), rgb)
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
@@ -159,10 +165,12 @@ class Frame:
         at_corner[corners] = True
         owner = np.zeros(len(voxels), dtype=np.int64)
         # What is outside has an index that means nothing, and leaves with it.
-        item = Items(voxels, self.grid.index_of(voxels), values, owner, at_corner).only(inside)
+        item = OrderedVoxels(voxels, self.grid.index_of(voxels), values, owner, at_corner).select(
+            inside
+        )
         self._raster[item.index] = self.format.pixels(item.values)
         self._items.append(item)
-        self._settled = False
+        self._all_visible = False
         return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
 
     def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
@@ -184,17 +192,19 @@ class Frame:
 
         """
         array = np.asarray(array)
-        self.format.check(array, self.grid.array_shape)
-        self._change()
+        self.format.validate(array, self.grid.array_shape)
+        self._prepare_change()
         self._raster[...] = array.reshape(self._raster.shape)
         self._items.clear()
         self._has_base = True
         if self._palette:
-            self._palette.use(np.flatnonzero(np.bincount(self._raster.reshape(-1), minlength=256)))
+            self._palette.mark_used(
+                np.flatnonzero(np.bincount(self._raster.reshape(-1), minlength=256))
+            )
 
     def clear(self) -> None:
         """Make the frame dark."""
-        self._change()
+        self._prepare_change()
         self._raster[...] = 0
         self._items.clear()
         self._has_base = False
@@ -209,7 +219,7 @@ class Frame:
     @property
     def has_own_palette(self) -> bool:
         """Whether the palette is not the default one."""
-        return self._palette is not None and len(self._palette.differs_from(DEFAULT)) > 0
+        return self._palette is not None and len(self._palette.entries_differing(DEFAULT)) > 0
 
     def array(self) -> Pixels:
         """Give the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
@@ -238,7 +248,7 @@ class Frame:
 
     def _find_lit(self) -> tuple[NDArray[np.int64], Values]:
         if self._has_base:
-            index = np.flatnonzero(lit(self._raster))
+            index = np.flatnonzero(is_lit(self._raster))
             return index, self._values_at(index)
         if not self._items:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
@@ -255,7 +265,7 @@ class Frame:
         # Of an array, much may be lit.
         whole = self._has_base
         found = page_digest(self._raster, self.format) if whole else digest(*self.lit())
-        if self._palette and len(entries := self._palette.differs_from(DEFAULT)):
+        if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
         return found & 0xFFFFFFFF
 
@@ -272,9 +282,9 @@ class Frame:
             What it announced, as in `DeviceInfo.features`. Nothing else is made use of.
 
         """
-        return list(chain.from_iterable(self.coded(max_payload, features)))
+        return list(chain.from_iterable(self.iter_payloads(max_payload, features)))
 
-    def coded(
+    def iter_payloads(
         self, max_payload: int, features: Collection[str] = (), bytes_per_s: float = 0.0
     ) -> Iterator[list[bytes]]:
         """Give payloads as `payloads` as soon as they are coded, a few at a time, or none.
@@ -290,15 +300,15 @@ class Frame:
             sooner than they are saved.
 
         """
-        coding = self._coding(max_payload, features, bytes_per_s)
-        colors = self._color_pieces(DEFAULT, coding)
-        if self._has_base and (plain := encode_page(self._raster, coding, colors)):
+        config = self._encoder_config(max_payload, features, bytes_per_s)
+        colors = self._palette_blocks(DEFAULT, config)
+        if self._has_base and (plain := encode_raw_if_faster(self._raster, config, colors)):
             yield from plain
             return
-        items = self._seen(dark=False)
-        index = _without(self.lit()[0], items) if self._has_base else _NONE
+        items = self._visible(dark=False)
+        index = _without(self.lit()[0], items) if self._has_base else _NO_INDICES
         yield []
-        yield from encode(Content(items, index, self._values_at), coding, colors)
+        yield from encode_update(PageUpdate(items, index, self._values_at), config, colors)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -313,17 +323,19 @@ class Frame:
             As of `payloads`.
 
         """
-        coding = self._coding(max_payload, features)
-        changed = self.changed(base)
-        items = self._seen(dark=True)
+        config = self._encoder_config(max_payload, features)
+        changed = self.changed_indices(base)
+        items = self._visible(dark=True)
         if items:  # one that has not changed at all is there
             fresh = np.isin(items.index, changed)
-            items = items.only(np.bincount(items.owner, fresh)[items.owner] > 0)
-        content = Content(items, _without(changed, items), self._values_at)
+            items = items.select(np.bincount(items.item, fresh)[items.item] > 0)
+        content = PageUpdate(items, _without(changed, items), self._values_at)
         old = base._palette.colors if base._palette else DEFAULT
-        return list(chain.from_iterable(encode(content, coding, self._color_pieces(old, coding))))
+        return list(
+            chain.from_iterable(encode_update(content, config, self._palette_blocks(old, config)))
+        )
 
-    def changed(self, base: Frame) -> NDArray[np.int64]:
+    def changed_indices(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
         mine, other = self._raster, base._raster
         if mine is other:
@@ -331,52 +343,52 @@ class Frame:
         if not (self._has_base or base._has_base):
             index = np.union1d(self.lit()[0], base.lit()[0])
             return np.asarray(index[self._values_at(index) != base._values_at(index)])
-        return np.flatnonzero(lit(mine ^ other))
+        return np.flatnonzero(is_lit(mine ^ other))
 
-    def _coding(
+    def _encoder_config(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
-    ) -> Coding:
+    ) -> EncoderConfig:
         bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in set(features))
-        coding = Coding(self.grid, self.format, max_payload, bits, bytes_per_s)
-        if self.has_own_palette and not coding.has(spec.FEATURE_PALETTE):
+        config = EncoderConfig(self.grid, self.format, max_payload, bits, bytes_per_s)
+        if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
             raise ValueError("this frame has a palette of its own, and the device keeps its own")
-        return coding
+        return config
 
-    def _seen(self, *, dark: bool) -> Items | None:
+    def _visible(self, *, dark: bool) -> OrderedVoxels | None:
         """Settle the painter's order: what a later item covers is not sent; nor is what is dark."""
         if not self._items:
             return None
-        if len(self._items) > 1 or not self._settled:
-            items = join_items(self._items)
+        if len(self._items) > 1 or not self._all_visible:
+            items = concatenate_ordered(self._items)
             # What is covered never comes to light again: then something newer has drawn it.
-            self._items = [items.only(self._values_at(items.index) == items.values)]
-            self._settled = True
+            self._items = [items.select(self._values_at(items.index) == items.values)]
+            self._all_visible = True
         (items,) = self._items
-        return items if dark else items.only(items.values != 0)
+        return items if dark else items.select(items.values != 0)
 
-    def _color_pieces(self, old: NDArray[np.uint8], coding: Coding) -> Pieces | None:
+    def _palette_blocks(self, old: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks | None:
         """Give the pieces that make another palette this one, if it differs."""
-        if self._palette and len(entries := self._palette.differs_from(old)):
-            return color_pieces(entries, self._palette.colors, coding)
+        if self._palette and len(entries := self._palette.entries_differing(old)):
+            return color_blocks(entries, self._palette.colors, config)
         return None
 
 
-_NONE = np.empty(0, dtype=np.int64)
+_NO_INDICES = np.empty(0, dtype=np.int64)
 # So many drawn voxels for one that is lit, and a copy forgets how it was drawn.
-_WORN = 4
+_OVERDRAW_LIMIT = 4
 
 
-def _corners(sequence: voxelization.Sequence) -> NDArray[np.int64]:
+def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
     """Give the voxels at which a curve has its corners."""
     breaks = sequence.curve.breaks
     if not len(breaks):
-        return _NONE
+        return _NO_INDICES
     behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
     before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)
     return np.unique(behind - before)
 
 
-def _without(index: NDArray[np.int64], items: Items | None) -> NDArray[np.int64]:
+def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[np.int64]:
     """Give indices, ascending, without those of items."""
     return np.setdiff1d(index, items.index) if items else index
 

@@ -5,7 +5,7 @@ from itertools import chain
 import document
 import numpy as np
 import pytest
-from drawing import plain
+from drawing import decode_plainly
 from sides import DeviceSide, features_of, flags_of, state_of
 
 from voxdisplay.raster.grid import Grid
@@ -15,12 +15,12 @@ from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.digest import digest, palette_digest
-from voxdisplay.wire.encoding_selection import Content, encode
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.encoding_selection import PageUpdate, encode_update
+from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.packet_stream import PacketStream
-from voxdisplay.wire.palette_ops import color_pieces
-from voxdisplay.wire.payload_splitting import Layout
-from voxdisplay.wire.range_coded_chains import encode_arcs
+from voxdisplay.wire.palette_ops import color_blocks
+from voxdisplay.wire.payload_splitting import PayloadLayout
+from voxdisplay.wire.range_coded_chains import encode_range_coded
 from voxdisplay.wire.spans import decode_spans, encode_spans
 
 
@@ -120,7 +120,9 @@ def test_digest_of_the_driver(vector):
     found = digest(np.array(index, dtype=int), np.array(values, dtype=int))
     colors = {}
     if "COLORS" in vector.name.upper():
-        colors = plain([vector.hex("ops")], vector.grid, PixelFormat[vector["format"]]).palette
+        colors = decode_plainly(
+            [vector.hex("ops")], vector.grid, PixelFormat[vector["format"]]
+        ).palette
     own = [entry for entry, color in colors.items() if color != tuple(DEFAULT[entry].tolist())]
     count = vector.grid[0] * vector.grid[1] * vector.grid[2]
     found += palette_digest(count, np.array(own, dtype=int), np.array([colors[i] for i in own]))
@@ -136,7 +138,7 @@ no_arc = pytest.mark.parametrize(
 @no_arc
 def test_ops_by_a_plain_reading(vector):
     format_ = PixelFormat[vector["format"]]
-    page = plain([vector.hex("ops")], vector.grid, format_).page
+    page = decode_plainly([vector.hex("ops")], vector.grid, format_).page
     nx, ny, _ = vector.grid
     lit = {
         (index % nx, index // nx % ny, index // nx // ny): value.to_bytes(format_.bytes, "little")
@@ -201,7 +203,7 @@ def test_coders_of_the_driver(vector):
     index = places @ [1, nx, nx * ny]
     values = np.zeros(nx * ny * nz, dtype=np.uint32)
     values[index] = [int.from_bytes(pixel, "little") for pixel in voxels.values()]
-    coding = Coding(Grid(*vector.grid), pixel_format, 1024)
+    coding = EncoderConfig(Grid(*vector.grid), pixel_format, 1024)
     for payloads in (encode_spans(values, coding), encode_chains(places, values[index], coding)):
         device = DeviceSide(vector.grid, vector["format"])
         device.open()
@@ -218,13 +220,15 @@ def test_coders_of_the_driver(vector):
 def test_coders_of_the_driver_by_a_plain_reading(vector):
     """The same with all features of the format."""
     format_ = PixelFormat[vector["format"]]
-    meant = plain([vector.hex("ops")], vector.grid, format_)
+    meant = decode_plainly([vector.hex("ops")], vector.grid, format_)
     pixels = np.array(meant.page)
-    content = Content(None, np.flatnonzero(pixels), lambda index: pixels[index])
+    content = PageUpdate(None, np.flatnonzero(pixels), lambda index: pixels[index])
     features = features_of(vector) - {"palette", "read", "digest", "arc"}
     bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in features)
-    coding = Coding(Grid(*vector.grid), format_, 64, bits)
-    drawn = plain(chain.from_iterable(encode(content, coding)), vector.grid, format_)
+    coding = EncoderConfig(Grid(*vector.grid), format_, 64, bits)
+    drawn = decode_plainly(
+        chain.from_iterable(encode_update(content, coding)), vector.grid, format_
+    )
     assert drawn.page == meant.page
     assert not drawn.two_pixels
     assert {name.lower() for name in drawn.ops} & ALL_FEATURES <= features
@@ -232,8 +236,8 @@ def test_coders_of_the_driver_by_a_plain_reading(vector):
     for entry, color in meant.palette.items():
         palette[entry] = color
     entries = np.array(sorted(meant.palette), dtype=int)
-    payloads = Layout(color_pieces(entries, palette, coding), coding).payloads
-    again = plain(payloads, vector.grid, format_)
+    payloads = PayloadLayout(color_blocks(entries, palette, coding), coding).payloads
+    again = decode_plainly(payloads, vector.grid, format_)
     assert again.palette.items() >= meant.palette.items()
 
 
@@ -250,7 +254,7 @@ def test_dialogues_as_the_driver_reads_them(vector):
             assert packets.pack(packet)[:-4] == body
             if isinstance(packet, packets.Info):
                 assert (packet.nx, packet.ny, packet.nz) == vector.grid
-                assert PixelFormat.of_wire(packet.format) is PixelFormat[facts["format"]]
+                assert PixelFormat.from_wire(packet.format) is PixelFormat[facts["format"]]
                 for name in ("boot", "max_payload", "rx_buffer", "refresh"):
                     assert getattr(packet, name) == int(facts[name])
 
@@ -265,5 +269,5 @@ def test_arcs_of_the_driver(vector):
     voxels = np.array(list(vector.voxels()))
     pens = np.array([int.from_bytes(pixel, "little") for pixel in vector.voxels().values()])
     pixel_format = PixelFormat(vector["format"].lower())
-    coding = Coding(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
-    assert encode_arcs(voxels, pens, coding) == [vector.hex("ops")]
+    coding = EncoderConfig(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
+    assert encode_range_coded(voxels, pens, coding) == [vector.hex("ops")]

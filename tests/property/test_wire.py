@@ -15,13 +15,13 @@ from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.digest import digest
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.packet_stream import PacketStream
 from voxdisplay.wire.spans import decode_spans, encode_spans
 
 GRIDS = [Grid(3, 5, 7), Grid(17, 64, 40), Grid(300, 4, 3), Grid(1, 1, 1)]
 codings = st.builds(
-    Coding, st.sampled_from(GRIDS), st.sampled_from(PixelFormat), st.integers(64, 400)
+    EncoderConfig, st.sampled_from(GRIDS), st.sampled_from(PixelFormat), st.integers(64, 400)
 )
 seeds = st.integers(0, 2**32 - 1)
 
@@ -73,7 +73,7 @@ def test_chains_are_cut_into_the_fewest_segments(grid, format_, seed, count):
     rng = np.random.default_rng(seed)
     voxels = walk(rng, grid, count)
     pens = pens_for(rng, voxels, grid, format_)
-    payloads = encode_chains(voxels, pens, Coding(grid, format_, 65535))
+    payloads = encode_chains(voxels, pens, EncoderConfig(grid, format_, 65535))
     assert len(segments_in(payloads, grid, format_)) == fewest_segments(voxels, pens)
 
 

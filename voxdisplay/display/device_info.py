@@ -67,7 +67,7 @@ def device_info(info: Info) -> DeviceInfo:
             f"the device speaks protocol {info.major}, this driver {spec.VERSION_MAJOR}",
             hint="update the older of the two",
         )
-    format_ = PixelFormat.of_wire(info.format)
+    format_ = PixelFormat.from_wire(info.format)
     if format_ is None:
         raise IncompatibleDevice(f"the device has the unknown pixel format {info.format}")
     return DeviceInfo(

@@ -16,7 +16,7 @@ from voxdisplay.display.receipt import WRONG_TWICE_HINT, describe_wrong_digest
 from voxdisplay.errors import DesyncError
 from voxdisplay.frame import Frame
 from voxdisplay.link import PictureId
-from voxdisplay.wire.features import UNKNOWN_BYTES_PER_S, worth_using
+from voxdisplay.wire.features import UNKNOWN_BYTES_PER_S, select_features
 
 # So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
 _LIT_PER_DIFFERENCE_BYTE = 64
@@ -63,7 +63,7 @@ class FrameQueue:
         if known and not link.backlog:
             whole = cache(partial(self.payloads, frame))
             lit = len(frame.lit()[0])
-            if 2 * len(frame.changed(known)) < lit:
+            if 2 * len(frame.changed_indices(known)) < lit:
                 payloads = frame.difference(known, link.payload_bytes, self._features)
                 size = sum(map(len, payloads))
                 # Where there is next to nothing to be sent, the whole frame need not be coded.
@@ -71,7 +71,7 @@ class FrameQueue:
                     return link.present_difference(link.displayed, payloads, whole)
                 return link.present(whole())
         ticket = link.open_frame()
-        coded = frame.coded(link.payload_bytes, self._features, self._bytes_per_s)
+        coded = frame.iter_payloads(link.payload_bytes, self._features, self._bytes_per_s)
         self._encoder = _Encoder(ticket, coded)
         return ticket
 
@@ -89,7 +89,7 @@ class FrameQueue:
 
     @property
     def _features(self) -> tuple[str, ...]:
-        return worth_using(self._connection.info.features, self._bytes_per_s)
+        return select_features(self._connection.info.features, self._bytes_per_s)
 
     # -- on the way
 

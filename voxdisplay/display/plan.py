@@ -16,8 +16,8 @@ from voxdisplay.frame import Frame
 from voxdisplay.link.payload_size import INITIAL_PAYLOAD, clamp_payload
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
-from voxdisplay.wire.features import worth_using
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.features import select_features
+from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.op_listing import list_ops
 
 EVERY_FEATURE: Final = tuple(
@@ -155,9 +155,9 @@ def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
 
     """
     longest, speed = receiver.payload_bytes, line.bytes_per_s
-    coded = frame.coded(longest, worth_using(receiver.features, speed), speed)
+    coded = frame.iter_payloads(longest, select_features(receiver.features, speed), speed)
     payloads = list(chain.from_iterable(coded)) or [b""]
-    coding = Coding(frame.grid, frame.format, longest)
+    coding = EncoderConfig(frame.grid, frame.format, longest)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()
     wire_bytes = 0

@@ -17,7 +17,7 @@ def check_info(info: packets.Info) -> None:
 
     """
     voxels = info.nx * info.ny * info.nz
-    longest = packets.wire_size(info.max_payload + spec.LIMIT_OVERHEAD)
+    longest = packets.max_wire_bytes(info.max_payload + spec.LIMIT_OVERHEAD)
     wrong = {
         "nx, ny, nz": not 0 < voxels <= spec.LIMIT_MAX_VOXELS,
         "pages": info.pages < 2,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.packet import wire_size
+from voxdisplay.wire.packet import max_wire_bytes
 
 # Header and check value, one code byte of COBS and the 00 (protocol.md, sections 3 and 4).
 OVERHEAD_BYTES = spec.LIMIT_OVERHEAD + 2
@@ -28,7 +28,9 @@ _MODULUS = 1 << 16
 
 def clamp_payload(payload_bytes: int, max_payload: int, rx_buffer: int) -> int:
     """Give what comes closest to a length of payloads and suits a device with such an INFO."""
-    room = (rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER - wire_size(spec.LIMIT_OVERHEAD)
+    room = (rx_buffer - spec.LIMIT_RESERVE) // _PACKETS_IN_BUFFER - max_wire_bytes(
+        spec.LIMIT_OVERHEAD
+    )
     return min(max(min(payload_bytes, room), spec.LIMIT_MIN_PAYLOAD), max_payload)
 
 

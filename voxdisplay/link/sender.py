@@ -125,7 +125,7 @@ class Sender:
             if not frame.started:
                 self._frames.resolve_difference(frame, None if self.outstanding else on_display)
             while frame.sendable:
-                size = packets.wire_size(len(frame.next_payload) + spec.LIMIT_OVERHEAD)
+                size = packets.max_wire_bytes(len(frame.next_payload) + spec.LIMIT_OVERHEAD)
                 if (
                     not self._window.has_room
                     or self._exceeds_flight_limit(size)

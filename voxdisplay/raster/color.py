@@ -85,7 +85,7 @@ def as_colors(color: Color) -> NDArray[np.uint8]:
     return parse_colors(color)
 
 
-def spread(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
+def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
     """Spread k colours evenly along ``count`` voxels, blending between them: (count, 3)."""
     if len(colors) == 1:
         return np.broadcast_to(colors, (count, 3))

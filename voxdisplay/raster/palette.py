@@ -36,7 +36,7 @@ class Palette:
     """
 
     def __init__(self, colors: Colors | None = None, *, grows: bool = False) -> None:
-        self.colors = (DEFAULT if colors is None else _checked(colors)).copy()
+        self.colors = (DEFAULT if colors is None else _validated(colors)).copy()
         self._grows = grows
         self._used = np.zeros(ENTRIES, dtype=np.bool_)
         self._used[0] = True
@@ -47,11 +47,11 @@ class Palette:
         twin._used = self._used.copy()
         return twin
 
-    def use(self, values: NDArray[np.integer]) -> None:
+    def mark_used(self, values: NDArray[np.integer]) -> None:
         """Note that pixels have these values: their entries stay what they are."""
         self._used[values] = True
 
-    def differs_from(self, other: Colors) -> NDArray[np.int64]:
+    def entries_differing(self, other: Colors) -> NDArray[np.int64]:
         """Give the entries that are not as in other colours, ascending."""
         return np.flatnonzero((self.colors != other).any(axis=1))
 
@@ -67,50 +67,50 @@ class Palette:
         Where there are more colours than entries, those that get one are spread evenly over the
         order in which they come; the others take the nearest by the sum of squared differences.
         """
-        wanted, first, back = np.unique(_codes(rgb), return_index=True, return_inverse=True)
+        wanted, first, back = np.unique(_packed_rgb(rgb), return_index=True, return_inverse=True)
         order = np.argsort(first)  # as they come
         values = np.empty(len(wanted), dtype=np.int64)
         values[order] = self._values_of(wanted[order])
-        self.use(values)
+        self.mark_used(values)
         return values[back].astype(np.uint32)
 
     def _values_of(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
         """Give the values of different colours."""
-        entries = _codes(self.colors)
+        entries = _packed_rgb(self.colors)
         entries[0] = 0  # black is pixel 0
         known, where = np.unique(entries, return_index=True)
         at = np.searchsorted(known, wanted).clip(max=len(known) - 1)
         values = np.where(known[at] == wanted, where[at], -1)
-        self.use(values[values >= 0])
+        self.mark_used(values[values >= 0])
         missing = np.flatnonzero(values < 0)
         if self._grows and len(missing):
             free = np.flatnonzero(~self._used)
             count = min(len(free), len(missing))
             chosen = missing[np.arange(count) * len(missing) // max(count, 1)]
             values[chosen] = free[:count]
-            self.colors[free[:count]] = _rgb(wanted[chosen])
+            self.colors[free[:count]] = _unpacked_rgb(wanted[chosen])
             self._used[free[:count]] = True
             missing = np.flatnonzero(values < 0)
         if len(missing):
             shown = self.rgb(np.arange(ENTRIES)).astype(np.int64)
             for begin in range(0, len(missing), ENTRIES):
                 some = missing[begin : begin + ENTRIES]
-                apart = _rgb(wanted[some]).astype(np.int64)[:, None] - shown
+                apart = _unpacked_rgb(wanted[some]).astype(np.int64)[:, None] - shown
                 values[some] = (apart**2).sum(axis=2).argmin(axis=1)
         return values
 
 
-def _codes(rgb: Colors) -> NDArray[np.int64]:
+def _packed_rgb(rgb: Colors) -> NDArray[np.int64]:
     """Give colours as numbers."""
     red, green, blue = rgb.astype(np.int64).T
     return np.asarray(red << 16 | green << 8 | blue)
 
 
-def _rgb(codes: NDArray[np.int64]) -> Colors:
+def _unpacked_rgb(codes: NDArray[np.int64]) -> Colors:
     return np.stack((codes >> 16, codes >> 8 & 255, codes & 255), axis=1).astype(np.uint8)
 
 
-def _checked(colors: Colors) -> Colors:
+def _validated(colors: Colors) -> Colors:
     colors = np.asarray(colors)
     if colors.shape != DEFAULT.shape or colors.dtype != np.uint8:
         raise ValueError(

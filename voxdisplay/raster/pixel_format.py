@@ -25,7 +25,7 @@ class PixelFormat(enum.Enum):
     RGB888 = "rgb888"
 
     @classmethod
-    def of_wire(cls, number: int) -> PixelFormat | None:
+    def from_wire(cls, number: int) -> PixelFormat | None:
         """Give the format that has a number in INFO, or None."""
         return next((format_ for format_ in cls if format_.wire == number), None)
 
@@ -73,9 +73,9 @@ class PixelFormat(enum.Enum):
             case PixelFormat.MONO1:
                 values = (red | green | blue) != 0
             case PixelFormat.INDEX8:
-                values = _level(red, 7) << 5 | _level(green, 7) << 2 | _level(blue, 3)
+                values = _quantise(red, 7) << 5 | _quantise(green, 7) << 2 | _quantise(blue, 3)
             case PixelFormat.RGB565:
-                values = _level(red, 31) << 11 | _level(green, 63) << 5 | _level(blue, 31)
+                values = _quantise(red, 31) << 11 | _quantise(green, 63) << 5 | _quantise(blue, 31)
             case PixelFormat.RGB888:
                 values = red | green << 8 | blue << 16
         return np.asarray(values, dtype=np.uint32)
@@ -88,9 +88,9 @@ class PixelFormat(enum.Enum):
             case PixelFormat.MONO1:
                 channels = (v * 255,) * 3
             case PixelFormat.INDEX8:
-                channels = (_full(v >> 5, 7), _full(v >> 2 & 7, 7), _full(v & 3, 3))
+                channels = (_expand(v >> 5, 7), _expand(v >> 2 & 7, 7), _expand(v & 3, 3))
             case PixelFormat.RGB565:
-                channels = (_full(v >> 11, 31), _full(v >> 5 & 63, 63), _full(v & 31, 31))
+                channels = (_expand(v >> 11, 31), _expand(v >> 5 & 63, 63), _expand(v & 31, 31))
             case PixelFormat.RGB888:
                 channels = (v & 255, v >> 8 & 255, v >> 16)
         return np.stack(channels, axis=1).astype(np.uint8)
@@ -111,7 +111,7 @@ class PixelFormat(enum.Enum):
             return np.asarray(values[:, None] >> np.array([0, 8, 16]) & 255, dtype=np.uint8)
         return np.asarray(values, dtype=self.dtype)
 
-    def check(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> None:
+    def validate(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> None:
         """Refuse an array that is not memory of this format.
 
         Raises
@@ -135,17 +135,17 @@ class PixelFormat(enum.Enum):
             raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
 
 
-def lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:
+def is_lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:
     """Tell which pixels, (n,) or (n, 3), are not dark: (n,)."""
     on = pixels != 0
     return on[:, 0] | on[:, 1] | on[:, 2] if on.ndim == 2 else np.asarray(on)
 
 
-def _level(channel: NDArray[np.integer], top: int) -> NDArray[np.integer]:
+def _quantise(channel: NDArray[np.integer], top: int) -> NDArray[np.integer]:
     """Nearest of the levels 0..top to a channel of 0..255."""
     return (channel * top * 2 + 255) // 510
 
 
-def _full(level: NDArray[np.integer], top: int) -> NDArray[np.integer]:
+def _expand(level: NDArray[np.integer], top: int) -> NDArray[np.integer]:
     """Channel of 0..255 of a level of 0..top."""
     return (level * 510 + top) // (2 * top)

@@ -62,7 +62,7 @@ def lit_voxels(
 
     """
     page = np.asarray(page)
-    format.check(page, grid.array_shape)
+    format.validate(page, grid.array_shape)
     flat = page.reshape(format.shape((grid.voxels,)))
     index, pixels = _nonzero_pixels(np.ascontiguousarray(flat))
     if format is PixelFormat.RGB888:

@@ -13,10 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Bools, Bytes, Coding, Ints, places, ranges
-from voxdisplay.wire.payload_splitting import Layout, Pieces
+from voxdisplay.wire.op_encoding import (
+    Bools,
+    Bytes,
+    EncoderConfig,
+    Ints,
+    concat_ranges,
+    encode_positions,
+)
+from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout
 
-Steps = NDArray[np.int32]
+Offsets = NDArray[np.int32]
 _STEPS_PER_BYTE = 4
 # By main axis and the axes that move, three bits: those of the next axis and the one behind it.
 _CRUMB_OF = np.array(
@@ -42,13 +49,13 @@ class Chains:
 
     """
 
-    pieces: Pieces
+    blocks: OpBlocks
     begin: Ints
     count: Ints
 
 
 def encode_chains(
-    voxels: NDArray[np.integer], pens: NDArray[np.integer], coding: Coding
+    voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
 ) -> list[bytes]:
     """Give the payloads that draw voxels, in their order.
 
@@ -66,13 +73,13 @@ def encode_chains(
         At most ``coding.max_payload`` bytes each.
 
     """
-    return Layout(chain(voxels, pens, coding).pieces, coding).payloads
+    return PayloadLayout(build_chains(voxels, pens, config).blocks, config).payloads
 
 
-def chain(
+def build_chains(
     voxels: NDArray[np.integer],
     pens: NDArray[np.integer],
-    coding: Coding,
+    config: EncoderConfig,
     corners: Bools | None = None,
 ) -> Chains:
     """Chain voxels that follow each other as 26-neighbours with the same pen.
@@ -91,25 +98,27 @@ def chain(
     value = pens.astype(np.int64)
     jump = np.abs(steps).max(axis=0, initial=0) != 1
     jump |= value[1:] != value[:-1]
-    ends, mains, falls = _octant_runs(steps, jump)
-    if corners is not None and coding.has(spec.FEATURE_LINE) and corners.any():
-        ends = _broken(ends, np.flatnonzero(corners))
+    ends, mains, falls = _longest_octant_runs(steps, jump)
+    if corners is not None and config.has(spec.FEATURE_LINE) and corners.any():
+        ends = _break_at_corners(ends, np.flatnonzero(corners))
     begin, count = _segments(ends, jump, n)
-    lines = _lines(spots, begin, count, coding)
-    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * (coding.room - 2))
-    begin, count, lines = _cut(begin, count, lines, longest)
+    lines = _find_lines(spots, begin, count, config)
+    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * (config.max_block_bytes - 2))
+    begin, count, lines = _split_long(begin, count, lines, longest)
 
     at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step; its octant is unused
     octant = 8 * mains[at] + falls[at] if n > 1 else np.zeros(n, dtype=np.int64)
-    body, size = _bodies(spots, steps, begin, count, octant, lines, coding)
-    index = coding.grid.index_of(voxels)
+    body, size = _encode_ops(spots, steps, begin, count, octant, lines, config)
+    index = config.grid.index_of(voxels)
     lone = count == 0
     pen = value[begin]
-    pieces = Pieces(body, size, pen, index[begin], pen, index[begin + count] + lone, ~lone & ~lines)
-    return Chains(pieces, begin, count)
+    blocks = OpBlocks(
+        body, size, pen, index[begin], pen, index[begin + count] + lone, ~lone & ~lines
+    )
+    return Chains(blocks, begin, count)
 
 
-def _octant_runs(steps: Steps, jump: Bools) -> tuple[Ints, Ints, Ints]:
+def _longest_octant_runs(steps: Offsets, jump: Bools) -> tuple[Ints, Ints, Ints]:
     """For each step: the end of the longest segment that begins there, and its octant.
 
     A run of steps fits an octant if some axis moves in all of them and no axis moves both ways.
@@ -118,7 +127,7 @@ def _octant_runs(steps: Steps, jump: Bools) -> tuple[Ints, Ints, Ints]:
     m = steps.shape[-1]
     index = np.arange(m, dtype=np.int32)
 
-    def next_where(condition: Bools) -> Steps:
+    def next_where(condition: Bools) -> Offsets:
         found = np.maximum(index, ~condition * np.int32(m))
         return np.minimum.accumulate(found[..., ::-1], axis=-1)[..., ::-1]
 
@@ -132,7 +141,7 @@ def _octant_runs(steps: Steps, jump: Bools) -> tuple[Ints, Ints, Ints]:
     return ends, main, falls
 
 
-def _broken(ends: Ints, corners: Ints) -> Ints:
+def _break_at_corners(ends: Ints, corners: Ints) -> Ints:
     """End segments also at the next corner behind their first voxel."""
     behind = np.append(corners, len(ends))[np.searchsorted(corners, np.arange(len(ends)), "right")]
     return np.asarray(np.minimum(ends, behind))
@@ -141,7 +150,7 @@ def _broken(ends: Ints, corners: Ints) -> Ints:
 def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
     """Follow the runs: first voxel and number of steps of each segment; a lone voxel has none."""
     m = len(jump)
-    ends = _trimmed(ends, jump)
+    ends = _trim_partial_bytes(ends, jump)
     following = (ends + jump).data  # a list of all would take longer than the few looked at
     path = []
     at = 0
@@ -158,7 +167,7 @@ def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
     return begin[kept], count[kept]
 
 
-def _trimmed(ends: Ints, jump: Bools) -> Ints:
+def _trim_partial_bytes(ends: Ints, jump: Bools) -> Ints:
     """End runs earlier whose last, partly filled byte of crumbs may be the next one's business."""
     m = len(ends)
     at = np.arange(m, dtype=np.int32)
@@ -172,12 +181,12 @@ def _trimmed(ends: Ints, jump: Bools) -> Ints:
     return np.asarray(ends - left * fits)
 
 
-def _lines(spots: Steps, begin: Ints, count: Ints, coding: Coding) -> Bools:
+def _find_lines(spots: Offsets, begin: Ints, count: Ints, config: EncoderConfig) -> Bools:
     """Find the segments that LINE draws in fewer bytes: all their voxels are where it has them."""
     found = np.zeros(len(begin), dtype=np.bool_)
-    if not coding.has(spec.FEATURE_LINE):
+    if not config.has(spec.FEATURE_LINE):
         return found
-    line_bytes = 1 + coding.move_bytes
+    line_bytes = 1 + config.position_bytes
     maybe = np.flatnonzero(2 + -(-count // _STEPS_PER_BYTE) > line_bytes)
     # Most segments of a curve are already elsewhere in their middle.
     for part in (2, 4):
@@ -185,14 +194,14 @@ def _lines(spots: Steps, begin: Ints, count: Ints, coding: Coding) -> Bools:
         maybe = maybe[~_off_line(spots, begin, count, maybe, k)]
     if len(maybe):
         owner = np.repeat(maybe, count[maybe])
-        k = ranges(np.zeros(len(maybe), dtype=np.int64), count[maybe])
+        k = concat_ranges(np.zeros(len(maybe), dtype=np.int64), count[maybe])
         off = _off_line(spots, begin, count, owner, k)
         starts = np.cumsum(count[maybe]) - count[maybe]
         found[maybe[~np.logical_or.reduceat(off, starts)]] = True
     return found
 
 
-def _off_line(spots: Steps, begin: Ints, count: Ints, which: Ints, k: Ints) -> Bools:
+def _off_line(spots: Offsets, begin: Ints, count: Ints, which: Ints, k: Ints) -> Bools:
     """Tell where voxel k of a segment is not that of the LINE between its ends."""
     first, length = begin[which], count[which]
     off = np.zeros(len(which), dtype=np.bool_)
@@ -203,13 +212,13 @@ def _off_line(spots: Steps, begin: Ints, count: Ints, which: Ints, k: Ints) -> B
     return off
 
 
-def _cut(begin: Ints, count: Ints, lines: Bools, longest: int) -> tuple[Ints, Ints, Bools]:
+def _split_long(begin: Ints, count: Ints, lines: Bools, longest: int) -> tuple[Ints, Ints, Bools]:
     """Cut segments that no op holds."""
     parts = np.where(lines, 1, np.maximum(1, -(-count // longest)))
     if parts.max(initial=0) <= 1:
         return begin, count, lines
     owner = np.repeat(np.arange(len(begin)), parts)
-    done = ranges(np.zeros(len(begin), dtype=np.int64), parts) * longest
+    done = concat_ranges(np.zeros(len(begin), dtype=np.int64), parts) * longest
     left = count[owner] - done
     return (
         begin[owner] + done,
@@ -218,38 +227,40 @@ def _cut(begin: Ints, count: Ints, lines: Bools, longest: int) -> tuple[Ints, In
     )
 
 
-def _bodies(
-    spots: Steps,
-    steps: Steps,
+def _encode_ops(
+    spots: Offsets,
+    steps: Offsets,
     begin: Ints,
     count: Ints,
     octant: Ints,
     lines: Bools,
-    coding: Coding,
+    config: EncoderConfig,
 ) -> tuple[Bytes, Ints]:
     """Give the ops of all segments, and how many bytes each has."""
     lone = count == 0
     stepped = np.flatnonzero(~lone & ~lines)
     crumbs, crumb_bytes = _crumbs(steps, begin[stepped], count[stepped], octant[stepped] // 8)
-    size = np.where(lone, 1, 1 + coding.move_bytes)
+    size = np.where(lone, 1, 1 + config.position_bytes)
     size[stepped] = 2 + crumb_bytes
     at = np.cumsum(size) - size
     body = np.empty(int(size.sum()), dtype=np.uint8)
     body[at] = np.where(lone, spec.OP_RUN, np.where(lines, spec.OP_LINE, spec.OP_STEP + octant))
     body[at[stepped] + 1] = count[stepped] - 1
-    body[ranges(at[stepped] + 2, crumb_bytes)] = crumbs
-    ends = places(spots[:, (begin + count)[lines]].T, coding)
-    body[at[lines, None] + 1 + np.arange(coding.move_bytes)] = ends
+    body[concat_ranges(at[stepped] + 2, crumb_bytes)] = crumbs
+    ends = encode_positions(spots[:, (begin + count)[lines]].T, config)
+    body[at[lines, None] + 1 + np.arange(config.position_bytes)] = ends
     return body, size
 
 
-def _crumbs(steps: Steps, begin: Ints, count: Ints, main: Ints) -> tuple[Bytes, Ints]:
+def _crumbs(steps: Offsets, begin: Ints, count: Ints, main: Ints) -> tuple[Bytes, Ints]:
     """Give the crumb bytes of segments, one after another, and how many each has."""
     sizes = -(-count // _STEPS_PER_BYTE)
     moved = (steps != 0).view(np.uint8)
     axes = moved[0] | moved[1] << 1 | moved[2] << 2
-    crumb = _CRUMB_OF[np.repeat(main.astype(np.uint8) << 3, count) | axes[ranges(begin, count)]]
+    crumb = _CRUMB_OF[
+        np.repeat(main.astype(np.uint8) << 3, count) | axes[concat_ranges(begin, count)]
+    ]
     padded = np.zeros(_STEPS_PER_BYTE * int(sizes.sum()), dtype=np.uint8)
-    padded[ranges(_STEPS_PER_BYTE * (np.cumsum(sizes) - sizes), count)] = crumb
+    padded[concat_ranges(_STEPS_PER_BYTE * (np.cumsum(sizes) - sizes), count)] = crumb
     four = padded.reshape(-1, _STEPS_PER_BYTE).view("<u4")[:, 0]
     return (four | four >> 6 | four >> 12 | four >> 18).astype(np.uint8), sizes

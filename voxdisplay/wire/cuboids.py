@@ -10,7 +10,9 @@ import numpy as np
 from voxdisplay.wire.op_encoding import Ints
 
 
-def cuboids(cells: Ints, group: Ints, high: Ints | None = None) -> tuple[Ints, Ints, Ints, Ints]:
+def merge_cuboids(
+    cells: Ints, group: Ints, high: Ints | None = None
+) -> tuple[Ints, Ints, Ints, Ints]:
     """Merge cells of the same group to cuboids, greedily: along x, then y, then z.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, lit
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
 from voxdisplay.wire import spec
 
 # What sets the value of a colour apart from that of a pixel.
@@ -32,7 +32,7 @@ def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
     index, values = np.asarray(index), np.asarray(values)
     index, values = index[values != 0], values[values != 0]
     blocks = (slice(low, low + _BLOCK) for low in range(0, len(values), _BLOCK))
-    found = sum(_of_block(index[some].astype(np.uint32), values[some]) for some in blocks)
+    found = sum(_block_digest(index[some].astype(np.uint32), values[some]) for some in blocks)
     return found & 0xFFFFFFFF
 
 
@@ -49,15 +49,15 @@ def page_digest(page: Pixels, format_: PixelFormat) -> int:
     found = 0
     for low in range(0, len(page), _BLOCK):
         pixels = page[low : low + _BLOCK]
-        on = lit(pixels)
+        on = is_lit(pixels)
         index = np.arange(low, low + len(on), dtype=np.uint32)
         if not on.all():
             index, pixels = index[on], pixels[on]
-        found += _of_block(index, format_.values(pixels))
+        found += _block_digest(index, format_.values(pixels))
     return found & 0xFFFFFFFF
 
 
-def _of_block(index: Values, values: NDArray[np.integer]) -> int:
+def _block_digest(index: Values, values: NDArray[np.integer]) -> int:
     """Give the sum of what lit voxels add, modulo 2**32."""
     h = index * np.uint32(spec.DIGEST_MUL_INDEX)
     part = values.astype(np.uint32)

@@ -15,7 +15,7 @@ SLOW_BYTES_PER_S: Final = 25_000
 UNKNOWN_BYTES_PER_S: Final = 200_000
 
 
-def worth_using(features: Collection[str], bytes_per_s: float) -> tuple[str, ...]:
+def select_features(features: Collection[str], bytes_per_s: float) -> tuple[str, ...]:
     """Leave out ARC on a line that is faster than its coder.
 
     Parameters

@@ -10,10 +10,10 @@ from collections.abc import Generator
 from typing import TypeAlias, TypeVar
 
 Result = TypeVar("Result")
-Steps: TypeAlias = Generator[None, None, Result]
+Incremental: TypeAlias = Generator[None, None, Result]
 
 
-def at_once(steps: Steps[Result]) -> Result:
+def run_to_end(steps: Incremental[Result]) -> Result:
     """Do all steps; give the result."""
     while True:
         try:

@@ -24,7 +24,7 @@ _LONGER_FROM = [SHORT_COUNT + 1 + (1 << bits if bits else 0) for bits in range(0
 
 
 @dataclass(frozen=True)
-class Coding:
+class EncoderConfig:
     """What the bytes of ops depend on: the display's grid and format, and what else it announced.
 
     Attributes
@@ -57,7 +57,7 @@ class Coding:
         return 1 if max(self.grid) <= 256 else 2
 
     @property
-    def move_bytes(self) -> int:
+    def position_bytes(self) -> int:
         """Bytes of the three coordinates of a MOVE or FROM."""
         return 3 * self.coordinate_bytes
 
@@ -67,9 +67,9 @@ class Coding:
         return 1 + self.format.bytes
 
     @property
-    def room(self) -> int:
+    def max_block_bytes(self) -> int:
         """Bytes of a payload that are left when its pen is set and its cursor has moved."""
-        return self.max_payload - self.pen_bytes - 1 - self.move_bytes
+        return self.max_payload - self.pen_bytes - 1 - self.position_bytes
 
 
 def little_endian(values: NDArray[np.integer], size: int) -> Bytes:
@@ -78,14 +78,14 @@ def little_endian(values: NDArray[np.integer], size: int) -> Bytes:
     return (values.astype(np.uint64)[:, None] >> shifts).astype(np.uint8)
 
 
-def places(voxels: NDArray[np.integer], coding: Coding) -> Bytes:
-    """Give the coordinates of voxels, (n, 3), as an (n, `Coding.move_bytes`) array of bytes."""
-    if coding.coordinate_bytes == 1:
+def encode_positions(voxels: NDArray[np.integer], config: EncoderConfig) -> Bytes:
+    """Return coordinates of voxels, (n, 3), as (n, `EncoderConfig.position_bytes`) bytes."""
+    if config.coordinate_bytes == 1:
         return voxels.astype(np.uint8)
-    return little_endian(voxels.reshape(-1), 2).reshape(-1, coding.move_bytes)
+    return little_endian(voxels.reshape(-1), 2).reshape(-1, config.position_bytes)
 
 
-def count_bytes(counts: NDArray[np.integer]) -> Ints:
+def counted_op_bytes(counts: NDArray[np.integer]) -> Ints:
     """Give the bytes of ops that carry counts, 1 <= count < 2**32, op byte included."""
     size = np.ones(counts.shape, dtype=np.int64)
     most = counts.max(initial=0)
@@ -96,9 +96,9 @@ def count_bytes(counts: NDArray[np.integer]) -> Ints:
     return size
 
 
-def count_ops(op: int | Ints, counts: Ints) -> tuple[Bytes, Ints]:
+def counted_ops(op: int | Ints, counts: Ints) -> tuple[Bytes, Ints]:
     """Give ops that carry counts: an (n, 6) array of bytes, and how many of each row count."""
-    size = count_bytes(counts)
+    size = counted_op_bytes(counts)
     out = np.empty((len(counts), 6), dtype=np.uint8)
     out[:, 0] = op | np.minimum(counts - 1, SHORT_COUNT)
     rest = np.maximum(counts - 1 - SHORT_COUNT, 0)
@@ -108,7 +108,7 @@ def count_ops(op: int | Ints, counts: Ints) -> tuple[Bytes, Ints]:
     return out, size
 
 
-def ranges(start: Ints, length: Ints) -> Ints:
+def concat_ranges(start: Ints, length: Ints) -> Ints:
     """Give the whole numbers of ranges, one range after another."""
     ends = np.cumsum(length)
     total = int(ends[-1]) if len(ends) else 0

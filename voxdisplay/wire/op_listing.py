@@ -11,13 +11,13 @@ from typing import Final
 
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import SHORT_COUNT, Coding
+from voxdisplay.wire.op_encoding import SHORT_COUNT, EncoderConfig
 
 UNKNOWN: Final = "?"
 _CRUMBS_PER_BYTE: Final = 4
 
 
-def list_ops(payload: bytes, coding: Coding) -> Iterator[tuple[str, int]]:
+def list_ops(payload: bytes, config: EncoderConfig) -> Iterator[tuple[str, int]]:
     """Give name and size of each op of a payload.
 
     Parameters
@@ -37,29 +37,29 @@ def list_ops(payload: bytes, coding: Coding) -> Iterator[tuple[str, int]]:
     """
     at = 0
     while at < len(payload):
-        name, size = _op_at(payload, at, coding)
+        name, size = _op_at(payload, at, config)
         left = len(payload) - at
         yield (name, size) if size <= left else (UNKNOWN, left)
         at += size
 
 
-def _op_at(payload: bytes, at: int, coding: Coding) -> tuple[str, int]:
+def _op_at(payload: bytes, at: int, config: EncoderConfig) -> tuple[str, int]:
     op = payload[at]
     for name, (value, mask, measure) in _OPS.items():
         if op & mask == value:
             try:
-                return name, measure(payload, at, coding)
+                return name, measure(payload, at, config)
             except IndexError:
                 break
     return UNKNOWN, len(payload) - at
 
 
-def _rest(payload: bytes, at: int, _coding: Coding) -> int:
+def _rest(payload: bytes, at: int, _config: EncoderConfig) -> int:
     return len(payload) - at
 
 
-def _chain(payload: bytes, at: int, coding: Coding) -> int:
-    place = coding.move_bytes if payload[at] & 0xE0 == spec.OP_FROM else 0
+def _chain(payload: bytes, at: int, config: EncoderConfig) -> int:
+    place = config.position_bytes if payload[at] & 0xE0 == spec.OP_FROM else 0
     steps = payload[at + 1 + place] + 1
     return 2 + place + -(-steps // _CRUMBS_PER_BYTE)
 
@@ -76,9 +76,9 @@ def _count(payload: bytes, at: int) -> tuple[int, int]:
     return SHORT_COUNT + 1 + rest, end + 1 - at
 
 
-def _brick(payload: bytes, at: int, coding: Coding) -> int:
+def _brick(payload: bytes, at: int, config: EncoderConfig) -> int:
     """Go through the masks of an OCT, level by level."""
-    size = 1 + coding.move_bytes
+    size = 1 + config.position_bytes
     nodes = 1
     for _ in range(payload[at] & 0x1F):
         masks = payload[at + size : at + size + nodes]
@@ -87,35 +87,35 @@ def _brick(payload: bytes, at: int, coding: Coding) -> int:
     return size
 
 
-def _differences(payload: bytes, at: int, _coding: Coding) -> int:
+def _differences(payload: bytes, at: int, _config: EncoderConfig) -> int:
     count, size = _count(payload, at)
     return size + (count + 1) // 2
 
 
-def _counted(payload: bytes, at: int, _coding: Coding) -> int:
+def _counted(payload: bytes, at: int, _config: EncoderConfig) -> int:
     return _count(payload, at)[1]
 
 
-def _literal(payload: bytes, at: int, coding: Coding) -> int:
+def _literal(payload: bytes, at: int, config: EncoderConfig) -> int:
     count, size = _count(payload, at)
-    if coding.format is PixelFormat.MONO1:
+    if config.format is PixelFormat.MONO1:
         return size + (count + 7) // 8
-    return size + count * coding.format.bytes
+    return size + count * config.format.bytes
 
 
 # Value, the bits that tell it, and how long it is: by name, in the order of section 7.
-_OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, Coding], int]]]] = {
+_OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]]]] = {
     "END": (spec.OP_END, 0xFF, _rest),
-    "PEN": (spec.OP_PEN, 0xFF, lambda _payload, _at, coding: coding.pen_bytes),
-    "MOVE": (spec.OP_MOVE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
-    "LINE": (spec.OP_LINE, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
-    "BOX": (spec.OP_BOX, 0xFF, lambda _payload, _at, coding: 1 + coding.move_bytes),
+    "PEN": (spec.OP_PEN, 0xFF, lambda _payload, _at, config: config.pen_bytes),
+    "MOVE": (spec.OP_MOVE, 0xFF, lambda _payload, _at, config: 1 + config.position_bytes),
+    "LINE": (spec.OP_LINE, 0xFF, lambda _payload, _at, config: 1 + config.position_bytes),
+    "BOX": (spec.OP_BOX, 0xFF, lambda _payload, _at, config: 1 + config.position_bytes),
     "DOTS": (
         spec.OP_DOTS,
         0xFF,
-        lambda payload, at, coding: 2 + (payload[at + 1] + 1) * coding.move_bytes,
+        lambda payload, at, config: 2 + (payload[at + 1] + 1) * config.position_bytes,
     ),
-    "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _coding: 3 + 3 * (payload[at + 2] + 1)),
+    "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _config: 3 + 3 * (payload[at + 2] + 1)),
     "STEP": (spec.OP_STEP, 0xE0, _chain),
     "ARC": (spec.OP_ARC, 0xFF, _rest),
     "FROM": (spec.OP_FROM, 0xE0, _chain),

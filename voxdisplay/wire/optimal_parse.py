@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.incremental import Steps
-from voxdisplay.wire.op_encoding import Bools, Coding, Ints, count_bytes
+from voxdisplay.wire.incremental import Incremental
+from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, counted_op_bytes
 
 # States: what the run before was drawn by.
 _LIT, _DIFF, _RUN, _SKIP = range(4)
 # Ways to draw a run, by their first and their second op; the second draws all but one pixel.
 LIT, DIFF, RUN, SKIP = spec.OP_LIT, spec.OP_DIFF, spec.OP_RUN, spec.OP_SKIP
-WAYS = np.array(
+OP_PAIRS = np.array(
     [(LIT, 0), (DIFF, 0), (LIT, RUN), (DIFF, RUN), (RUN, 0), (RUN, 0), (SKIP, 0), (LIT, DIFF)]
 )
 _ALL_LIT, _ALL_DIFF, _LIT_RUN, _DIFF_RUN, _PEN_RUN, _SAME_RUN, _SKIPPED, _LIT_DIFF = range(8)
 
 # Costs are bits; what is never done costs more than any path. Below a cost stands how it came
-# about: the state before in two bits, the row of `WAYS` in three. So one minimum finds both.
+# about: the state before in two bits, the row of `OP_PAIRS` in three. So one minimum finds both.
 _NEVER = 1 << 23
 _FROM_BITS, _CODE_BITS = 2, 5
 _CODE = (1 << _CODE_BITS) - 1
@@ -61,12 +61,12 @@ class Runs:
     start: Ints
     length: Ints
     value: Ints
-    may_skip: Bools
-    may_write: Bools
+    skippable: Bools
+    writable: Bools
 
 
-def cheapest(runs: Runs, coding: Coding) -> Steps[Ints]:
-    """Find the row of `WAYS` by which each run is drawn in the fewest bytes, in steps."""
+def cheapest_ops(runs: Runs, config: EncoderConfig) -> Incremental[Ints]:
+    """Find the row of `OP_PAIRS` by which each run is drawn in the fewest bytes, in steps."""
     n = len(runs.start)
     if n == 0:
         return np.empty(0, dtype=np.int64)
@@ -74,7 +74,7 @@ def cheapest(runs: Runs, coding: Coding) -> Steps[Ints]:
     height = min(n, height)
     width = -(-n // height)
     yield
-    of = {name: _folded(cost, height, width) for name, cost in _costs(runs, coding).items()}
+    of = {name: _to_columns(cost, height, width) for name, cost in _costs(runs, config).items()}
     # At the top of a stretch the pen is not known, but for the first: a packet begins so.
     for name in ("no_diff", "no_diff_behind_skip", "same_run"):
         of[name][0, 1:] = _NEVER << _CODE_BITS
@@ -104,22 +104,22 @@ def cheapest(runs: Runs, coding: Coding) -> Steps[Ints]:
         back[row] = np.bitwise_and(new, _CODE, dtype=np.int32)
         cost = (new & ~_CODE) + states
     yield
-    return _traced(back, cost.argmin(axis=0)).T.reshape(-1)[:n]
+    return _trace_back(back, cost.argmin(axis=0)).T.reshape(-1)[:n]
 
 
-def _costs(runs: Runs, coding: Coding) -> dict[str, Costs]:
+def _costs(runs: Runs, config: EncoderConfig) -> dict[str, Costs]:
     """Give the bits of each way to draw each run, without those of an op that is open already."""
     value = runs.value.astype(np.int32)
     length = np.minimum(runs.length, _LONG).astype(np.int32)
-    pixel = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    run = 8 * count_bytes(runs.length).astype(np.int32)
-    tail = 8 * count_bytes(np.maximum(runs.length - 1, 1)).astype(np.int32)
+    pixel = 1 if config.format is PixelFormat.MONO1 else 8 * config.format.bytes
+    run = 8 * counted_op_bytes(runs.length).astype(np.int32)
+    tail = 8 * counted_op_bytes(np.maximum(runs.length - 1, 1)).astype(np.int32)
     before, before_skip = np.full((2, len(value)), 1 << 30, dtype=np.int32)
     before[1:] = value[:-1]
-    before_skip[:1] = coding.format.full
-    before_skip[2:] = np.where(runs.may_skip[1:-1], value[:-2], 1 << 30)
-    may_diff = coding.has(spec.FEATURE_DIFF)
-    writes, several = runs.may_write, runs.may_write & (length > 1)
+    before_skip[:1] = config.format.full
+    before_skip[2:] = np.where(runs.skippable[1:-1], value[:-2], 1 << 30)
+    may_diff = config.has(spec.FEATURE_DIFF)
+    writes, several = runs.writable, runs.writable & (length > 1)
 
     def cost(way: int, bits: Costs | int, when: Bools) -> Costs:
         costs = np.where(when, np.int32(bits), np.int32(_NEVER))
@@ -132,28 +132,28 @@ def _costs(runs: Runs, coding: Coding) -> dict[str, Costs]:
         "diff": cost(_ALL_DIFF, 4 * length, writes),
         "lit_run": cost(_LIT_RUN, pixel + tail, several),
         "diff_run": cost(_DIFF_RUN, 4 + tail, several),
-        "pen_run": cost(_PEN_RUN, 8 * coding.pen_bytes + run, writes),
+        "pen_run": cost(_PEN_RUN, 8 * config.pen_bytes + run, writes),
         "same_run": cost(_SAME_RUN, run, value == before_skip),
-        "skip": cost(_SKIPPED, run, runs.may_skip),
+        "skip": cost(_SKIPPED, run, runs.skippable),
         "lit_diff": cost(_LIT_DIFF, pixel + _DIFF_BITS + 4 * (length - 1), several & may_diff),
-        "no_diff": cost(0, 0, near(value - before) & may_diff),
-        "no_diff_behind_skip": cost(0, 0, near(value - before_skip) & may_diff),
+        "no_diff": cost(0, 0, fits_nibble(value - before) & may_diff),
+        "no_diff_behind_skip": cost(0, 0, fits_nibble(value - before_skip) & may_diff),
     }
 
 
-def near(difference: Ints | Costs) -> Bools:
+def fits_nibble(difference: Ints | Costs) -> Bools:
     """Tell which differences of pixels of a byte a nibble holds: -8 to 7, modulo 256."""
     return np.asarray((((difference + 8) & 255) < 16) & (np.abs(difference) < 256))
 
 
-def _folded(cost: Costs, height: int, width: int) -> Costs:
+def _to_columns(cost: Costs, height: int, width: int) -> Costs:
     """Lay costs out in columns, one for each stretch; what is missing costs nothing at all."""
     padded = np.zeros(height * width, dtype=np.int32)
     padded[: len(cost)] = cost
     return np.ascontiguousarray(padded.reshape(width, height).T)
 
 
-def _traced(back: NDArray[np.uint8], state: Ints) -> Ints:
+def _trace_back(back: NDArray[np.uint8], state: Ints) -> Ints:
     """Follow each stretch from its cheapest end to its beginning."""
     ways = np.empty((len(back), len(state)), dtype=np.int64)
     column = np.arange(len(state))

@@ -51,7 +51,7 @@ class Packet:
 _P = TypeVar("_P", bound=Packet)
 
 
-def _type(kind: int, section: str, layout: spec.Layout = ()) -> Any:
+def _packet_type(kind: int, section: str, layout: spec.Layout = ()) -> Any:
     """Make a dataclass a type of packet: its number, its section, and its layout as a struct."""
 
     def finish(cls: type[_P]) -> type[_P]:
@@ -62,7 +62,7 @@ def _type(kind: int, section: str, layout: spec.Layout = ()) -> Any:
     return finish
 
 
-@_type(spec.TYPE_DATA, "6")
+@_packet_type(spec.TYPE_DATA, "6")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Data(Packet):
     """Ops for the back page."""
@@ -80,7 +80,7 @@ class Data(Packet):
         return {"ops": tail}
 
 
-@_type(spec.TYPE_HELLO, "5", spec.LAYOUT_HELLO)
+@_packet_type(spec.TYPE_HELLO, "5", spec.LAYOUT_HELLO)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hello(Packet):
     """Opens a session."""
@@ -90,13 +90,13 @@ class Hello(Packet):
     minor: int = spec.VERSION_MINOR
 
 
-@_type(spec.TYPE_STATUS, "9")
+@_packet_type(spec.TYPE_STATUS, "9")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status(Packet):
     """Asks for an ACK; ``seq`` is the tag."""
 
 
-@_type(spec.TYPE_READ, "10", spec.LAYOUT_READ)
+@_packet_type(spec.TYPE_READ, "10", spec.LAYOUT_READ)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Read(Packet):
     """Asks for the pixels of a range of indices; ``seq`` is the tag."""
@@ -105,7 +105,7 @@ class Read(Packet):
     count: int
 
 
-@_type(spec.TYPE_ACK, "9", spec.LAYOUT_ACK)
+@_packet_type(spec.TYPE_ACK, "9", spec.LAYOUT_ACK)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ack(Packet):
     """What the device has, and what it has room for."""
@@ -129,7 +129,7 @@ class Ack(Packet):
         return self.frame if self.flags & spec.ACK_FLAG_SHOWN else None
 
 
-@_type(spec.TYPE_INFO, "5", spec.LAYOUT_INFO)
+@_packet_type(spec.TYPE_INFO, "5", spec.LAYOUT_INFO)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Info(Packet):
     """What the device says of itself."""
@@ -176,7 +176,7 @@ class Info(Packet):
         return texts
 
 
-@_type(spec.TYPE_PAGE, "10", spec.LAYOUT_PAGE)
+@_packet_type(spec.TYPE_PAGE, "10", spec.LAYOUT_PAGE)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page(Packet):
     """Pixels of a range of indices, as ops."""
@@ -196,7 +196,7 @@ class Page(Packet):
         return {"ops": tail}
 
 
-@_type(spec.TYPE_ERROR, "11", spec.LAYOUT_ERROR)
+@_packet_type(spec.TYPE_ERROR, "11", spec.LAYOUT_ERROR)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Error(Packet):
     """What the device refused, and where."""
@@ -236,7 +236,7 @@ def encode(packet: Packet) -> bytes:
     return bytes(cobs.encode(pack(packet))) + b"\0"
 
 
-def wire_size(size: int) -> int:
+def max_wire_bytes(size: int) -> int:
     """Give the most bytes that a packet of ``size`` bytes, check value included, has on the wire.
 
     That is the packet, COBS's code byte for each 254 bytes of it, and the 00.
@@ -244,7 +244,7 @@ def wire_size(size: int) -> int:
     return size + -(-size // 254) + 1
 
 
-def intact(raw: bytes) -> bool:
+def has_valid_crc(raw: bytes) -> bool:
     """Tell whether bytes out of COBS are a packet: long enough, and the check value holds."""
     return (
         len(raw) >= spec.LIMIT_OVERHEAD

@@ -73,7 +73,7 @@ class PacketStream:
                 self._drop(segment, self._overlong + end)
                 self._overlong = 0
                 continue
-            raw = self._unpack(segment)
+            raw = self._decode_segment(segment)
             if raw is None:
                 continue
             if raw[0] >> 4 not in packets.TYPES:  # section 12: of a later version, perhaps
@@ -87,7 +87,7 @@ class PacketStream:
             self._segment.clear()
         self._searched = len(self._segment)
 
-    def _unpack(self, segment: bytes) -> bytes | None:
+    def _decode_segment(self, segment: bytes) -> bytes | None:
         if len(segment) < spec.LIMIT_MIN_SEGMENT:
             self.counters.noise_bytes += len(segment)
             self._keep_noise(segment)
@@ -96,7 +96,7 @@ class PacketStream:
             raw = bytes(cobs.decode(segment))
         except cobs.DecodeError:
             raw = b""
-        if len(raw) <= _LONGEST and packets.intact(raw):
+        if len(raw) <= _LONGEST and packets.has_valid_crc(raw):
             return raw
         self._drop(segment, len(segment))
         return None

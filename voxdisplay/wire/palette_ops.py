@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Coding, Ints
-from voxdisplay.wire.payload_splitting import ANY, Pieces, no_pieces
+from voxdisplay.wire.op_encoding import EncoderConfig, Ints
+from voxdisplay.wire.payload_splitting import ANY, OpBlocks, no_blocks
 
 _OP_BYTES, _COLOR_BYTES = 3, 3
 
 
-def color_pieces(entries: Ints, palette: NDArray[np.uint8], coding: Coding) -> Pieces:
+def color_blocks(entries: Ints, palette: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks:
     """Give the pieces that set some entries of a palette.
 
     Parameters
@@ -24,7 +24,7 @@ def color_pieces(entries: Ints, palette: NDArray[np.uint8], coding: Coding) -> P
     coding : Coding
 
     """
-    most = min(spec.LIMIT_MAX_COLORS, (coding.room - _OP_BYTES) // _COLOR_BYTES)
+    most = min(spec.LIMIT_MAX_COLORS, (config.max_block_bytes - _OP_BYTES) // _COLOR_BYTES)
     ops = []
     for run in _runs(entries.tolist()):
         for first in range(run.start, run.stop, most):
@@ -32,12 +32,12 @@ def color_pieces(entries: Ints, palette: NDArray[np.uint8], coding: Coding) -> P
             head = bytes((spec.OP_COLORS, first, stop - first - 1))
             ops.append(head + palette[first:stop].tobytes())
     if not ops:
-        return no_pieces()
+        return no_blocks()
     anything = np.full(len(ops), ANY)
     size = np.array([len(op) for op in ops], dtype=np.int64)
     body = np.frombuffer(b"".join(ops), dtype=np.uint8)
     no_chains = np.zeros(len(ops), dtype=np.bool_)
-    return Pieces(body, size, anything, anything, anything, anything, no_chains)
+    return OpBlocks(body, size, anything, anything, anything, anything, no_chains)
 
 
 def _runs(entries: list[int]) -> list[range]:

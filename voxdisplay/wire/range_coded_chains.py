@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Coding, Ints
+from voxdisplay.wire.op_encoding import EncoderConfig, Ints
 
 # Of 4096 parts, how many the chance of a sure thing has.
 _ONE = 4096
@@ -36,8 +36,8 @@ _SPARE_STEPS = 8
 _FIRST_WINDOW = 5
 
 
-def encode_arcs(
-    voxels: NDArray[np.integer], pens: NDArray[np.integer], coding: Coding
+def encode_range_coded(
+    voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
 ) -> list[bytes]:
     """Give the payloads that draw voxels, in their order; each is one ARC.
 
@@ -58,10 +58,10 @@ def encode_arcs(
     """
     payloads = []
     at = 0
-    window = _FIRST_WINDOW * coding.max_payload
+    window = _FIRST_WINDOW * config.max_payload
     while at < len(voxels):
-        part = _Part.of(voxels[at : at + window], pens[at : at + window], coding)
-        payload, drawn = _fill(part, coding)
+        part = _Window.of(voxels[at : at + window], pens[at : at + window], config)
+        payload, drawn = _encode_payload(part, config)
         if drawn == window and at + drawn < len(voxels):
             window *= 2  # there is room for more
             continue
@@ -72,13 +72,13 @@ def encode_arcs(
     return payloads
 
 
-def _fill(part: _Part, coding: Coding) -> tuple[bytes, int]:
+def _encode_payload(part: _Window, config: EncoderConfig) -> tuple[bytes, int]:
     """Give one payload, and how many voxels of the part it draws."""
-    coder = _RangeCoder(coding.max_payload - 1 - _TAIL_BYTES)
-    pen, drawn = coding.format.full, 0
+    coder = _RangeCoder(config.max_payload - 1 - _TAIL_BYTES)
+    pen, drawn = config.format.full, 0
     for begin, end in part.pieces:
         head = part.head(begin, pen)
-        fits = _code_piece(coder, part, head, begin, end)
+        fits = _encode_piece(coder, part, head, begin, end)
         if fits == 0:
             break
         drawn, pen = begin + fits, part.pens[begin]
@@ -88,15 +88,15 @@ def _fill(part: _Part, coding: Coding) -> tuple[bytes, int]:
     return bytes((spec.OP_ARC,)) + coder.finish(), drawn
 
 
-def _code_piece(
-    coder: _RangeCoder, part: _Part, head: list[tuple[int, int]], begin: int, end: int
+def _encode_piece(
+    coder: _RangeCoder, part: _Window, head: list[tuple[int, int]], begin: int, end: int
 ) -> int:
     """Code as many voxels of a piece as there is room for; give their number."""
     jumps = begin == 0 or not part.joined[begin - 1]
     want = end - begin
     while want > 0:
         before = coder.state()
-        models, bits = zip(*head, *_number(want - jumps), strict=True)
+        models, bits = zip(*head, *_count_bits(want - jumps), strict=True)
         # The step to voxel i is the (i - 1)th of the part.
         first, last = begin if jumps else begin - 1, begin + want - 1
         low, high = part.offset[first], part.offset[last]
@@ -113,16 +113,16 @@ def _code_piece(
     return 0
 
 
-def _number(value: int) -> list[tuple[int, int]]:
+def _count_bits(value: int) -> list[tuple[int, int]]:
     """Give models and bits of a number from 0 to _LONGEST_PIECE."""
     k = (value + 1).bit_length() - 1
     length = [(spec.ARC_COUNT + i, 1) for i in range(k)]
     if k < spec.ARC_MAX_K:
         length.append((spec.ARC_COUNT + k, 0))
-    return length + _plain(value + 1 - (1 << k), k)
+    return length + _raw_bits(value + 1 - (1 << k), k)
 
 
-def _plain(value: int, count: int) -> list[tuple[int, int]]:
+def _raw_bits(value: int, count: int) -> list[tuple[int, int]]:
     """Give bits without a model, highest first."""
     return [(_PLAIN, value >> i & 1) for i in reversed(range(count))]
 
@@ -212,7 +212,7 @@ class _RangeCoder:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Window:
     """Voxels that may fill a payload, with the models of the steps between them.
 
     Attributes
@@ -236,10 +236,12 @@ class _Part:
     ones: list[int]
     others: list[int]
     bits: list[int]
-    coding: Coding
+    config: EncoderConfig
 
     @classmethod
-    def of(cls, voxels: NDArray[np.integer], pens: NDArray[np.integer], coding: Coding) -> _Part:
+    def of(
+        cls, voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
+    ) -> _Window:
         """Prepare voxels; the first begins a payload."""
         places = voxels.astype(np.int64)
         steps = np.diff(places, axis=0)
@@ -251,7 +253,7 @@ class _Part:
             for low, end in pairwise(bounds)
             for begin in range(low, end, _LONGEST_PIECE)
         ]
-        ones, others, bits, used = _models(steps[joined], _first_steps(joined))
+        ones, others, bits, used = _step_contexts(steps[joined], _first_steps(joined))
         count = np.zeros(len(steps), dtype=np.int64)
         count[joined] = used.sum(axis=1)
         return cls(
@@ -263,7 +265,7 @@ class _Part:
             ones=ones[used].tolist(),
             others=others[used].tolist(),
             bits=bits[used].tolist(),
-            coding=coding,
+            config=config,
         )
 
     def head(self, begin: int, pen: int) -> list[tuple[int, int]]:
@@ -275,10 +277,10 @@ class _Part:
         new = self.pens[begin]
         bits.append((spec.ARC_INK, int(new != pen)))
         if new != pen:
-            bits += _plain(new, self.coding.format.full.bit_length())
+            bits += _raw_bits(new, self.config.format.full.bit_length())
         if jumps:
-            for place, size in zip(self.voxels[begin], self.coding.grid, strict=True):
-                bits += _plain(place, (size - 1).bit_length())
+            for place, size in zip(self.voxels[begin], self.config.grid, strict=True):
+                bits += _raw_bits(place, (size - 1).bit_length())
         return bits
 
 
@@ -287,11 +289,13 @@ def _first_steps(joined: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.append(True, ~joined)[: len(joined)][joined]
 
 
-def _models(steps: Ints, first: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
+def _step_contexts(
+    steps: Ints, first: NDArray[np.bool_]
+) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
     """Give two models, the bit, and whether it is sent, of the six bits of each step: (n, 6)."""
     n = len(steps)
     moved = (steps != 0).astype(np.int64)
-    axes = [_Axis.of(moved[:, axis], steps[:, axis] < 0, first) for axis in range(3)]
+    axes = [_AxisContext.of(moved[:, axis], steps[:, axis] < 0, first) for axis in range(3)]
 
     def stacked(name: str) -> Ints:
         return np.stack([getattr(axis, name) for axis in axes], axis=1)
@@ -325,7 +329,7 @@ def _models(steps: Ints, first: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, ND
 
 
 @dataclass(frozen=True)
-class _Axis:
+class _AxisContext:
     """What a decoder knows of an axis before each step: (n,) arrays."""
 
     last: Ints
@@ -336,7 +340,7 @@ class _Axis:
     turns: Ints
 
     @classmethod
-    def of(cls, moved: Ints, falls: NDArray[np.bool_], first: NDArray[np.bool_]) -> _Axis:
+    def of(cls, moved: Ints, falls: NDArray[np.bool_], first: NDArray[np.bool_]) -> _AxisContext:
         """Follow an axis over the steps of curves."""
         index = np.arange(len(moved))
         curve = np.maximum.accumulate(np.where(first, index, 0))

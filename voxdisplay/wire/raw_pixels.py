@@ -12,10 +12,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.pixel_format import PixelFormat, Pixels, lit
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, is_lit
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Bools, Coding, Ints, count_bytes, count_ops, ranges
-from voxdisplay.wire.payload_splitting import fill
+from voxdisplay.wire.op_encoding import (
+    Bools,
+    EncoderConfig,
+    Ints,
+    concat_ranges,
+    counted_op_bytes,
+    counted_ops,
+)
+from voxdisplay.wire.payload_splitting import next_fit
 
 # Bytes of a gap that are written: to skip fewer saves nothing.
 _NARROW = 3
@@ -31,7 +38,7 @@ _SOME = 4096  # voxels, which show whether there are as many
 _MANY_CHANGES = 3
 
 
-def is_noise(page: Pixels, coding: Coding) -> bool:
+def is_incompressible(page: Pixels, config: EncoderConfig) -> bool:
     """Tell whether few voxels are like the next, so that there is little to be saved.
 
     Parameters
@@ -49,10 +56,10 @@ def is_noise(page: Pixels, coding: Coding) -> bool:
     if page.ndim == 2:
         same = same[:, 0] & same[:, 1] & same[:, 2]
     alike = int(np.count_nonzero(same))
-    if coding.format is PixelFormat.MONO1:
+    if config.format is PixelFormat.MONO1:
         written = int(np.count_nonzero(np.packbits(page)))
         return len(same) - alike > _MANY_CHANGES * written
-    on = lit(page)
+    on = is_lit(page)
     if 2 * (alike - int(np.count_nonzero(same & ~on[1:]))) >= np.count_nonzero(on):
         return False
     places = np.flatnonzero(on)
@@ -60,13 +67,13 @@ def is_noise(page: Pixels, coding: Coding) -> bool:
     return len(np.unique(some, axis=0)) > _MANY_COLORS
 
 
-def encode_plain(page: Pixels, coding: Coding) -> Iterator[list[bytes]]:
+def encode_raw(page: Pixels, config: EncoderConfig) -> Iterator[list[bytes]]:
     """Give the payloads that draw a page which is dark before, a few at a time.
 
     Parameters
     ----------
     page, coding
-        As of `is_noise`.
+        As of `is_incompressible`.
 
     Yields
     ------
@@ -75,20 +82,27 @@ def encode_plain(page: Pixels, coding: Coding) -> Iterator[list[bytes]]:
 
     """
     units, per_unit = page, 1
-    if coding.format is PixelFormat.MONO1:  # a pixel run begins with a byte: so do all
+    if config.format is PixelFormat.MONO1:  # a pixel run begins with a byte: so do all
         units, per_unit = np.packbits(page, bitorder="little"), 8
-    elif coding.format is PixelFormat.RGB565:
+    elif config.format is PixelFormat.RGB565:
         units = page.astype("<u2", copy=False)
-    size = coding.format.bytes
+    size = config.format.bytes
     memory = units.view(f"V{size}").reshape(-1) if units.ndim == 2 else units
     for low in range(0, len(page), _SLAB_VOXELS):
         at = low // per_unit
         some = slice(at, at + _SLAB_VOXELS // per_unit)
-        yield _encode(lit(units[some]), memory[some], low, len(page) - low, per_unit, coding)
+        yield _encode_slab(
+            is_lit(units[some]), memory[some], low, len(page) - low, per_unit, config
+        )
 
 
-def _encode(
-    on: Bools, memory: NDArray[np.generic], low: int, voxels: int, per_unit: int, coding: Coding
+def _encode_slab(
+    on: Bools,
+    memory: NDArray[np.generic],
+    low: int,
+    voxels: int,
+    per_unit: int,
+    config: EncoderConfig,
 ) -> list[bytes]:
     """Code a slab.
 
@@ -112,28 +126,28 @@ def _encode(
     wide = np.flatnonzero(edges[2::2] - edges[1:-1:2] > _NARROW // size)
     begin, end = edges[np.append(0, 2 * wide + 2)], edges[np.append(2 * wide + 1, -1)]
     # No LIT is longer than a payload takes, wherever it begins.
-    way, op = count_bytes(np.array([low + voxels, 8 * coding.max_payload])).tolist()
-    most = (coding.max_payload - way - op) // size
+    way, op = counted_op_bytes(np.array([low + voxels, 8 * config.max_payload])).tolist()
+    most = (config.max_payload - way - op) // size
     parts = -(-(end - begin) // most)
-    done = ranges(np.zeros(len(parts), dtype=np.int64), parts) * most
+    done = concat_ranges(np.zeros(len(parts), dtype=np.int64), parts) * most
     start = np.repeat(begin, parts) + done
     count = np.minimum(np.repeat(end - begin, parts) - done, most)
 
     pixels = np.minimum(count * per_unit, voxels - start * per_unit)
     place = low + start * per_unit
     gap = place - np.append(0, (place + pixels)[:-1])
-    following = _op_bytes(gap) + count_bytes(pixels) + count * size
+    following = _op_bytes(gap) + counted_op_bytes(pixels) + count * size
     first = following + _op_bytes(place) - _op_bytes(gap)
-    heads = fill(first, following, coding.max_payload)
+    heads = next_fit(first, following, config.max_payload)
     gap[heads], following[heads] = place[heads], first[heads]
 
     out = np.empty(int(following.sum()), dtype=np.uint8)
     here = np.cumsum(following) - following
     offset = here[heads].tolist()
     for op, counts in ((spec.OP_SKIP, gap), (spec.OP_LIT, pixels)):
-        ops, op_bytes = count_ops(op, counts)
+        ops, op_bytes = counted_ops(op, counts)
         op_bytes[counts == 0] = 0
-        out[ranges(here, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
+        out[concat_ranges(here, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
         here += op_bytes
     written = memory[_mask(begin, end, len(on))]
     out[_mask(here, here + count * size, len(out))] = written.view(np.uint8)
@@ -143,7 +157,7 @@ def _encode(
 
 def _op_bytes(counts: Ints) -> Ints:
     """Give the bytes of ops that carry counts; none where there is nothing to count."""
-    return np.where(counts > 0, count_bytes(counts), 0)
+    return np.where(counts > 0, counted_op_bytes(counts), 0)
 
 
 def _mask(begin: Ints, end: Ints, size: int) -> Bools:

@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.pixel_format import PixelFormat, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.incremental import Steps, at_once
+from voxdisplay.wire.incremental import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import (
     SHORT_COUNT,
     Bools,
     Bytes,
-    Coding,
+    EncoderConfig,
     Ints,
-    count_bytes,
-    count_ops,
+    concat_ranges,
+    counted_op_bytes,
+    counted_ops,
     little_endian,
-    ranges,
 )
-from voxdisplay.wire.optimal_parse import DIFF, LIT, RUN, SKIP, WAYS, Runs, cheapest
-from voxdisplay.wire.payload_splitting import ANY, Layout, Pieces, no_pieces
+from voxdisplay.wire.optimal_parse import DIFF, LIT, OP_PAIRS, RUN, SKIP, Runs, cheapest_ops
+from voxdisplay.wire.payload_splitting import ANY, OpBlocks, PayloadLayout, no_blocks
 
-Look = Callable[[Ints], NDArray[np.integer]]
+PixelLookup = Callable[[Ints], NDArray[np.integer]]
 
 # Pixels of a gap that may be cheaper to write again than to skip.
 _NARROW = 64
@@ -37,7 +37,7 @@ _NARROW = 64
 _PAGE_OPS = 12
 
 
-def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
+def encode_spans(values: NDArray[np.integer], config: EncoderConfig) -> list[bytes]:
     """Give the payloads that draw a page which is dark before.
 
     Parameters
@@ -52,7 +52,7 @@ def encode_spans(values: NDArray[np.integer], coding: Coding) -> list[bytes]:
         At most ``coding.max_payload`` bytes each; empty if all is dark.
 
     """
-    return Layout(at_once(span(page_runs(values), coding)), coding).payloads
+    return PayloadLayout(run_to_end(encode_runs(page_runs(values), config)), config).payloads
 
 
 def page_runs(values: NDArray[np.integer]) -> Runs:
@@ -68,7 +68,7 @@ def page_runs(values: NDArray[np.integer]) -> Runs:
     return Runs(start, length, value, dark, ~dark | (length <= _NARROW))
 
 
-def set_runs(index: Ints, values: NDArray[np.integer], look: Look) -> Runs:
+def set_runs(index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup) -> Runs:
     """Give the runs of some voxels, and of the gaps between them, which may be skipped.
 
     Parameters
@@ -91,7 +91,7 @@ def set_runs(index: Ints, values: NDArray[np.integer], look: Look) -> Runs:
     behind, gap = behind[gaps], gap[gaps]
     looked_at = np.where(gap <= _NARROW, gap, 1)
     begins = np.cumsum(looked_at) - looked_at
-    pixels = look(ranges(behind, looked_at)).astype(np.int64)
+    pixels = pixels_at(concat_ranges(behind, looked_at)).astype(np.int64)
     uniform = gap <= _NARROW
     if len(gap):
         same = pixels == np.repeat(pixels[begins], looked_at)
@@ -106,33 +106,35 @@ def set_runs(index: Ints, values: NDArray[np.integer], look: Look) -> Runs:
     )
 
 
-def least_bytes(index: Ints, coding: Coding) -> int:
+def min_bytes(index: Ints, config: EncoderConfig) -> int:
     """Give a lower bound of the bytes for voxels, (n,) ascending, n >= 1, quickly.
 
     Each gap is skipped, and a new op follows; or it is drawn, and a voxel behind it.
     """
     gap = np.diff(index) - 1
     gap = gap[gap > 0]
-    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    if coding.has(spec.FEATURE_DIFF):
+    bits = 1 if config.format is PixelFormat.MONO1 else 8 * config.format.bytes
+    if config.has(spec.FEATURE_DIFF):
         bits = 4
     drawn = (gap + 1) * bits // 8
-    skipped = np.minimum(count_bytes(gap), 1 + coding.move_bytes) + 1
+    skipped = np.minimum(counted_op_bytes(gap), 1 + config.position_bytes) + 1
     return 1 + int(np.minimum(skipped, drawn).sum())
 
 
-def span_set(index: Ints, values: NDArray[np.integer], look: Look, coding: Coding) -> Steps[Pieces]:
+def encode_span_set(
+    index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup, config: EncoderConfig
+) -> Incremental[OpBlocks]:
     """Make the pieces that draw voxels, in steps: the parameters are those of `set_runs`."""
-    runs = set_runs(index, values, look)
+    runs = set_runs(index, values, pixels_at)
     yield
-    return (yield from span(runs, coding))
+    return (yield from encode_runs(runs, config))
 
 
-def span(runs: Runs, coding: Coding) -> Steps[Pieces]:
+def encode_runs(runs: Runs, config: EncoderConfig) -> Incremental[OpBlocks]:
     """Make the pieces that draw runs, in steps."""
-    way = yield from cheapest(runs, coding)
+    choice = yield from cheapest_ops(runs, config)
     yield
-    op, rest = WAYS[:, 0][way], WAYS[:, 1][way]
+    op, rest = OP_PAIRS[:, 0][choice], OP_PAIRS[:, 1][choice]
     split = np.flatnonzero(rest)
     count = runs.length.copy()
     count[split] = 1
@@ -143,11 +145,13 @@ def span(runs: Runs, coding: Coding) -> Steps[Pieces]:
     value = np.insert(runs.value, behind, runs.value[split])
     drawn = op != SKIP
     if not drawn.any():
-        return no_pieces()
-    return _pieces(op[drawn], start[drawn], count[drawn], value[drawn], coding)
+        return no_blocks()
+    return _blocks_of_stretches(op[drawn], start[drawn], count[drawn], value[drawn], config)
 
 
-def _pieces(op: Ints, start: Ints, count: Ints, value: Ints, coding: Coding) -> Pieces:
+def _blocks_of_stretches(
+    op: Ints, start: Ints, count: Ints, value: Ints, config: EncoderConfig
+) -> OpBlocks:
     """Make pieces of stretches of equal pixels: those of one LIT, or one DIFF, are joined."""
     goes_on = np.zeros(len(op), dtype=np.bool_)
     goes_on[1:] = (op[1:] == op[:-1]) & (op[1:] != RUN) & (start[1:] == (start + count)[:-1])
@@ -156,73 +160,73 @@ def _pieces(op: Ints, start: Ints, count: Ints, value: Ints, coding: Coding) -> 
     # All pixels of LIT and DIFF, and what the pen is before each.
     written = np.where(op == RUN, 1, count)
     pixel = np.repeat(value, written)
-    pen = np.concatenate(([coding.format.full], pixel[:-1]))
+    pen = np.concatenate(([config.format.full], pixel[:-1]))
     at_pixel = (np.cumsum(written) - written)[first]
 
     op, start = op[first], start[first]
-    bits = 1 if coding.format is PixelFormat.MONO1 else 8 * coding.format.bytes
-    most_literal = _most(coding.room + coding.pen_bytes, bits)  # it needs no pen
-    most = [most_literal, _most(coding.room, 4)]
+    bits = 1 if config.format is PixelFormat.MONO1 else 8 * config.format.bytes
+    most_literal = _max_pixels(config.max_block_bytes + config.pen_bytes, bits)  # it needs no pen
+    most = [most_literal, _max_pixels(config.max_block_bytes, 4)]
     limit = np.select([op == LIT, op == DIFF], most, 1 << 62)
     parts = -(-pixels // limit)
     owner = np.repeat(np.arange(len(op)), parts)
-    done = ranges(np.zeros(len(op), dtype=np.int64), parts) * limit[owner]
+    done = concat_ranges(np.zeros(len(op), dtype=np.int64), parts) * limit[owner]
     op, start = op[owner], start[owner] + done
     pixels = np.minimum(pixels[owner] - done, limit[owner])
     at_pixel = at_pixel[owner] + done
     last = pixel[at_pixel + np.where(op == RUN, 1, pixels) - 1]
     needs = np.where(op == LIT, ANY, np.where(op == RUN, last, pen[at_pixel]))
-    body, size = _bodies(op, pixels, at_pixel, pixel, pen, coding)
+    body, size = _encode_ops(op, pixels, at_pixel, pixel, pen, config)
     none = np.zeros(len(op), dtype=np.bool_)
-    return Pieces(body, size, needs, start, last, start + pixels, none)
+    return OpBlocks(body, size, needs, start, last, start + pixels, none)
 
 
-def _most(room: int, bits: int) -> int:
+def _max_pixels(room: int, bits: int) -> int:
     """Give the most pixels of so many bits that one op with its count holds in so many bytes."""
     overhead = 1
     while True:
         count = (room - overhead) * 8 // bits
-        if int(count_bytes(np.array(count))) <= overhead:
+        if int(counted_op_bytes(np.array(count))) <= overhead:
             return count
         overhead += 1
 
 
-def _bodies(
-    op: Ints, count: Ints, at_pixel: Ints, pixel: Ints, pen: Ints, coding: Coding
+def _encode_ops(
+    op: Ints, count: Ints, at_pixel: Ints, pixel: Ints, pen: Ints, config: EncoderConfig
 ) -> tuple[Bytes, Ints]:
     """Give all ops with their operands, and the bytes of each."""
-    ops, op_bytes = count_ops(op, count)
+    ops, op_bytes = counted_ops(op, count)
     size = op_bytes.copy()
     operands: list[tuple[Bools, Bytes, Ints]] = []
     if (which := op == LIT).any():
-        picked = pixel[ranges(at_pixel[which], count[which])]
-        operands.append((which, *_literals(picked, count[which], coding)))
+        picked = pixel[concat_ranges(at_pixel[which], count[which])]
+        operands.append((which, *_literal_operands(picked, count[which], config)))
     if (which := op == DIFF).any():
-        places = ranges(at_pixel[which], count[which])
+        places = concat_ranges(at_pixel[which], count[which])
         nibbles = ((pixel[places] - pen[places]) & 15).astype(np.uint8)
-        operands.append((which, *_packed(nibbles, count[which], 2)))
+        operands.append((which, *_pack_bits(nibbles, count[which], 2)))
     for which, _, bytes_of in operands:
         size[which] += bytes_of
     at = np.cumsum(size) - size
     body = np.empty(int(size.sum()), dtype=np.uint8)
-    body[ranges(at, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
+    body[concat_ranges(at, op_bytes)] = ops[np.arange(ops.shape[1]) < op_bytes[:, None]]
     for which, data, bytes_of in operands:
-        body[ranges((at + op_bytes)[which], bytes_of)] = data
+        body[concat_ranges((at + op_bytes)[which], bytes_of)] = data
     return body, size
 
 
-def _literals(pixel: Ints, count: Ints, coding: Coding) -> tuple[Bytes, Ints]:
+def _literal_operands(pixel: Ints, count: Ints, config: EncoderConfig) -> tuple[Bytes, Ints]:
     """Give the pixel runs (section 2.1) of LIT ops."""
-    if coding.format is PixelFormat.MONO1:
-        return _packed(pixel.astype(np.uint8), count, 8)
-    return little_endian(pixel, coding.format.bytes).reshape(-1), count * coding.format.bytes
+    if config.format is PixelFormat.MONO1:
+        return _pack_bits(pixel.astype(np.uint8), count, 8)
+    return little_endian(pixel, config.format.bytes).reshape(-1), count * config.format.bytes
 
 
-def _packed(parts: Bytes, count: Ints, per_byte: int) -> tuple[Bytes, Ints]:
+def _pack_bits(parts: Bytes, count: Ints, per_byte: int) -> tuple[Bytes, Ints]:
     """Pack parts of bytes, the first lowest; each stretch of ``count`` begins a new byte."""
     size = -(-count // per_byte)
     padded = np.zeros((int(size.sum()), per_byte), dtype=np.uint8)
-    padded.reshape(-1)[ranges((np.cumsum(size) - size) * per_byte, count)] = parts
+    padded.reshape(-1)[concat_ranges((np.cumsum(size) - size) * per_byte, count)] = parts
     weights = (1 << np.arange(per_byte) * (8 // per_byte)).astype(np.uint8)
     return padded @ weights, size
 
@@ -249,15 +253,15 @@ def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
         If an op is not allowed there, is cut off, or the ops do not cover exactly ``count``.
 
     """
-    reader = _Reader(ops, count, format_)
+    reader = _PageReader(ops, count, format_)
     while reader.at < len(ops):
         reader.read_op()
     if reader.cursor != count:
-        raise reader.wrong(f"the ops cover {reader.cursor} voxels, not {count}")
+        raise reader.error(f"the ops cover {reader.cursor} voxels, not {count}")
     return reader.values
 
 
-class _Reader:
+class _PageReader:
     """The ops of a PAGE, one after another, into an array."""
 
     def __init__(self, ops: bytes, count: int, format_: PixelFormat) -> None:
@@ -268,7 +272,7 @@ class _Reader:
         self._format = format_
         self._pen = format_.full
 
-    def wrong(self, what: str) -> RemoteProtocolError:
+    def error(self, what: str) -> RemoteProtocolError:
         """Give the error that says what is wrong with the op at `at`."""
         return RemoteProtocolError(
             f"PAGE: {what}", section="10", offset=_PAGE_OPS + self.at, raw=self._ops
@@ -279,7 +283,7 @@ class _Reader:
         op = self._ops[self.at]
         if op == spec.OP_END:
             if any(self._ops[self.at :]):
-                raise self.wrong("bytes behind END are not 0")
+                raise self.error("bytes behind END are not 0")
             self.at = len(self._ops)
         elif op == spec.OP_PEN:
             run, behind = self._pixels(self.at + 1, 1)
@@ -288,16 +292,16 @@ class _Reader:
         elif (kind := op & 0xE0) in (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT):
             self._draw(kind)
         else:
-            raise self.wrong(f"op {op:02X} is not allowed there")
+            raise self.error(f"op {op:02X} is not allowed there")
 
     def _draw(self, kind: int) -> None:
         try:
             n, behind = _read_count(self._ops, self.at)
         except (IndexError, ValueError) as error:
-            raise self.wrong("a count is malformed") from error
+            raise self.error("a count is malformed") from error
         end = self.cursor + n
         if end > len(self.values):
-            raise self.wrong(f"the ops cover more than {len(self.values)} voxels")
+            raise self.error(f"the ops cover more than {len(self.values)} voxels")
         if kind == spec.OP_RUN:
             self.values[self.cursor : end] = self._pen
         elif kind == spec.OP_LIT:
@@ -310,7 +314,7 @@ class _Reader:
         mono = self._format is PixelFormat.MONO1
         behind = at + (-(-n // 8) if mono else n * self._format.bytes)
         if behind > len(self._ops):
-            raise self.wrong("a pixel is cut off")
+            raise self.error("a pixel is cut off")
         run = np.frombuffer(self._ops[at:behind], dtype=np.uint8)
         if not mono:
             channels = run.reshape(n, self._format.bytes).astype(np.uint32)
@@ -318,7 +322,7 @@ class _Reader:
             return np.asarray((channels << shifts).sum(axis=1, dtype=np.uint32)), behind
         bits = np.unpackbits(run, bitorder="little")
         if bits[n:].any():
-            raise self.wrong("unused bits are not 0")
+            raise self.error("unused bits are not 0")
         return bits[:n].astype(np.uint32), behind
 
 

@@ -87,7 +87,7 @@ def test_a_refused_packet_and_then_another():
     display, pipe = open_display()
     for _ in range(6):
         frame = random_frame(display)
-        frame.coded = lambda *_device: iter([[b"\xe0\x00"]])
+        frame.iter_payloads = lambda *_device: iter([[b"\xe0\x00"]])
         with pytest.raises(vd.DeviceError, match=r"OP \(7\) at byte 3: op E0") as caught:
             display.present(frame)
         assert caught.value.code == spec.CODE_OP

@@ -256,7 +256,7 @@ def test_a_frame_whose_coding_is_interrupted_is_never_shown(wait):
         display.flush()
 
     show(first)
-    broken.coded = coded
+    broken.iter_payloads = coded
     with pytest.raises(KeyboardInterrupt):
         show(broken)
     assert display.present(last).frame == 2

@@ -10,7 +10,7 @@ from voxdisplay.cli import main
 from voxdisplay.cli.plan import FeaturesType
 from voxdisplay.display.plan import COMMON_LINES, EVERY_FEATURE, USB_LINES, Line, Receiver, plan
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.op_listing import list_ops
 
 FORMATS = ["mono1", "index8", "rgb565", "rgb888"]
@@ -45,7 +45,7 @@ def memory(grid, format_, density):
 def test_the_ops_are_all_that_is_in_a_payload(grid, format_, density):
     frame = curves(grid, format_) if density is None else memory(grid, format_, density)
     for longest in (64, 1024):
-        coding = Coding(frame.grid, frame.format, longest)
+        coding = EncoderConfig(frame.grid, frame.format, longest)
         every = {"line", "box", "dots", "oct"} | ({"diff"} if format_ == "index8" else set())
         for payload in frame.payloads(longest) + frame.payloads(longest, every):
             ops = list(list_ops(payload, coding))
@@ -79,12 +79,12 @@ def plan_names():
     ],
 )  # fmt: skip
 def test_ops_by_hand(payload, ops):
-    coding = Coding(vd.Grid(17, 64, 40), vd.PixelFormat.RGB565, 64)
+    coding = EncoderConfig(vd.Grid(17, 64, 40), vd.PixelFormat.RGB565, 64)
     assert list(list_ops(bytes.fromhex(payload), coding)) == ops
 
 
 def test_pixels_of_one_bit():
-    coding = Coding(vd.Grid(5, 3, 7), vd.PixelFormat.MONO1, 64)
+    coding = EncoderConfig(vd.Grid(5, 3, 7), vd.PixelFormat.MONO1, 64)
     assert list(list_ops(bytes.fromhex("C9 A5 02 A0"), coding)) == [("LIT", 3), ("RUN", 1)]
 
 

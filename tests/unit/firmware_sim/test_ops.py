@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_ops import Plain, random_ops
+from random_ops import VoxelwiseDecoder, random_ops
 from simpage import GRIDS, digest, unpack
 
 from firmware_sim.config import Config
@@ -22,7 +22,7 @@ def test_ops_draw_what_the_plainest_decoder_draws(name: str, sides: tuple[int, i
     rng = random.Random(f"{name} {sides}")
     grid = Grid(*sides)
     for _ in range(60 if grid.volume < 10_000 else 5):
-        plain = Plain(sides, name)
+        plain = VoxelwiseDecoder(sides, name)
         ops = random_ops(rng, plain, name)
         page = Page(grid.volume, FORMATS[name].size)
         unpack(ops, grid, name, page)
@@ -32,7 +32,7 @@ def test_ops_draw_what_the_plainest_decoder_draws(name: str, sides: tuple[int, i
 
 
 def test_a_chain_of_256_steps() -> None:
-    plain = Plain((300, 4, 3), "rgb888")
+    plain = VoxelwiseDecoder((300, 4, 3), "rgb888")
     plain.chain(0, [0] * 256)
     page = Page(3600, 3)
     unpack(b"\x20\xff" + bytes(64), Grid(300, 4, 3), "rgb888", page)
@@ -165,7 +165,7 @@ def test_a_line_goes_up_from_the_middle_and_back_over_the_same_voxels() -> None:
     rng = random.Random(2)
     sides = (17, 23, 9)
     for _ in range(200):
-        plain = Plain(sides, "mono1")
+        plain = VoxelwiseDecoder(sides, "mono1")
         p, q = (plain.at(rng.randrange(plain.volume)) for _ in range(2))
         pictures = []
         for start, end in ((p, q), (q, p)):
@@ -182,7 +182,7 @@ def test_a_box_may_be_flat_or_thin_on_every_axis() -> None:
     sides = (5, 4, 6)
     for p in product((0, 1, 3), (0, 3), (0, 2, 5)):
         for q in product((0, 4), (0, 1, 3), (0, 5)):
-            plain = Plain(sides, "index8")
+            plain = VoxelwiseDecoder(sides, "index8")
             plain.cursor = plain.index(p)
             plain.box(q)
             page = Page(plain.volume, 1)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from drawing import plain
+from drawing import decode_plainly
 
 from voxdisplay.frame import Frame
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Coding
-from voxdisplay.wire.palette_ops import color_pieces
-from voxdisplay.wire.payload_splitting import Layout
+from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.palette_ops import color_blocks
+from voxdisplay.wire.payload_splitting import PayloadLayout
 
 GRID = (17, 9, 5)
 
@@ -34,15 +34,15 @@ def test_the_default_palette_is_the_documents():
 def test_a_colour_of_the_palette_is_its_entry():
     palette = Palette(grows=True)
     assert palette.nearest(DEFAULT[[7, 255, 0]]).tolist() == [7, 255, 0]
-    assert len(palette.differs_from(DEFAULT)) == 0
+    assert len(palette.entries_differing(DEFAULT)) == 0
 
 
 def test_a_colour_that_is_missing_gets_an_entry_that_nobody_uses():
     palette = Palette(grows=True)
-    palette.use(np.array([1, 2, 4]))
+    palette.mark_used(np.array([1, 2, 4]))
     values = palette.nearest(rgb((1, 2, 3), (4, 5, 6), (1, 2, 3), (0, 0, 0)))
     assert values.tolist() == [3, 5, 3, 0]
-    assert palette.differs_from(DEFAULT).tolist() == [3, 5]
+    assert palette.entries_differing(DEFAULT).tolist() == [3, 5]
     assert palette.rgb(values).tolist() == [[1, 2, 3], [4, 5, 6], [1, 2, 3], [0, 0, 0]]
     assert palette.nearest(rgb((4, 5, 6))).tolist() == [5]
     assert palette.nearest(DEFAULT[[3]]).tolist() == [6], "its colour is elsewhere now"
@@ -108,10 +108,12 @@ def test_what_is_no_palette(colors):
 )
 def test_entries_are_set_in_ops_that_fit(entries, most):
     palette = np.random.default_rng(1).integers(0, 256, (256, 3), dtype=np.uint8)
-    coding = Coding(Frame(GRID).grid, PixelFormat.INDEX8, most, 1 << spec.FEATURE_PALETTE)
-    payloads = Layout(color_pieces(np.array(entries, dtype=int), palette, coding), coding).payloads
+    coding = EncoderConfig(Frame(GRID).grid, PixelFormat.INDEX8, most, 1 << spec.FEATURE_PALETTE)
+    payloads = PayloadLayout(
+        color_blocks(np.array(entries, dtype=int), palette, coding), coding
+    ).payloads
     assert all(len(payload) <= most for payload in payloads)
-    drawn = plain(payloads, GRID, PixelFormat.INDEX8).palette
+    drawn = decode_plainly(payloads, GRID, PixelFormat.INDEX8).palette
     assert set(entries) <= set(drawn)
     assert all(tuple(palette[entry].tolist()) == color for entry, color in drawn.items())
     if entries == [1, 2, 4, 7, 8]:
@@ -176,7 +178,7 @@ def test_a_palette_is_sent_with_its_frame_and_counts_in_the_digest():
     plain_digest = frame.digest()
     frame.draw([(4, 4, 1)], "#808080")
     (payload,) = frame.payloads(1024, {"palette", "oct"})
-    drawn = plain([payload], GRID, PixelFormat.INDEX8)
+    drawn = decode_plainly([payload], GRID, PixelFormat.INDEX8)
     assert drawn.palette == {1: (0x80,) * 3}
     assert frame.digest() != plain_digest
     again = Frame(GRID, "index8", palette=frame.palette)

@@ -16,12 +16,12 @@ LEVELS = {"index8": (7, 7, 3), "rgb565": (31, 63, 31), "rgb888": (255, 255, 255)
 def test_what_the_document_says_of_it(format_):
     assert format_.wire == document.literals()[f"FORMAT_{format_.name}"]
     assert format_.bytes == document.pixel_bytes()[format_.wire]
-    assert PixelFormat.of_wire(format_.wire) is format_
+    assert PixelFormat.from_wire(format_.wire) is format_
     assert format_.full == {1: 1, 2: 0xFF, 3: 0xFFFF, 4: 0xFFFFFF}[format_.wire]
 
 
 def test_an_unknown_number_is_none():
-    assert PixelFormat.of_wire(9) is None
+    assert PixelFormat.from_wire(9) is None
 
 
 @pytest.mark.parametrize(
@@ -74,14 +74,14 @@ def test_values_and_pixels_are_each_others_inverse(format_):
 @FORMATS
 def test_an_array_of_another_shape_or_type_is_refused(format_):
     shape = format_.shape((7, 5, 3))
-    format_.check(np.zeros(shape, dtype=format_.dtype), (7, 5, 3))
+    format_.validate(np.zeros(shape, dtype=format_.dtype), (7, 5, 3))
     for wrong in itertools.permutations((7, 5, 3)):
         if wrong != (7, 5, 3):
             with pytest.raises(ValueError, match=r"\[z, y, x\]"):
-                format_.check(np.zeros(format_.shape(wrong), dtype=format_.dtype), (7, 5, 3))
+                format_.validate(np.zeros(format_.shape(wrong), dtype=format_.dtype), (7, 5, 3))
     for dtype in (float, bool, np.int64):
         with pytest.raises(ValueError, match="astype"):
-            format_.check(np.zeros(shape, dtype=dtype), (7, 5, 3))
+            format_.validate(np.zeros(shape, dtype=dtype), (7, 5, 3))
 
 
 def test_mono1_has_only_0_and_1():
@@ -89,4 +89,4 @@ def test_mono1_has_only_0_and_1():
     array = np.zeros((7, 5, 3), dtype=np.uint8)
     array[1, 2, 0] = 2
     with pytest.raises(ValueError, match="only 0 and 1"):
-        PixelFormat.MONO1.check(array, (7, 5, 3))
+        PixelFormat.MONO1.validate(array, (7, 5, 3))

@@ -7,7 +7,7 @@ from drawing import chains_in, page_after, segments_in, values_of
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire.chains import encode_chains
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 
 LONG = Grid(1200, 4, 3)
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)
@@ -22,7 +22,7 @@ def row(count, start=0):
 def encode(voxels, pens=None, *, grid=LONG, format_=PixelFormat.INDEX8, max_payload=1024):
     voxels = np.asarray(voxels).reshape(-1, 3)
     pens = np.full(len(voxels), format_.full) if pens is None else np.asarray(pens)
-    return encode_chains(voxels, pens, Coding(grid, format_, max_payload))
+    return encode_chains(voxels, pens, EncoderConfig(grid, format_, max_payload))
 
 
 def test_nothing_is_no_payload():

@@ -84,7 +84,7 @@ def as_dict(packet):
 
 @pytest.mark.parametrize("raw", [b"", b"123456", with_check(b"\x40\0\0")[:-1], bytes(7)])
 def test_what_is_no_packet_is_not_intact(raw):
-    assert not packets.intact(raw)
+    assert not packets.has_valid_crc(raw)
 
 
 @pytest.mark.parametrize("size", [1, 7, 8, 253, 254, 255, 507, 508, 509, 65542])
@@ -94,4 +94,4 @@ def test_the_most_bytes_on_the_wire(size):
         len(document.cobs_encode(body)) + 1
         for body in (b"\xff" * size, bytes(size), b"\0" + b"\xff" * (size - 1))
     )
-    assert packets.wire_size(size) == worst
+    assert packets.max_wire_bytes(size) == worst

@@ -11,8 +11,8 @@ from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.op_encoding import Coding
-from voxdisplay.wire.range_coded_chains import encode_arcs
+from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.range_coded_chains import encode_range_coded
 
 GRIDS = [Grid(17, 12, 20), Grid(3, 5, 7), Grid(300, 4, 3), Grid(1, 1, 1)]
 ARC = 1 << spec.FEATURE_ARC
@@ -48,7 +48,7 @@ def test_the_emulator_draws_what_was_meant(seed, grid, pixel_format, most, count
     voxels = voxels[np.sort(np.unique(voxels, axis=0, return_index=True)[1])]
     pens = rng.choice(rng.integers(1, pixel_format.full + 1, 3), len(voxels))
     pens = np.repeat(pens[::5], 5)[: len(voxels)]
-    payloads = encode_arcs(voxels, pens, Coding(grid, pixel_format, most, ARC))
+    payloads = encode_range_coded(voxels, pens, EncoderConfig(grid, pixel_format, most, ARC))
     assert all(0 < len(payload) <= most for payload in payloads)
     meant = np.zeros(grid.voxels, dtype=np.uint32)
     meant[grid.index_of(voxels)] = pens
@@ -59,7 +59,9 @@ def test_the_emulator_draws_what_was_meant(seed, grid, pixel_format, most, count
 def test_a_long_straight_line_is_cut_where_a_piece_may_be_longest():
     grid = Grid(65535, 1, 2)
     voxels = np.stack([np.arange(65535), np.zeros(65535, int), np.zeros(65535, int)], axis=1)
-    (payload,) = encode_arcs(voxels, np.ones(65535, int), Coding(grid, PixelFormat.MONO1, 1024))
+    (payload,) = encode_range_coded(
+        voxels, np.ones(65535, int), EncoderConfig(grid, PixelFormat.MONO1, 1024)
+    )
     shown = values_of(page_after([payload], grid, PixelFormat.MONO1), PixelFormat.MONO1)
     assert shown.sum() == 65535
     assert len(payload) < 200

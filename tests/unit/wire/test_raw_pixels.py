@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawing import plain
+from drawing import decode_plainly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,7 +10,7 @@ from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import raw_pixels as plainly
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 
 GRIDS = [Grid(3, 5, 7), Grid(17, 12, 20), Grid(300, 4, 3), Grid(1, 1, 1)]
 
@@ -39,12 +39,12 @@ def test_a_page_is_drawn_in_any_order_of_its_payloads(grid, format_, most, lit, 
     page = some_page(rng, format_, grid.voxels, lit)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plainly, "_SLAB_VOXELS", slab)
-        portions = list(plainly.encode_plain(page, Coding(grid, format_, most)))
+        portions = list(plainly.encode_raw(page, EncoderConfig(grid, format_, most)))
     payloads = [payload for portion in portions for payload in portion]
     assert all(1 <= len(payload) <= most for payload in payloads)
     rng.shuffle(payloads)
     values = format_.values(page)
-    drawn = plain(payloads, grid, format_)
+    drawn = decode_plainly(payloads, grid, format_)
     assert drawn.page == values.tolist()
     assert not drawn.two_pixels
     assert bool(payloads) == bool(values.any())
@@ -54,19 +54,21 @@ def test_a_page_is_drawn_in_any_order_of_its_payloads(grid, format_, most, lit, 
 def test_a_full_page_costs_its_pixels_and_hardly_more(format_):
     grid = Grid(64, 32, 32)
     page = format_.pixels(np.full(grid.voxels, format_.full))
-    payloads = [p for ps in plainly.encode_plain(page, Coding(grid, format_, 1024)) for p in ps]
+    payloads = [
+        p for ps in plainly.encode_raw(page, EncoderConfig(grid, format_, 1024)) for p in ps
+    ]
     pixels = -(-grid.voxels * (1 if format_ is PixelFormat.MONO1 else 8 * format_.bytes) // 8)
     assert pixels < sum(map(len, payloads)) <= pixels * 1.01
 
 
 def test_narrow_gaps_are_written_and_wide_ones_skipped():
     grid = Grid(3, 5, 7)
-    coding = Coding(grid, PixelFormat.INDEX8, 64)
+    coding = EncoderConfig(grid, PixelFormat.INDEX8, 64)
     page = np.zeros(grid.voxels, dtype=np.uint8)
     page[[4, 8, 13]] = 9
     # SKIP 4, LIT of 5 with three that are dark between, SKIP 4, LIT of 1.
     expected = bytes([0x83, 0xC4, 9, 0, 0, 0, 9, 0x83, 0xC0, 9])
-    assert list(plainly.encode_plain(page, coding)) == [[expected]]
+    assert list(plainly.encode_raw(page, coding)) == [[expected]]
 
 
 def test_noise_is_told_from_what_has_runs():
@@ -75,7 +77,7 @@ def test_noise_is_told_from_what_has_runs():
 
     def noise(format_, values):
         page = format_.pixels(np.asarray(values, dtype=np.uint32).reshape(-1))
-        return plainly.is_noise(page, Coding(grid, format_, 1024))
+        return plainly.is_incompressible(page, EncoderConfig(grid, format_, 1024))
 
     z, y, x = np.indices((32, 32, 32))
     ball = (x - 16) ** 2 + (y - 16) ** 2 + (z - 16) ** 2 < 200
@@ -100,10 +102,10 @@ def test_a_frame_goes_plain_only_over_a_fast_line_and_with_what_is_drawn_on_it()
     features = ("palette",)
 
     def coded(rate):
-        return [payload for some in frame.coded(1024, features, rate) for payload in some]
+        return [payload for some in frame.iter_payloads(1024, features, rate) for payload in some]
 
     fast = coded(1e8)
-    drawn = plain(fast, frame.grid, frame.format)
+    drawn = decode_plainly(fast, frame.grid, frame.format)
     assert drawn.page == frame.array().reshape(-1).tolist()
     entry = int(frame.array()[7, 5, 3])
     assert drawn.palette[entry] == (0x12, 0x34, 0x56)

@@ -10,7 +10,7 @@ from firmware_sim.page_encoder import pack
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.wire.op_encoding import Coding, count_ops
+from voxdisplay.wire.op_encoding import EncoderConfig, counted_ops
 from voxdisplay.wire.spans import decode_spans, encode_spans
 
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)
@@ -24,13 +24,13 @@ def some(format_, count, seed=1):
 
 
 def op_of(op, count):
-    (row,), (size,) = count_ops(op, np.array([count]))
+    (row,), (size,) = counted_ops(op, np.array([count]))
     return row[:size].tobytes()
 
 
 def drawn(values, format_, max_payload=1024, grid=None):
     grid = grid or Grid(len(values), 1, 1)
-    payloads = encode_spans(values, Coding(grid, format_, max_payload))
+    payloads = encode_spans(values, EncoderConfig(grid, format_, max_payload))
     assert all(0 < len(payload) <= max_payload for payload in payloads)
     return payloads, values_of(page_after(payloads, grid, format_), format_)
 
@@ -79,7 +79,9 @@ def test_literals_of_a_length_at_the_limits(format_, count, max_payload):
 @FORMATS
 def test_a_dark_page_is_no_payload(format_):
     assert drawn(np.zeros(105, dtype=np.uint32), format_)[0] == []
-    assert encode_spans(np.zeros(0, dtype=np.uint32), Coding(Grid(0, 1, 1), format_, 64)) == []
+    assert (
+        encode_spans(np.zeros(0, dtype=np.uint32), EncoderConfig(Grid(0, 1, 1), format_, 64)) == []
+    )
 
 
 @FORMATS

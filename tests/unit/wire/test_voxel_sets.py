@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from drawing import plain
+from drawing import decode_plainly
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.cuboids import cuboids
-from voxdisplay.wire.op_encoding import Coding
-from voxdisplay.wire.voxel_sets import brick, encode_bricks, least_bytes
+from voxdisplay.wire.cuboids import merge_cuboids
+from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.voxel_sets import encode_set, encode_set_payloads, min_bytes
 
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)
 OCT, DOTS, BOX = (1 << bit for bit in (spec.FEATURE_OCT, spec.FEATURE_DOTS, spec.FEATURE_BOX))
@@ -26,13 +26,15 @@ def encode(voxels, features, values=None, *, grid=GRID, format_=PixelFormat.MONO
     index = grid.index_of(np.asarray(voxels))
     order = np.argsort(index)
     values = np.full(len(index), format_.full) if values is None else np.asarray(values)
-    return encode_bricks(index[order], values[order], Coding(grid, format_, most, features))
+    return encode_set_payloads(
+        index[order], values[order], EncoderConfig(grid, format_, most, features)
+    )
 
 
 def assert_draws(payloads, voxels, values=None, *, grid=GRID, format_=PixelFormat.MONO1):
     meant = np.zeros(grid.voxels, dtype=int)
     meant[grid.index_of(np.asarray(voxels))] = format_.full if values is None else values
-    drawn = plain(payloads, grid, format_)
+    drawn = decode_plainly(payloads, grid, format_)
     assert drawn.page == meant.tolist()
     return drawn.ops
 
@@ -76,12 +78,12 @@ def test_a_dots_op_has_at_most_256_voxels_and_fits(format_, count, most):
     grid = Grid(300, 4, 3)
     index = np.sort(np.random.default_rng(1).permutation(grid.voxels)[:count])
     value = max(1, format_.full - 1)
-    coding = Coding(grid, format_, most, DOTS)
-    made = brick(index, np.full(count, value), coding)
-    assert made.pieces.size.max() <= coding.room
-    payloads = encode_bricks(index, np.full(count, value), coding)
+    coding = EncoderConfig(grid, format_, most, DOTS)
+    made = encode_set(index, np.full(count, value), coding)
+    assert made.blocks.size.max() <= coding.max_block_bytes
+    payloads = encode_set_payloads(index, np.full(count, value), coding)
     assert max(map(len, payloads)) <= most
-    drawn = plain(payloads, grid, format_)
+    drawn = decode_plainly(payloads, grid, format_)
     assert np.flatnonzero(drawn.page).tolist() == index.tolist()
 
 
@@ -199,9 +201,9 @@ def test_what_is_no_chain(voxels):
 def test_a_chain_of_each_pixel():
     voxels = [(x, y, 3) for y in (0, 8) for x in range(8)]
     values = [5] * 8 + [9] * 8
-    made = brick(np.sort(GRID.index_of(np.array(voxels))), np.array(values),
-                 Coding(GRID, PixelFormat.INDEX8, 1024, OCT))  # fmt: skip
-    assert made.bytes_of.tolist() == [7, 7]
+    made = encode_set(np.sort(GRID.index_of(np.array(voxels))), np.array(values),
+                 EncoderConfig(GRID, PixelFormat.INDEX8, 1024, OCT))  # fmt: skip
+    assert made.bytes_per_value.tolist() == [7, 7]
     payloads = encode(voxels, OCT, values, format_=PixelFormat.INDEX8)
     ops = assert_draws(payloads, voxels, values, format_=PixelFormat.INDEX8)
     assert ops[1::2] in (["STEP", "FROM"], ["FROM", "FROM"])
@@ -220,7 +222,7 @@ def test_cells_are_merged_to_cuboids():
     cells = np.concatenate((block((2, 3, 4), (5, 7, 9)), block((6, 3, 4), (6, 6, 9)), [(0, 0, 0)]))
     order = np.random.default_rng(1).permutation(len(cells))
     group = (cells[:, 2] > 6).astype(int)
-    low, high, count, owner = cuboids(cells[order], group[order])
+    low, high, count, owner = merge_cuboids(cells[order], group[order])
     assert (high - low + 1).prod(axis=1).sum() == len(cells)
     assert np.bincount(owner).tolist() == (high - low + 1).prod(axis=1).tolist() == count.tolist()
     for at, mine in zip(cells[order], owner, strict=True):
@@ -231,13 +233,13 @@ def test_cells_are_merged_to_cuboids():
 
 def test_the_bound_is_one():
     rng = np.random.default_rng(3)
-    coding = Coding(GRID, PixelFormat.MONO1, 1024, OCT | DOTS)
+    coding = EncoderConfig(GRID, PixelFormat.MONO1, 1024, OCT | DOTS)
     for density in (0.001, 0.02, 0.3, 0.9, 1):
         index = np.flatnonzero(rng.random(GRID.voxels) < density)
-        (bound,) = least_bytes(index, index * 0, 1, coding)
-        made = brick(index, np.ones(len(index), dtype=int), coding)
-        assert 0 <= bound <= made.bytes_of.sum()
-    parts = least_bytes(index, index // 7000, 4, coding)
+        (bound,) = min_bytes(index, index * 0, 1, coding)
+        made = encode_set(index, np.ones(len(index), dtype=int), coding)
+        assert 0 <= bound <= made.bytes_per_value.sum()
+    parts = min_bytes(index, index // 7000, 4, coding)
     assert len(parts) == 4
     # A whole solid has nothing but full cells, but for a side of 33.
     assert parts.sum() < GRID.voxels / 8
@@ -246,8 +248,8 @@ def test_the_bound_is_one():
 def test_the_bytes_of_each_pixel_are_counted():
     index = np.sort(np.random.default_rng(5).permutation(GRID.voxels)[:500])
     values = np.where(index % 3, 7, 200)
-    coding = Coding(GRID, PixelFormat.INDEX8, 65535, OCT | DOTS)
-    made = brick(index, values, coding)
-    (payload,) = encode_bricks(index, values, coding)
+    coding = EncoderConfig(GRID, PixelFormat.INDEX8, 65535, OCT | DOTS)
+    made = encode_set(index, values, coding)
+    (payload,) = encode_set_payloads(index, values, coding)
     assert made.values.tolist() == [7, 200]
-    assert made.bytes_of.sum() + 2 * coding.pen_bytes == len(payload)
+    assert made.bytes_per_value.sum() + 2 * coding.pen_bytes == len(payload)

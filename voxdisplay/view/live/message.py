@@ -89,7 +89,7 @@ def encode(snapshot: Snapshot) -> bytes:
             "counters": dict(snapshot.counters),
             "bitmap": bitmap,
             "wide": wide,
-            "own": palette.differs_from(DEFAULT).tolist(),
+            "own": palette.entries_differing(DEFAULT).tolist(),
         }
     ).encode()
     head += b" " * (-(len(head) + _OFFSET.size) % 8)

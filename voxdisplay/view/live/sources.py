@@ -101,7 +101,7 @@ class TapSource:
             self._socket.sendall(self._QUESTION.pack(*self._last_seen))
             header = self._HEADER.unpack(self._receive(self._HEADER.size))
             magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
-            format_ = PixelFormat.of_wire(number)
+            format_ = PixelFormat.from_wire(number)
             if magic != self._MAGIC or format_ is None:
                 raise TransportClosed(f"{self._name} speaks another language: {magic!r}")
             grid = Grid(nx, ny, nz)

@@ -4,7 +4,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
-from drawing import plain
+from drawing import decode_plainly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,9 +15,9 @@ from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import encoding_selection
 from voxdisplay.wire import raw_pixels as plainly
 from voxdisplay.wire.chains import encode_chains
-from voxdisplay.wire.op_encoding import Coding
+from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.spans import encode_spans
-from voxdisplay.wire.voxel_sets import encode_bricks
+from voxdisplay.wire.voxel_sets import encode_set_payloads
 
 GRIDS = [Grid(17, 12, 20), Grid(3, 5, 7), Grid(300, 4, 3), Grid(1, 1, 1)]
 # What a feature adds to the ops that every device has.
@@ -88,7 +88,7 @@ def assert_draws(payloads, frame, base=None):
     assert all(0 < len(payload) <= most for payload in payloads)
     shuffled = [payloads[k] for k in np.random.default_rng(0).permutation(len(payloads))]
     values = None if base is None else base.format.values(base.array())
-    drawn = plain(shuffled, frame.grid, frame.format, values)
+    drawn = decode_plainly(shuffled, frame.grid, frame.format, values)
     assert drawn.page == frame.format.values(frame.array()).tolist()
     assert not drawn.two_pixels
     assert set(drawn.ops) <= BASE | {OPS_OF[name] for name in features}
@@ -119,7 +119,7 @@ def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_pe
         patch.setattr(encoding_selection, "_SLAB_VOXELS", 1)
         patch.setattr(encoding_selection, "_PARSED_VOXELS", 150)
         patch.setattr(plainly, "_SLAB_VOXELS", 160)
-        portions = list(frame.coded(*device[2:], bytes_per_s))
+        portions = list(frame.iter_payloads(*device[2:], bytes_per_s))
     assert_draws([payload for portion in portions for payload in portion], frame)
 
 
@@ -130,7 +130,7 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
     voxels = frame.grid.voxels
 
     def portions(rate: float) -> int:
-        return len(list(filter(None, frame.coded(1024, (), rate))))
+        return len(list(filter(None, frame.iter_payloads(1024, (), rate))))
 
     assert portions(11_520) == 1, "in one piece it is shorter, and the line is busy for seconds"
     assert portions(1.2e6) == voxels // encoding_selection._PARSED_VOXELS
@@ -138,16 +138,18 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
     solid = Frame((128, 128, 32), "index8")
     solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
     assert (
-        len(list(filter(None, solid.coded(1024, (), 1e9))))
+        len(list(filter(None, solid.iter_payloads(1024, (), 1e9))))
         == voxels // encoding_selection._SLAB_VOXELS
     )
     solid.draw([(1, 2, 3)], "red")
     solid.device = (solid.grid, solid.format, 1024, frozenset())
-    assert_draws(list(chain.from_iterable(solid.coded(1024, (), 1e9))), solid)
+    assert_draws(list(chain.from_iterable(solid.iter_payloads(1024, (), 1e9))), solid)
     half = solid.array()
     half[16:] = 0
     solid.set(half)
-    assert len(list(filter(None, solid.coded(1024, (), 1e9)))) == 1, "the dark slab costs nothing"
+    assert len(list(filter(None, solid.iter_payloads(1024, (), 1e9)))) == 1, (
+        "the dark slab costs nothing"
+    )
 
 
 def test_a_curve_on_a_fast_line_goes_as_its_chain():
@@ -156,13 +158,17 @@ def test_a_curve_on_a_fast_line_goes_as_its_chain():
     frame.draw(np.argwhere(np.ones((9, 9, 9))), "white")
     features = ("box", "oct", "dots")
     sizes = [
-        sum(len(payload) for portion in frame.coded(1024, features, rate) for payload in portion)
+        sum(
+            len(payload)
+            for portion in frame.iter_payloads(1024, features, rate)
+            for payload in portion
+        )
         for rate in (0.0, 1.2e6)
     ]
     assert sizes[0] < 20 < sizes[1]
     dots = Frame(GRIDS[0], "mono1")
     dots.draw(np.argwhere(np.ones((4, 4, 4))) * 3, "white")
-    portions = dots.coded(1024, features, 1.2e6)
+    portions = dots.iter_payloads(1024, features, 1.2e6)
     assert list(chain.from_iterable(portions)) == dots.payloads(1024, features)
 
 
@@ -177,7 +183,7 @@ def test_a_difference_makes_one_frame_of_another(device, seed):
     assert (base.array() == before).all(), "a copy is drawn on for itself"
     frame.device = device
     assert_draws(frame.difference(base, *device[2:]), frame, base)
-    changed = frame.changed(base)
+    changed = frame.changed_indices(base)
     differs = frame.format.values(frame.array()) != base.format.values(before)
     assert changed.tolist() == np.flatnonzero(differs).tolist()
 
@@ -190,12 +196,12 @@ def test_no_coder_alone_takes_fewer_bytes(device, seed):
     features = features - {"palette"}
     frame = some_frame(rng, (grid, format_, most, features))
     size = sum(map(len, frame.payloads(most, features)))
-    coding = frame._coding(most, features)
+    coding = frame._encoder_config(most, features)
     values = format_.values(frame.array())
     assert size <= sum(map(len, encode_spans(values, coding)))
-    items = frame._seen(dark=False)
+    items = frame._visible(dark=False)
     if not frame._has_base and items:
-        plain_coding = Coding(grid, format_, most)
+        plain_coding = EncoderConfig(grid, format_, most)
         for each in (coding, plain_coding):
             chains = encode_chains(items.voxels, items.values, each)
             assert size <= sum(map(len, chains))
@@ -250,9 +256,9 @@ def test_erasing_is_drawing_the_dark():
     frame.draw([(3, 4, 5)], "black")
     (payload,) = frame.difference(base, 1024)
     assert len(payload) <= 9
-    assert plain([payload], frame.grid, frame.format, base.format.values(base.array())).page == (
-        frame.format.values(frame.array()).tolist()
-    )
+    assert decode_plainly(
+        [payload], frame.grid, frame.format, base.format.values(base.array())
+    ).page == (frame.format.values(frame.array()).tolist())
     assert base.difference(base, 1024) == []
 
 
@@ -263,9 +269,9 @@ def test_bricks_alone_are_not_better_for_a_surface():
     frame.draw(shell)
     features = {"oct", "dots", "line"}
     size = sum(map(len, frame.payloads(1024, features)))
-    coding = frame._coding(1024, features)
+    coding = frame._encoder_config(1024, features)
     index = np.sort(frame.grid.index_of(shell))
-    assert size <= sum(map(len, encode_bricks(index, np.ones(len(index), dtype=int), coding)))
+    assert size <= sum(map(len, encode_set_payloads(index, np.ones(len(index), dtype=int), coding)))
 
 
 @pytest.mark.slow
