@@ -12,7 +12,8 @@ PACKAGE = ROOT / "voxdisplay"
 
 # What each part of the driver may import of the driver.
 MAY_IMPORT = {
-    "errors": set(),
+    "printable_text": set(),
+    "errors": {"printable_text"},
     "compute": {"compute"},
     "expressions": {"compute", "errors", "expressions"},
     "curves": {"compute", "errors", "expressions", "curves"},
@@ -22,9 +23,9 @@ MAY_IMPORT = {
     "frame": {"curves", "errors", "raster", "view", "voxelization", "wire"},
     "scene": {"compute", "curves", "errors", "expressions", "raster", "scene"},
     "link": {"errors", "link", "wire"},
-    "transport": {"errors", "transport", "wire.spec"},
-    "conformance": {"conformance", "errors", "transport", "wire.spec"},
-    "view": {"errors", "raster", "view"},
+    "transport": {"errors", "printable_text", "transport", "wire.spec"},
+    "conformance": {"conformance", "errors", "printable_text", "transport", "wire.spec"},
+    "view": {"errors", "printable_text", "raster", "view"},
     "display": {"display", "errors", "frame", "link", "raster", "transport", "wire"},
 }
 

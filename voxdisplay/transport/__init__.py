@@ -1,10 +1,10 @@
-"""Byte pipes, and how a port's name finds one. Knows no packet.
+"""Byte pipes, and their selection by the name of a port. Knows no packet.
 
 A port is ``kind:rest``: ``sim:``, ``tcp://127.0.0.1:5000``; anything else is pyserial's. Further
 kinds come as entry points of the group ``voxdisplay.transport``: callables that take the whole name
-and give an object with ``read``, ``write`` and ``close`` as of `Transport`. They raise `ValueError`
-for a name that is wrong and `OSError` for a pipe that fails, and need nothing of this package.
-Those of the group ``voxdisplay.usb`` give a backend of pyusb instead: see `transport.usb`.
+and return an object with ``read``, ``write`` and ``close`` as of `Transport`. They raise
+`ValueError` for a name that is wrong and `OSError` for a pipe that fails, and need nothing of this
+package. Those of the group ``voxdisplay.usb`` return a backend of pyusb: see `transport.usb`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _GROUP = "voxdisplay.transport"
 _USB_GROUP = "voxdisplay.usb"
 
 
-def open_transport(port: str, *, baud: int = 115200) -> Transport:
+def open_transport(port: str, *, baud: int = 115200, reset: bool = True) -> Transport:
     """Open a port.
 
     Parameters
@@ -31,6 +31,9 @@ def open_transport(port: str, *, baud: int = 115200) -> Transport:
         ``/dev/ttyUSB0`` or ``COM3``, or any URL of pyserial.
     baud : int
         Bits per second of a serial line.
+    reset : bool
+        Raise DTR and RTS of a serial line, on which many boards restart; False leaves both alone,
+        as far as the system does: Linux raises them when a port is opened for the first time.
 
     Raises
     ------
@@ -49,15 +52,15 @@ def open_transport(port: str, *, baud: int = 115200) -> Transport:
 
         return UsbTransport(port)
     for entry in entry_points(group=_GROUP, name=kind):
-        from voxdisplay.transport.plugin import PluginTransport  # noqa: PLC0415
+        from voxdisplay.transport.plugin import PluginTransport, opener_of  # noqa: PLC0415
 
-        return PluginTransport(port, entry.load())
+        return PluginTransport(port, opener_of(entry))
     for entry in entry_points(group=_USB_GROUP, name=kind):
-        from voxdisplay.transport.plugin import open_usb  # noqa: PLC0415
+        from voxdisplay.transport.plugin import open_usb, opener_of  # noqa: PLC0415
 
-        return open_usb(port, entry.load())
+        return open_usb(port, opener_of(entry))
     if not port.strip():
         raise OpenError("no port was named", port=port, hint="try sim: for the built-in emulator")
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415
 
-    return SerialTransport(port, baud=baud)
+    return SerialTransport(port, baud=baud, reset=reset)

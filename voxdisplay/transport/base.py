@@ -1,4 +1,4 @@
-"""What every byte pipe does."""
+"""Interface of every byte pipe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Transport(Protocol):
     port: str
 
     def read(self, timeout_s: float) -> bytes:
-        """Give what has come, at least a byte; wait for it at most ``timeout_s``.
+        """Return what has come, at least a byte; wait for it at most ``timeout_s``.
 
         ``b""`` means that nothing came, and only that.
 

@@ -1,8 +1,8 @@
-"""A pipe that writes down all that goes through it, with times. Knows no packet.
+"""Recording of all bytes that pass through a pipe, with times. Knows no packet.
 
-A capture is text, a JSON object a line. The first says what it is: ``{"voxdisplay_capture": 1,
-"port": ...}``; another such line follows if a device that had gone away is back. Each other one is
-a portion of bytes as it was written or read: ``{"s": seconds since the line that names the port,
+A capture is text, a JSON object a line. The first names the port: ``{"voxdisplay_capture": 1,
+"port": ...}``; another such line follows when a device that had gone away is back. Each other one
+is a portion of bytes as it was written or read: ``{"s": seconds since the line that names the port,
 "to": "device" or "host", "hex": ...}``.
 """
 
@@ -19,7 +19,7 @@ VERSION: Final = 1
 
 
 class Capture:
-    """A transport around another one.
+    """A transport around another one that records what passes.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Capture:
     file : text file
         Open for writing. Each portion is flushed, so that what led to a crash can be read.
     clock : callable
-        Seconds, never going back.
+        Returns seconds, never going back.
 
     """
 

@@ -1,11 +1,12 @@
-"""Why a port does not open, and what a person can do about it.
+"""Causes of a port that does not open, and their remedies.
 
-Asks the system: which ports there are, who holds this one, whose it is. Knows nothing of pyserial
-but the shape of its errors, and no packet.
+Asks the system which ports there are, who holds this one, and who owns it. Of pyserial it knows
+only the shape and the wording of its errors. Knows no packet.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import stat
@@ -13,28 +14,46 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from voxdisplay.errors import OpenError
+from voxdisplay.printable_text import printable
 from voxdisplay.transport.discovery import serial_ports
+from voxdisplay.transport.library_errors import message_of
 
 _PROC = Path("/proc")
 _MAX_LISTED = 8
 
-
-def message_of(error: BaseException) -> str:
-    """Give what an error says, or at least its kind."""
-    return str(error) or type(error).__name__
+# What pyserial says of a server of RFC 2217 that is there, and what to do about it.
+_OF_SERVER = (
+    (
+        ("does not seem to support RFC2217", "remote rejected value for option 'we-"),
+        "what listens there does not speak RFC 2217; does it pass bytes on? Then try socket://",
+    ),
+    (
+        ("does not accept parameter change", "remote rejected value for option"),
+        "the server did not confirm the line's rate or format: does it let clients set them?",
+    ),
+    (
+        ("server has closed the connection", "reader thread died"),
+        "the server is there, and hung up: is its port busy, or not plugged in?",
+    ),
+)
+_OF_NETWORK = (
+    errno.ECONNREFUSED, errno.ETIMEDOUT, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNRESET,
+)  # fmt: skip
 
 
 def as_open_error(port: str, error: BaseException) -> OpenError:
-    """Turn what was said when a serial port was opened into what a person can do.
+    """Return the error for a serial port that did not open, with cause and remedy.
 
     Parameters
     ----------
     port : str
-        As it was named.
+        As the user named it.
     error : BaseException
         What was raised.
 
     """
+    if "://" in port and not port.lower().startswith(("spy:", "alt:")):
+        return _url_error(port, error)
     number = _errno(error)
     path = _device_path(port)
     if number in {errno.EACCES, errno.EPERM}:
@@ -56,24 +75,34 @@ def as_open_error(port: str, error: BaseException) -> OpenError:
         return OpenError(
             f"{port} names nothing: {os.strerror(number)}", port=port, hint=_available_ports()
         )
-    hint = "is the device, or the server for it, running there?" if "://" in port else None
-    return OpenError(f"{port} cannot be opened: {message_of(error)}", port=port, hint=hint)
+    return OpenError(f"{port} cannot be opened: {message_of(error)}", port=port)
+
+
+def _url_error(port: str, error: BaseException) -> OpenError:
+    """Return the error for a URL of pyserial: with a hint only where the cause is known."""
+    text = message_of(error)
+    hint = next((hint for parts, hint in _OF_SERVER if any(part in text for part in parts)), None)
+    if hint is None and _errno(error) in _OF_NETWORK:
+        hint = "is the device, or the server for it, running there?"
+    return OpenError(f"{port} cannot be opened: {text}", port=port, hint=hint)
 
 
 def _errno(error: BaseException) -> int | None:
-    """Find the system's number in an error, or in one that it was made of."""
+    """Return the system's number of an error, or of one that it was raised from."""
     cause: BaseException | None = error
     while cause is not None:
         numbers = (getattr(cause, "errno", None), *cause.args[:1])
         for number in numbers:
             if isinstance(number, int):
                 return number
+        if isinstance(cause, TimeoutError):
+            return errno.ETIMEDOUT
         cause = cause.__cause__ or cause.__context__
     return None
 
 
 def _device_path(port: str) -> str:
-    """Give the device behind a port's name: spy:///dev/ttyUSB0?file=x is one, too."""
+    """Return the device of a port's name: spy:///dev/ttyUSB0?file=x has one, too."""
     return port.partition("://")[2].partition("?")[0] if "://" in port else port
 
 
@@ -84,11 +113,11 @@ def _available_ports() -> str:
     return f"{known}{more}; sim: is the built-in emulator"
 
 
-# -- somebody else has it
+# -- busy
 
 
 def busy_error(port: str, path: str) -> OpenError:
-    """Give the error for a port that somebody else has open, at a path of the system."""
+    """Return the error for a port that a process has open, at a path of the system."""
     names = [f"{_process_name(pid)} (process {pid})" for pid in _holding_processes(path)]
     if not names:
         return OpenError(
@@ -99,15 +128,15 @@ def busy_error(port: str, path: str) -> OpenError:
     return OpenError(
         f"{port} is busy: {', '.join(names)} has it open",
         port=port,
-        hint="end that program, or let go of the port there",
+        hint="end that program, or close the port there",
     )
 
 
 def _holding_processes(path: str) -> list[int]:
-    """Find the processes that have a device open; of these, those that have locked it, if any."""
+    """Return the processes that have a device open; of these, those that locked it, if any."""
     try:
         device = os.stat(path)  # noqa: PTH116 - a port's name need not be a path
-    except OSError:
+    except (OSError, ValueError):
         return []
     openers = sorted(set(_processes_with_open(device.st_rdev)))
     locked = set(_processes_with_lock(device.st_ino))
@@ -115,19 +144,20 @@ def _holding_processes(path: str) -> list[int]:
 
 
 def _processes_with_open(device: int) -> Iterator[int]:
-    for descriptor in _PROC.glob("[0-9]*/fd/*"):
-        try:
-            status = descriptor.stat()
-        except OSError:  # closed meanwhile, or not for us to see
-            continue
-        if stat.S_ISCHR(status.st_mode) and status.st_rdev == device:
-            yield int(descriptor.parts[-3])
+    with contextlib.suppress(OSError):
+        for descriptor in _PROC.glob("[0-9]*/fd/*"):
+            try:
+                status = descriptor.stat()
+            except OSError:  # closed meanwhile, or not for us to see
+                continue
+            if stat.S_ISCHR(status.st_mode) and status.st_rdev == device:
+                yield int(descriptor.parts[-3])
 
 
 def _processes_with_lock(inode: int) -> Iterator[int]:
     """Read /proc/locks: `1: FLOCK  ADVISORY  WRITE 8280 00:1a:3 0 EOF`."""
     try:
-        lines = (_PROC / "locks").read_text(encoding="ascii").splitlines()
+        lines = (_PROC / "locks").read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
         return
     for line in lines:
@@ -143,10 +173,10 @@ def _process_name(pid: int) -> str:
         name = (_PROC / str(pid) / "comm").read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
         return "a program"
-    return "".join(c if c.isprintable() else "?" for c in name) or "a program"
+    return printable(name) or "a program"
 
 
-# -- it is not for us
+# -- no permission
 
 
 def _permission_error(port: str, path: str) -> OpenError:
@@ -172,7 +202,7 @@ def _permission_error(port: str, path: str) -> OpenError:
     both = stat.S_IRGRP | stat.S_IWGRP
     if status.st_mode & both != both or status.st_gid == 0:
         # Nobody should join root's group for a port, nor would it help where the group may not.
-        return OpenError(message, port=port, hint=f"let yourself: sudo chmod a+rw {path}")
+        return OpenError(message, port=port, hint=f"allow it: sudo chmod a+rw {path}")
     try:
         joined = user in grp.getgrgid(status.st_gid).gr_mem
     except KeyError:

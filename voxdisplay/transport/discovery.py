@@ -1,24 +1,35 @@
-"""Which ports there are. Each kind of port has a finder; none of them opens anything."""
+"""Enumeration of ports. Each kind of port has a finder; none of them opens anything.
+
+A port that cannot be looked at, because it comes or goes at this moment, is listed by its name
+alone or not at all: listing never fails.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-# Finders: a module and a function in it, without parameters, that gives `FoundPort`s. Looked up
+from voxdisplay.printable_text import printable
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS
+
+# Finders: a module and a function in it, without parameters, that returns `FoundPort`s. Called
 # only when ports are listed, and left out where what they need is not installed.
 _FINDERS: Final = (
     ("voxdisplay.transport.discovery", "serial_ports"),
     ("voxdisplay.transport.usb", "usb_ports"),
 )
+# A list that fails while a device comes or goes is right a moment later.
+_ATTEMPTS: Final = 3
+_DEVICES: Final = ("ttyUSB*", "ttyACM*", "cu.usb*")  # in /dev, where pyserial cannot list them
 
 
 @dataclass(frozen=True, slots=True)
 class FoundPort:
-    """A port that can be named to ``--port``.
+    """A port that can be named to ``--port``. Its texts are printable, whatever a device says.
 
     Attributes
     ----------
@@ -28,7 +39,7 @@ class FoundPort:
         USB vendor and product, where the system knows them.
     serial_number : str or None
     product : str or None
-        What the USB device calls itself.
+        Name of the USB device by its own descriptor.
 
     """
 
@@ -39,13 +50,18 @@ class FoundPort:
     serial_number: str | None = None
     product: str | None = None
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if isinstance(value := getattr(self, field.name), str):
+                object.__setattr__(self, field.name, printable(value))
+
     @property
     def kind(self) -> str:
-        """What it is: ``"emulator"``, ``"usb"`` or ``"serial"``."""
+        """Kind of port: ``"emulator"``, ``"usb"`` or ``"serial"``."""
         return {"sim": "emulator", "usb": "usb"}.get(self.port.partition(":")[0], "serial")
 
     def is_same_device(self, other: FoundPort) -> bool:
-        """Tell whether both are one USB device, wherever it is plugged in.
+        """Return whether both are one USB device, wherever it is plugged in.
 
         Only a serial number tells two devices of a kind apart.
         """
@@ -54,27 +70,52 @@ class FoundPort:
 
 
 def serial_ports() -> list[FoundPort]:
-    """List the serial ports that the system knows, by name."""
-    from serial.tools.list_ports import comports  # noqa: PLC0415 - looks through the system
+    """Return the serial ports that the system knows, sorted by name."""
+    for _ in range(_ATTEMPTS):
+        try:
+            from serial.tools import list_ports  # noqa: PLC0415 - looks through the system
 
-    return sorted(
-        (
-            FoundPort(
-                found.device,
-                found.description,
-                found.vid,
-                found.pid,
-                found.serial_number or None,
-                found.product,
-            )
-            for found in comports()
-        ),
-        key=lambda found: found.port,
+            found = [_found_port(port) for port in list_ports.comports()]
+            break
+        except LIBRARY_ERRORS:
+            continue
+    else:
+        found = _devices_by_name()
+    return sorted(found, key=lambda port: port.port)
+
+
+def _found_port(port: Any) -> FoundPort:
+    """Return a port of pyserial's list, without what is not of the right type."""
+
+    def text(value: object) -> str | None:
+        return value if isinstance(value, str) and value else None
+
+    def number(value: object) -> int | None:
+        return value if isinstance(value, int) else None
+
+    return FoundPort(
+        str(port.device),
+        text(port.description) or "",
+        number(port.vid),
+        number(port.pid),
+        text(port.serial_number),
+        text(port.product),
     )
 
 
+def _devices_by_name() -> list[FoundPort]:
+    """Return the USB serial devices by the names that the system has for them."""
+    if sys.platform == "win32":
+        return []
+    try:
+        paths = [path for pattern in _DEVICES for path in Path("/dev").glob(pattern)]
+    except OSError:
+        return []
+    return [FoundPort(str(path), "no details: the system's list is incomplete") for path in paths]
+
+
 def all_ports() -> list[FoundPort]:
-    """List everything that can be opened without further knowledge."""
+    """Return everything that can be opened without further knowledge."""
     return [FoundPort("sim:", "the built-in emulator"), *_discovered()]
 
 
@@ -82,16 +123,16 @@ def _discovered() -> Iterator[FoundPort]:
     for module, name in _FINDERS:
         try:
             finder = getattr(import_module(module), name)
-        except ImportError:
+            ports: Iterable[FoundPort] = finder()
+        except LIBRARY_ERRORS:  # not installed, or damaged
             continue
-        ports: Iterable[FoundPort] = finder()
         yield from ports
 
 
 def find_port(port: str) -> FoundPort | None:
-    """Find the serial port of a name, or of a link to it, among those that the system knows."""
+    """Return the listed serial port of a name, or of a link to it; None if there is none."""
     try:
         real = str(Path(port).resolve())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: a loop of links
         return None
     return next((found for found in serial_ports() if found.port in {port, real}), None)

@@ -1,6 +1,6 @@
-"""The latency timer of FTDI's USB-serial chips: 16 ms of waiting in each answer, unless it is set.
+"""Latency timer of FTDI's USB-serial chips: up to 16 ms of delay in each answer by default.
 
-The chip keeps back what it has received until a USB packet is full or the timer runs out. Linux
+The chip holds back what it has received until a USB packet is full or the timer runs out. Linux
 shows the timer in sysfs, and lets its owner set it; where it cannot be set, nothing is lost but
 time. Knows no pipe.
 """
@@ -9,31 +9,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_LEAST_MS = 1
+_MIN_MS = 1
 _SYSFS = Path("/sys")
 
 
 def lower_latency(device: str, *, sysfs: Path = _SYSFS) -> bool:
-    """Set the latency timer of a serial device to its least, if it has one that may be set.
+    """Set the latency timer of a serial device to its minimum, if it has one that may be set.
 
     Parameters
     ----------
     device : str
         Such as ``/dev/ttyUSB0``, or a link to it.
     sysfs : Path
-        Where sysfs is mounted.
+        Mount point of sysfs.
 
     Returns
     -------
     bool
-        Whether the timer is at its least now.
+        True if the timer is at its minimum now.
 
     """
     try:
         name = Path(device).resolve().name
         timer = sysfs / "bus" / "usb-serial" / "devices" / name / "latency_timer"
-        if int(timer.read_text()) > _LEAST_MS:
-            timer.write_text(f"{_LEAST_MS}\n")
-    except (OSError, ValueError):
+        if int(timer.read_text()) > _MIN_MS:
+            timer.write_text(f"{_MIN_MS}\n")
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: a loop of links
         return False
     return True

@@ -1,12 +1,26 @@
-"""Pipes that other packages bring: their errors become ours."""
+"""Pipes of other packages' entry points, with their errors turned into ours.
+
+See the first paragraph of `voxdisplay.transport` for what an entry point must do.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from typing import Any
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport.base import Transport
+from voxdisplay.transport.library_errors import message_of
+
+
+def opener_of(entry: EntryPoint) -> Callable[[str], Any]:
+    """Return a function that loads an entry point and opens a port by it."""
+
+    def opener(port: str) -> Any:
+        return entry.load()(port)
+
+    return opener
 
 
 def open_usb(port: str, opener: Callable[[str], Any]) -> Transport:
@@ -21,12 +35,12 @@ def _call_opener(port: str, opener: Callable[[str], Any]) -> Any:
         return opener(port)
     except ValueError as error:
         raise OpenError(f"{port}: {error}", port=port) from error
-    except OSError as error:
-        raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
+    except (OSError, ImportError, AttributeError) as error:  # the last two: a damaged package
+        raise OpenError(f"{port} cannot be opened: {message_of(error)}", port=port) from error
 
 
 class PluginTransport:
-    """A pipe from an entry point: see the package's first paragraph for what it must do."""
+    """A pipe that an entry point has opened."""
 
     def __init__(self, port: str, opener: Callable[[str], Any]) -> None:
         self.port = port
@@ -34,7 +48,7 @@ class PluginTransport:
 
     @property
     def pipe(self) -> Any:
-        """What the entry point gave: an emulator's has a ``bench``."""
+        """Object that the entry point returned: an emulator's has a ``bench``."""
         return self._pipe
 
     def read(self, timeout_s: float) -> bytes:
@@ -42,16 +56,16 @@ class PluginTransport:
         try:
             return bytes(self._pipe.read(timeout_s))
         except OSError as error:
-            raise TransportClosed(f"{self.port} is gone: {error}") from error
+            raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def write(self, data: bytes, timeout_s: float) -> None:
         """See `Transport.write`."""
         try:
             self._pipe.write(data, timeout_s)
         except TimeoutError as error:
-            raise TransportTimeout(f"{self.port} takes no bytes: {error}") from error
+            raise TransportTimeout(f"{self.port} takes no bytes: {message_of(error)}") from error
         except OSError as error:
-            raise TransportClosed(f"{self.port} is gone: {error}") from error
+            raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def close(self) -> None:
         """See `Transport.close`."""

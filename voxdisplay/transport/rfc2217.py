@@ -1,20 +1,24 @@
 """``rfc2217://``: pyserial's port behind a server of serial lines, read in blocks.
 
-pyserial's own reader puts every byte into a queue by itself, and gives 0.2 MB/s. What is kept of it
-is all that RFC 2217 is about: options, rates and wires. Its socket is one of ours, which parts the
-data from telnet's commands; the reader sees only the commands. Of pyserial's private parts this
-takes ``_socket``, where it keeps its socket, and ``_telnet_read_loop``, what its thread runs.
-Knows no packet.
+pyserial's own reader puts every byte into a queue by itself, at 0.2 MB/s. Its negotiation of
+options and line settings is kept. Its socket is replaced by one that separates the data from
+telnet's commands, so that its reader thread sees the commands alone. Requests that a display does
+not need answered (DTR, RTS, flow control, PURGE) are sent and not waited for: servers in front of
+a port without modem lines never answer them. Of pyserial's private parts this takes ``_socket``,
+``_telnet_read_loop`` and ``_rfc2217_options``. Knows no packet.
 """
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import threading
 from typing import Any, Final
 
 import serial
 from serial import rfc2217
+
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS
 
 _READ_BYTES: Final = 1 << 16
 # More is not taken from the server until some of it is read, so that it waits as a tty would.
@@ -25,7 +29,7 @@ _WITH_OPTION = range(0xFB, 0xFF)  # WILL, WONT, DO, DONT
 
 
 class TelnetDecoder:
-    """Parts what a telnet server sends into data and commands, wherever it is cut."""
+    """Incremental separation of a telnet stream into data and commands."""
 
     def __init__(self) -> None:
         self._escaped = False  # the last byte was IAC
@@ -33,7 +37,7 @@ class TelnetDecoder:
         self._within = False  # between IAC SB and IAC SE
 
     def feed(self, data: bytes) -> tuple[bytes, bytes]:
-        """Give the data, unescaped, and the commands as they came."""
+        """Return the data, unescaped, and the commands as they came."""
         plain, commands = bytearray(), bytearray()
         at = 0
         while at < len(data):
@@ -61,7 +65,10 @@ class TelnetDecoder:
 
 
 class _CommandSocket:
-    """A socket that keeps the data, and gives the commands to who reads it."""
+    """A socket whose `recv` returns telnet commands only; the data are buffered for `read_data`.
+
+    The reader thread of pyserial calls `recv`, the user of the port `read_data`.
+    """
 
     def __init__(self, inner: socket.socket) -> None:
         self._inner = inner
@@ -71,7 +78,7 @@ class _CommandSocket:
         self._changed = threading.Condition()
 
     def recv(self, _count: int) -> bytes:
-        """Give the next commands; ``b""`` at the end."""
+        """Return the next commands; ``b""`` at the end of the connection."""
         commands = b""
         while not commands and (data := self._inner.recv(_READ_BYTES)):
             plain, commands = self._decoder.feed(data)
@@ -82,7 +89,7 @@ class _CommandSocket:
         return commands
 
     def read_data(self, count: int, timeout_s: float | None) -> bytes:
-        """Give so many bytes of data, or fewer if no more come in time or at the end."""
+        """Return so many bytes of data, or fewer if no more come in time or at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or len(self._data) >= count, timeout_s)
             data = bytes(self._data[:count])
@@ -92,18 +99,24 @@ class _CommandSocket:
                 raise serial.SerialException("the server has closed the connection")
         return data
 
+    def discard_data(self) -> None:
+        """Drop the data that have come."""
+        with self._changed:
+            self._data.clear()
+            self._changed.notify_all()
+
     @property
     def data_waiting(self) -> int:
-        """Count the bytes of data that have come."""
+        """Number of bytes of data that have come and were not read."""
         return len(self._data)
 
     def mark_ended(self) -> None:
-        """Wake who waits: nothing more comes."""
+        """Wake all readers: nothing more comes."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()
 
-    # -- and what else pyserial asks of its socket
+    # -- the rest of what pyserial asks of its socket
 
     def setsockopt(self, *option: int) -> None:
         self._inner.setsockopt(*option)
@@ -123,10 +136,11 @@ class _CommandSocket:
         self._inner.close()
 
 
-class Serial(rfc2217.Serial):
-    """pyserial's port, but for how data are read."""
+class Rfc2217Port(rfc2217.Serial):
+    """pyserial's port, but for how data are read and which answers are waited for."""
 
     _command_socket: _CommandSocket | None = None
+    _rfc2217_options: Any
 
     @property
     def _socket(self) -> Any:
@@ -137,12 +151,20 @@ class Serial(rfc2217.Serial):
         self._command_socket = None if inner is None else _CommandSocket(inner)
 
     def _telnet_read_loop(self) -> None:
-        sieved = self._command_socket
-        try:
+        command_socket = self._command_socket
+        # What it raises is that the connection is gone, or that the server speaks no telnet.
+        with contextlib.suppress(*LIBRARY_ERRORS):
             super()._telnet_read_loop()  # type: ignore[misc] # not in its types
-        finally:
-            if sieved is not None:
-                sieved.mark_ended()
+        if command_socket is not None:
+            command_socket.mark_ended()
+
+    def rfc2217_set_control(self, value: bytes) -> None:
+        """Request a modem line or a kind of flow control; wait for no answer."""
+        self._rfc2217_options["control"].set(value)
+
+    def rfc2217_send_purge(self, value: bytes) -> None:
+        """Request that a buffer of the server is emptied; wait for no answer."""
+        self._rfc2217_options["purge"].set(value)
 
     @property
     def in_waiting(self) -> int:
@@ -159,4 +181,4 @@ class Serial(rfc2217.Serial):
         """See pyserial."""
         super().reset_input_buffer()
         if self._command_socket is not None:
-            self._command_socket.read_data(self._command_socket.data_waiting, 0)
+            self._command_socket.discard_data()

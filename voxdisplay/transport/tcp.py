@@ -1,20 +1,34 @@
-"""``tcp://host:port``: a device behind a TCP socket."""
+"""``tcp://host:port``: byte pipe over a TCP connection. Knows no packet."""
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import time
 from urllib.parse import urlsplit
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
 
 _READ_BYTES = 1 << 16
 _CONNECT_S = 5.0
-_LIKE = "write it like tcp://127.0.0.1:5000 or tcp://[::1]:5000"
+_EXAMPLE_HINT = "write it like tcp://127.0.0.1:5000 or tcp://[::1]:5000"
 
 
 class TcpTransport:
-    """A pipe over TCP; small packets leave at once."""
+    """A pipe over TCP; small packets leave at once (TCP_NODELAY).
+
+    Parameters
+    ----------
+    port : str
+        ``tcp://host:port``.
+
+    Raises
+    ------
+    OpenError
+        If it is no such URL, or nothing accepts the connection.
+
+    """
 
     def __init__(self, port: str) -> None:
         self.port = port
@@ -22,20 +36,22 @@ class TcpTransport:
             url = urlsplit(port)
             host, number = url.hostname, url.port
         except ValueError as error:
-            raise OpenError(f"{port}: {error}", port=port, hint=_LIKE) from error
+            raise OpenError(f"{port}: {error}", port=port, hint=_EXAMPLE_HINT) from error
         if not host or not number or url.path or url.query:
-            raise OpenError(f"{port} is not a TCP port", port=port, hint=_LIKE)
+            raise OpenError(f"{port} is not a TCP port", port=port, hint=_EXAMPLE_HINT)
         try:
             self._socket = socket.create_connection((host, number), timeout=_CONNECT_S)
-        except UnicodeError as error:  # a name that no host can have
-            raise OpenError(f"{port} is not a TCP port: {error}", port=port, hint=_LIKE) from error
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except OSError as error:
             raise OpenError(
-                f"{port} cannot be opened: {error}",
+                f"{port} cannot be opened: {message_of(error)}",
                 port=port,
                 hint="is the device, or voxdisplay-sim --tcp, running there?",
             ) from error
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except LIBRARY_ERRORS as error:  # a name that no host can have
+            raise OpenError(
+                f"{port} is not a TCP port: {message_of(error)}", port=port, hint=_EXAMPLE_HINT
+            ) from error
 
     def read(self, timeout_s: float) -> bytes:
         """See `Transport.read`."""
@@ -44,8 +60,8 @@ class TcpTransport:
             data = self._socket.recv(_READ_BYTES)
         except (TimeoutError, BlockingIOError):
             return b""
-        except OSError as error:
-            raise TransportClosed(f"{self.port} is gone: {error}") from error
+        except LIBRARY_ERRORS as error:
+            raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
         if not data:
             raise TransportClosed(f"{self.port} was closed by the device")
         return data
@@ -63,9 +79,10 @@ class TcpTransport:
                     f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
                     f"in {timeout_s:.1f} s"
                 ) from error
-            except OSError as error:
-                raise TransportClosed(f"{self.port} is gone: {error}") from error
+            except LIBRARY_ERRORS as error:
+                raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def close(self) -> None:
         """See `Transport.close`."""
-        self._socket.close()
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            self._socket.close()

@@ -1,9 +1,9 @@
-"""``usb:``, ``usb:VID:PID``, ``usb:VID:PID:SERIAL``: a display on USB, through pyusb.
+"""``usb:``, ``usb:VID:PID``, ``usb:VID:PID:SERIAL``: byte pipe over USB bulk endpoints, by pyusb.
 
-A display is known by the class of its interface (protocol.md, section 16.1), and its endpoints by
-their kind and direction. Further kinds of port whose devices are on some USB come as entry points
-of the group ``voxdisplay.usb``: callables that take the whole name and give a backend of pyusb.
-This knows USB; it knows no packet of the protocol.
+A display is recognised by the class of its interface (protocol.md, section 16.1), and its endpoints
+by type and direction. Further kinds of port whose devices are on some USB come as entry points of
+the group ``voxdisplay.usb``: callables that take the whole name and return a backend of pyusb.
+Knows USB packets; knows no packet of the protocol.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ import usb.core
 import usb.util
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+from voxdisplay.printable_text import printable
 from voxdisplay.transport.discovery import FoundPort
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
 from voxdisplay.transport.usb_access import busy_error, find_backend, permission_error
 from voxdisplay.wire import spec
 
 _READ_BYTES = 16384  # a multiple of every packet size there is, so that no packet is too long
 _WRITE_BYTES = 65536
-_CONTINUATION_TIMEOUT_S = (
-    0.02  # for as much as one read takes, at full speed; the end of a transfer ends it sooner
-)
-_MIN_TIMEOUT_S = 0.001  # libusb counts in milliseconds, and takes 0 for ever
-_MAX_CONSECUTIVE_ERRORS = 8  # stalls and packets that are too long, in a row
+# Time for _READ_BYTES at full speed; the end of a transfer ends it sooner.
+_CONTINUATION_TIMEOUT_S = 0.02
+_MIN_TIMEOUT_S = 0.001  # libusb counts in milliseconds, and 0 means for ever
+_MAX_CONSECUTIVE_ERRORS = 8  # stalls and packets that are too long
 _MAX_LISTED = 10  # devices named in an error
 
 _DISCONNECTED = (errno.EIO, errno.ENODEV, errno.ENOENT, errno.ESHUTDOWN)
@@ -69,14 +70,14 @@ class UsbTransport:
             raise
 
     def _claim(self) -> None:
-        """Open the device and take its interface."""
+        """Open the device and claim its interface, from a driver of the system if need be."""
         device = self._device
         configuration, interface = next(_display_interfaces(device))
         number = interface.bInterfaceNumber
         self._out, self._in = _endpoint(interface, "OUT"), _endpoint(interface, "IN")
         if _active_configuration(device) != configuration.bConfigurationValue:
             configuration.set()  # only then: it resets the device
-        with contextlib.suppress(NotImplementedError):  # not on every system
+        with contextlib.suppress(NotImplementedError):  # of systems without such drivers
             if device.is_kernel_driver_active(number):
                 device.detach_kernel_driver(number)
                 self._detached_driver = number
@@ -89,8 +90,8 @@ class UsbTransport:
         deadline_s = time.monotonic() + timeout_s
         packet_bytes = _packet_bytes(self._in)
         while True:
-            # A transfer ends with a packet that is not full, and a device need not send one. So
-            # the first packet is waited for by itself, and the rest only as long as it flows.
+            # A transfer ends with a short packet, and a device need not send one. So the first
+            # packet is waited for by itself, and the rest only as long as packets follow.
             data = self._transfer_in(packet_bytes, deadline_s - time.monotonic())
             if len(data) == packet_bytes:
                 data += self._transfer_in(_READ_BYTES, _CONTINUATION_TIMEOUT_S)
@@ -98,12 +99,12 @@ class UsbTransport:
                 return data
 
     def _transfer_in(self, size: int, timeout_s: float) -> bytes:
-        """Do a transfer; give nothing if nothing came, or an empty packet, or a damaged one."""
+        """Return the data of one transfer; none if none came, or an empty or a damaged packet."""
         try:
             data = bytes(self._in.read(size, _milliseconds(timeout_s)))
         except usb.core.USBTimeoutError:
             return b""
-        except usb.core.USBError as error:
+        except LIBRARY_ERRORS as error:
             self._recover(error, self._in)
             return b""
         self._consecutive_errors = 0
@@ -120,11 +121,11 @@ class UsbTransport:
             if sent < len(data) and time.monotonic() > deadline_s:
                 raise TransportTimeout(f"{self.port} took only {sent} of {len(data)} bytes in time")
         if data and len(data) % _packet_bytes(self._out) == 0:
-            # The device may wait for more in a transfer of its own: tell it that this is all.
-            self._transfer_out(b"", deadline_s, "no end of what was sent")
+            # The device may wait for the rest of a transfer: an empty packet ends it.
+            self._transfer_out(b"", deadline_s, "no end of the transfer")
 
     def _transfer_out(self, data: bytes, deadline_s: float, so_far: str) -> int:
-        """Do a transfer; give how many bytes the device took, which may be a part."""
+        """Do one transfer; return how many bytes the device took, which may be a part."""
         left_s = deadline_s - time.monotonic()
         try:
             sent = int(self._out.write(data, _milliseconds(left_s)))
@@ -132,36 +133,37 @@ class UsbTransport:
             raise TransportTimeout(
                 f"{self.port} took {so_far}", hint="is its firmware still running?"
             ) from error
-        except usb.core.USBError as error:
+        except LIBRARY_ERRORS as error:
             self._recover(error, self._out)
             return 0
         self._consecutive_errors = 0
         return sent
 
-    def _recover(self, error: usb.core.USBError, endpoint: Any) -> None:
-        """Clear a stall, or let a packet go that was too long; raise what is past mending.
+    def _recover(self, error: Exception, endpoint: Any) -> None:
+        """Clear a stalled endpoint, or drop a packet that was too long; raise on any other error.
 
-        What was under way is lost or comes twice: the protocol finds out, and repeats it.
+        Data in transfer are lost or come twice: the protocol detects that, and retransmits.
         """
         self._consecutive_errors += 1
+        number = _errno(error)
         if (
-            error.errno not in {errno.EPIPE, errno.EOVERFLOW}
+            number not in {errno.EPIPE, errno.EOVERFLOW}
             or self._consecutive_errors > _MAX_CONSECUTIVE_ERRORS
         ):
             raise self._closed_error(error) from error
-        if error.errno == errno.EPIPE:
+        if number == errno.EPIPE:
             try:
                 endpoint.clear_halt()
-            except usb.core.USBError as worse:
+            except LIBRARY_ERRORS as worse:
                 raise self._closed_error(worse) from worse
 
-    def _closed_error(self, error: usb.core.USBError) -> TransportClosed:
-        if error.errno in _DISCONNECTED:
+    def _closed_error(self, error: Exception) -> TransportClosed:
+        if _errno(error) in _DISCONNECTED:
             return TransportClosed(f"{self.port} is gone: it was unplugged, or has restarted")
-        return TransportClosed(f"{self.port} does not work any more: {error}")
+        return TransportClosed(f"{self.port} does not work any more: {message_of(error)}")
 
     def _check_open(self) -> None:
-        """Refuse to go on with a closed port: pyusb would open it again."""
+        """Raise if the port is closed: pyusb would open it again."""
         if self._closed:
             raise TransportClosed(f"{self.port} is closed")
 
@@ -170,31 +172,33 @@ class UsbTransport:
         if self._closed:
             return
         self._closed = True
-        with contextlib.suppress(usb.core.USBError):  # it may be gone
+        with contextlib.suppress(*LIBRARY_ERRORS):  # it may be gone
             if self._claimed_interface is not None:
                 usb.util.release_interface(self._device, self._claimed_interface)
             if self._detached_driver is not None:
                 self._device.attach_kernel_driver(self._detached_driver)
-        usb.util.dispose_resources(self._device)
+        _dispose(self._device)
 
 
 def usb_ports() -> list[FoundPort]:
-    """List the displays on USB. Without libusb there are none to be seen."""
+    """Return the displays on USB, sorted by name; none without libusb."""
     try:
         displays = _display_devices(find_backend("usb:"))
-    except (OpenError, usb.core.USBError):
+    except OpenError:
+        return []
+    except LIBRARY_ERRORS:
         return []
     ports = []
     for device in displays:
         product = _string_descriptor(device, "product")
         description = product or "a display"
         ports.append(FoundPort(_port_name(device), description, *_ids(device), product=product))
-        usb.util.dispose_resources(device)
+        _dispose(device)
     return sorted(ports, key=lambda port: port.port)
 
 
 class _DeviceSelector:
-    """What a name asks for."""
+    """Predicate on displays: vendor, product and serial number of a port's name."""
 
     def __init__(self, port: str) -> None:
         match = re.fullmatch(r"usb:(?:([0-9a-fA-F]{1,4}):([0-9a-fA-F]{1,4})(?::(.+))?)?", port)
@@ -208,17 +212,17 @@ class _DeviceSelector:
         self._serial = match[3]
 
     def __call__(self, device: usb.core.Device) -> bool:
-        """Tell whether a display is the one. To read its serial number, it must be opened."""
+        """Return whether a display matches. It is opened if its serial number is asked for."""
         if self._ids and (device.idVendor, device.idProduct) != self._ids:
             return False
         if not self._serial:
             return True
-        _active_configuration(device)  # opens it, or says why not
+        _active_configuration(device)  # opens it, or raises
         return _string_descriptor(device, "serial_number") == self._serial
 
 
 def _select_device(port: str, wanted: _DeviceSelector, backend: Any) -> usb.core.Device:
-    """Give the only display that is wanted."""
+    """Return the only display that matches; raise `OpenError` if there is none, or more."""
     with _as_open_error(port):
         displays = _display_devices(backend)
     chosen = []
@@ -229,7 +233,7 @@ def _select_device(port: str, wanted: _DeviceSelector, backend: Any) -> usb.core
     named = ", ".join(_port_name(device) for device in (chosen or displays)[:_MAX_LISTED])
     for device in displays:
         if chosen != [device]:
-            usb.util.dispose_resources(device)
+            _dispose(device)
     if len(chosen) == 1:
         return chosen[0]
     if chosen:
@@ -244,11 +248,11 @@ def _select_device(port: str, wanted: _DeviceSelector, backend: Any) -> usb.core
 
 
 def _display_devices(backend: Any) -> list[usb.core.Device]:
-    """Find the devices with an interface of the protocol's class."""
+    """Return the devices with an interface of the protocol's class."""
     displays = []
     for device in usb.core.find(find_all=True, backend=backend):
-        # Some systems do not let us look at devices of their own.
-        with contextlib.suppress(usb.core.USBError, NotImplementedError):
+        # Some systems hide devices of their own; others are unplugged just now.
+        with contextlib.suppress(*LIBRARY_ERRORS):
             if next(_display_interfaces(device), None):
                 displays.append(device)
     return displays
@@ -257,7 +261,7 @@ def _display_devices(backend: Any) -> list[usb.core.Device]:
 def _display_interfaces(
     device: usb.core.Device,
 ) -> Iterator[tuple[usb.core.Configuration, usb.core.Interface]]:
-    """Find the interfaces of the protocol's class that have a bulk endpoint each way."""
+    """Yield the interfaces of the protocol's class that have a bulk endpoint each way."""
     wanted = (spec.USB_CLASS, spec.USB_SUBCLASS, spec.USB_PROTOCOL, 0)
     for configuration in device:
         for interface in configuration:
@@ -272,13 +276,14 @@ def _display_interfaces(
 
 
 def _endpoint(interface: usb.core.Interface, direction: str) -> Any:
-    """Find the bulk endpoint of a direction."""
+    """Return the bulk endpoint of a direction; None if there is none."""
     bit = usb.util.ENDPOINT_IN if direction == "IN" else usb.util.ENDPOINT_OUT
 
     def matches(endpoint: usb.core.Endpoint) -> bool:
         kind = usb.util.endpoint_type(endpoint.bmAttributes)
         way = usb.util.endpoint_direction(endpoint.bEndpointAddress)
-        return (kind, way) == (usb.util.ENDPOINT_TYPE_BULK, bit)
+        is_bulk = (kind, way) == (usb.util.ENDPOINT_TYPE_BULK, bit)
+        return is_bulk and _packet_bytes(endpoint) > 0
 
     return usb.util.find_descriptor(interface, custom_match=matches)
 
@@ -288,22 +293,22 @@ def _packet_bytes(endpoint: usb.core.Endpoint) -> int:
 
 
 def _active_configuration(device: usb.core.Device) -> int:
-    """Give the value of the configuration; 0 if there is none."""
+    """Return the value of the active configuration; 0 if there is none."""
     try:
         return int(device.get_active_configuration().bConfigurationValue)
     except usb.core.USBError as error:
-        if error.errno is None:  # pyusb's own word for it
+        if error.errno is None:  # as pyusb reports it
             return 0
         raise
 
 
 def _string_descriptor(device: usb.core.Device, name: str) -> str | None:
-    """Give a text of the device; None if it has none, or gives none."""
+    """Return a text of the device, printable; None if it has none, or it cannot be read."""
     try:
         text = getattr(device, name)
-    except (usb.core.USBError, ValueError, NotImplementedError):
+        return text and printable(text)
+    except LIBRARY_ERRORS:
         return None
-    return text and "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def _ids(device: usb.core.Device) -> tuple[int, int, str | None]:
@@ -315,13 +320,24 @@ def _port_name(device: usb.core.Device) -> str:
     return f"usb:{vid:04x}:{pid:04x}" + (f":{serial}" if serial else "")
 
 
+def _dispose(device: usb.core.Device) -> None:
+    """Close a device."""
+    with contextlib.suppress(*LIBRARY_ERRORS):  # it may be gone
+        usb.util.dispose_resources(device)
+
+
+def _errno(error: Exception) -> int | None:
+    """Return the system's number of an error; None if it has none."""
+    return error.errno if isinstance(error, OSError) else None
+
+
 def _milliseconds(seconds: float) -> int:
     return max(1, round(max(seconds, _MIN_TIMEOUT_S) * 1000))
 
 
 @contextlib.contextmanager
 def _as_open_error(port: str, device: usb.core.Device | None = None) -> Iterator[None]:
-    """Turn what USB says on opening into what a person can do."""
+    """Turn errors of USB on opening into an `OpenError` with the remedy."""
     try:
         yield
     except usb.core.USBError as error:
@@ -336,7 +352,9 @@ def _as_open_error(port: str, device: usb.core.Device | None = None) -> Iterator
         raise OpenError(f"{port} cannot be opened: {error}", port=port) from error
     except NotImplementedError as error:
         raise OpenError(
-            f"{port} cannot be opened: {error}",
+            f"{port} cannot be opened: {message_of(error)}",
             port=port,
-            hint="on Windows, the display needs the driver WinUSB: https://zadig.akeo.ie gives it",
+            hint="on Windows, the display needs the driver WinUSB: https://zadig.akeo.ie has it",
         ) from error
+    except LIBRARY_ERRORS as error:
+        raise OpenError(f"{port} cannot be opened: {message_of(error)}", port=port) from error

@@ -1,7 +1,8 @@
-"""What stands between a program and a USB device: libusb, permission, and other programs."""
+"""Access to USB devices: libusb, permission, and other programs that hold a device."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,10 @@ import usb.util
 
 from voxdisplay.errors import OpenError
 from voxdisplay.transport import diagnosis
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS
 from voxdisplay.wire import spec
 
-# Lets who sits at the machine use any device with an interface of the protocol's class.
+# Grants the user at the machine access to any device with an interface of the protocol's class.
 UDEV_RULE = (
     'SUBSYSTEM=="usb", ENV{ID_USB_INTERFACES}=="*:'
     f'{spec.USB_CLASS:02x}{spec.USB_SUBCLASS:02x}{spec.USB_PROTOCOL:02x}:*", TAG+="uaccess"'
@@ -23,7 +25,7 @@ _NODES = Path("/dev/bus/usb")
 
 
 def find_backend(port: str) -> Any:
-    """Find libusb: the one that the package ``libusb-package`` brings, or else the system's.
+    """Return libusb: the one that the package ``libusb-package`` brings, or else the system's.
 
     Parameters
     ----------
@@ -41,12 +43,14 @@ def find_backend(port: str) -> Any:
         If there is none.
 
     """
-    try:
-        import libusb_package  # noqa: PLC0415 - need not be there
-    except ImportError:
-        backend = usb.backend.libusb1.get_backend()
-    else:
-        backend = libusb_package.get_libusb1_backend() or usb.backend.libusb1.get_backend()
+    backend = None
+    with contextlib.suppress(*LIBRARY_ERRORS):  # it need not be there, nor fit this machine
+        import libusb_package  # noqa: PLC0415
+
+        backend = libusb_package.get_libusb1_backend()
+    if backend is None:
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            backend = usb.backend.libusb1.get_backend()
     if backend is None:
         raise OpenError(
             f"{port}: there is no libusb on this machine",
@@ -57,7 +61,7 @@ def find_backend(port: str) -> Any:
 
 
 def permission_error(port: str) -> OpenError:
-    """Give the error for a device that may not be opened, with the way to be allowed."""
+    """Return the error for a device that may not be opened, with the remedy."""
     hint = (
         f"allow it, and plug the display in again:\n  echo '{UDEV_RULE}' | sudo tee {_UDEV_FILE}\n"
         "  sudo udevadm control --reload"
@@ -68,12 +72,14 @@ def permission_error(port: str) -> OpenError:
 
 
 def busy_error(port: str, device: Any) -> OpenError:
-    """Give the error for a device that another program uses, with its name if it can be known."""
+    """Return the error for a device that another program uses, with its name where it is known."""
     if device is not None:
-        usb.util.dispose_resources(device)  # or else we would be one of those who have it open
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            # Or else we would be one of those who have it open.
+            usb.util.dispose_resources(device)
         node = _NODES / f"{device.bus or 0:03d}" / f"{device.address or 0:03d}"
         if node.exists():
             return diagnosis.busy_error(port, str(node))
     return OpenError(
-        f"{port} is busy", port=port, hint="another program has it open: end it, or let go there"
+        f"{port} is busy", port=port, hint="another program has it open: end it, or close it there"
     )
