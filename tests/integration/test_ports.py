@@ -279,7 +279,7 @@ def test_a_device_that_falls_silent_in_mid_push(run, line):
 
     threading.Thread(target=device, daemon=True).start()
     said = pushed(run, line.port, "--timeout", "0.8", code=3)
-    assert "answers HELLO, and has said nothing else" in said or "silent" in said
+    assert "answers HELLO, and has sent nothing else" in said or "silent" in said
     assert 1 <= max(statuses) <= 4
 
 

@@ -1,4 +1,7 @@
-"""The host's end of protocol.md, without any I/O: bytes in, events out, time is an argument."""
+"""Sans-I/O host endpoint of protocol.md: bytes in, events out, time is an argument.
+
+Must not know any pipe, thread or clock.
+"""
 
 from voxdisplay.link.counters import LinkCounters
 from voxdisplay.link.events import (

@@ -1,4 +1,4 @@
-"""What a link has done: plain numbers, no behaviour."""
+"""Counters of one link: plain numbers, no behaviour."""
 
 from __future__ import annotations
 
@@ -7,7 +7,24 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What a link has done since it was made."""
+    """Totals since the link was made, over all its sessions.
+
+    Attributes
+    ----------
+    packets : int
+        DATA packets, each counted once however often it was sent.
+    wire_bytes : int
+        Bytes sent, of all packets.
+    retransmitted : int
+        Retransmissions of DATA packets.
+    statuses : int
+        STATUS packets sent.
+    sessions : int
+        Sessions opened.
+    device_damaged : int
+        Damaged segments that the device has reported.
+
+    """
 
     packets: int = 0
     wire_bytes: int = 0

@@ -1,73 +1,75 @@
-"""How much may be on its way, so that what is lost does not wait behind it longer than it must.
+"""Delivery rate of a line, and the limit on bytes in flight (bandwidth-delay product).
 
-Buffers between host and device may hold more than a slow line carries in minutes; what is lost is
-then sent again behind all of it, and the window stands still meanwhile. So no more is sent than
-keeps the line busy, going by what it has been seen to deliver. Knows packets only as sizes and
-times; credit and sequence numbers are the business of ``window.py``.
+Buffers between host and device may hold more than a slow line carries in minutes, and a
+retransmission would queue behind all of it. So no more is in flight than keeps the line busy at its
+measured rate. Must not know packets but by size and time; credit and sequence numbers are those of
+`send_window`.
 """
 
 from __future__ import annotations
 
 import math
 
-# On its way at any rate.
-MIN_BYTES = 4096
-# One that is being sent, and one behind it.
-MIN_PACKETS = 2
-# The rest of the window can be sent while a lost packet is on its way again. Of 10, 13, 16 and 20
-# the one that leaves most of a line with a bit error rate of 1e-4 (tools/bench_goodput.py).
+MIN_BYTES = 4096  # always allowed in flight
+MIN_PACKETS = 2  # likewise: one that is being sent, and one behind it
+# The rest of the window is room for new packets while a retransmission is in flight. Of 10, 13, 16
+# and 20 this has the highest goodput at a bit error rate of 1e-4 (tools/bench_goodput.py).
 MAX_PACKETS = 13
-# How late the caller may be: processes wait for their turn.
-SCHEDULING_DELAY_S = 0.02
-# How long coding may take before it gives the first bytes of a frame.
-ENCODING_DELAY_S = 0.06
-# How fast a rate that is not reached any more is forgotten, with each packet delivered.
-_DECAY = 1 / 64
+SCHEDULING_DELAY_S = 0.02  # the caller may be late by so much: processes wait for their turn
+ENCODING_DELAY_S = 0.06  # until the encoder yields the first bytes of a frame
+_DECAY = 1 / 64  # of a rate that is not reached any more, with each packet delivered
 
 
 class DeliveryRate:
-    """The rate of delivery of one line and its round trip, and what follows from them."""
+    """Estimator of the delivery rate and round-trip time of one line.
+
+    Attributes
+    ----------
+    delivered : int
+        Bytes that the device has acknowledged so far.
+
+    """
 
     def __init__(self) -> None:
         self.delivered = 0
-        self._rate = 0.0  # bytes per second
-        # The shortest: what waited in a queue says nothing of the line.
-        self._round_trip_s = math.inf
+        self._bytes_per_s = 0.0
+        self._round_trip_s = math.inf  # the shortest: longer ones include time in a queue
         self._was_busy = False
 
-    def sample(self, size: int, before: int, seconds: float) -> None:
-        """Count a packet that has arrived.
+    def sample(self, size: int, delivered_before: int, seconds: float) -> None:
+        """Take a sample from an acknowledged packet.
 
         Parameters
         ----------
         size : int
             Its bytes.
-        before : int
+        delivered_before : int
             `delivered` when it was sent.
         seconds : float
-            How long ago that was: meanwhile the line has delivered all that came in between.
+            Time since it was sent, in which the line has delivered all bytes in between.
 
         """
         self.delivered += size
         seconds = max(seconds, 1e-6)
-        meanwhile = self.delivered - before
+        meanwhile = self.delivered - delivered_before
         self._was_busy |= meanwhile >= MIN_BYTES
-        self._rate = max(meanwhile / seconds, self._rate * (1 - _DECAY))
+        self._bytes_per_s = max(meanwhile / seconds, self._bytes_per_s * (1 - _DECAY))
         self._round_trip_s = min(seconds, self._round_trip_s)
 
     @property
     def bytes_per_s(self) -> float | None:
-        """What the line carries; None if it has not had enough to do yet to tell."""
-        return self._rate if self._was_busy else None
+        """Delivery rate of the busy line; None as long as it had too little to carry."""
+        return self._bytes_per_s if self._was_busy else None
 
     def allows(self, packets: int, size: int) -> bool:
-        """Tell whether so many packets of so many bytes in all may be on their way."""
+        """Return whether ``packets`` packets of ``size`` bytes in all may be in flight."""
         if packets <= MIN_PACKETS:
             return True
-        busy = 1.25 * self._rate * self._round_trip_s if self._rate else 0.0
-        in_time = size <= max(MIN_BYTES, busy + self._rate * SCHEDULING_DELAY_S)
-        return in_time and (packets <= MAX_PACKETS or size <= busy)
+        rate = self._bytes_per_s
+        busy_bytes = 1.25 * rate * self._round_trip_s if rate else 0.0
+        in_time = size <= max(MIN_BYTES, busy_bytes + rate * SCHEDULING_DELAY_S)
+        return in_time and (packets <= MAX_PACKETS or size <= busy_bytes)
 
     def drains_early(self, size: int) -> bool:
-        """Tell whether so many bytes last no longer than what follows them takes to be coded."""
-        return size <= max(MIN_BYTES, self._rate * ENCODING_DELAY_S)
+        """Return whether ``size`` bytes are sent before another frame begins to be encoded."""
+        return size <= max(MIN_BYTES, self._bytes_per_s * ENCODING_DELAY_S)

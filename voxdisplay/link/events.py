@@ -1,4 +1,4 @@
-"""What a `Link` has to tell: plain values, no behaviour."""
+"""Events that a `Link` returns from received bytes: plain values, no behaviour."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from voxdisplay.wire.packet import Error, Info, Page
 
 @dataclass(frozen=True, slots=True)
 class SessionOpened:
-    """A session is open."""
+    """The device has answered HELLO."""
 
     info: Info
 
 
 @dataclass(frozen=True, slots=True)
 class FrameShown:
-    """A frame is on display. ``digest`` is the device's, or None if it gives none."""
+    """A frame is on display. ``digest`` is the device's, None without that feature."""
 
     ticket: int
     digest: int | None
@@ -25,28 +25,28 @@ class FrameShown:
 
 @dataclass(frozen=True, slots=True)
 class StatusReceived:
-    """The device was asked what is on display; ``digest`` is None if it gives none."""
+    """Answer to `Link.request_status`. ``digest`` is the front page's, None without the feature."""
 
     digest: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class PageReceived:
-    """Pixels came back."""
+    """Answer to `Link.read`: pixels of the requested range, or the first of them."""
 
     page: Page
 
 
 @dataclass(frozen=True, slots=True)
 class PacketRefused:
-    """The device refused a packet; if it was a DATA, the session is over."""
+    """The device sent ERROR: the session is over, and all queued frames and reads are dropped."""
 
     error: Error
 
 
 @dataclass(frozen=True, slots=True)
 class SessionLost:
-    """The device has lost the session; a new one is being opened, and frames are sent again."""
+    """The device no longer has the session. A new one is being opened; frames are sent again."""
 
 
 Event: TypeAlias = (

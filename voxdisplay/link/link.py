@@ -1,8 +1,8 @@
-"""The host's end of protocol.md: one session after the other, and when to ask.
+"""Sans-I/O host endpoint of protocol.md: sessions, retransmission, polling.
 
-A `Link` does no I/O and reads no clock: `receive` takes what a pipe brought, `transmit` gives what
-to write, `next_timeout` says when to come back if nothing happens. It knows frames only as
-payloads, and no pipe at all.
+`Link.receive` takes the bytes that a pipe brought, `Link.transmit` returns those to write, and
+`Link.next_timeout` the time until the next call if nothing comes. Must not know pipes or clocks;
+frames are payloads here.
 """
 
 from __future__ import annotations
@@ -26,27 +26,37 @@ from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
 from voxdisplay.link.payload_size import clamp_payload
 from voxdisplay.link.readback import ReadRequests
 from voxdisplay.link.sender import Sender
-from voxdisplay.link.session_opening import SessionOpening, no_info_error
+from voxdisplay.link.session_opening import SessionOpening
 from voxdisplay.link.silence_timer import SilenceTimer
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.packet_stream import PacketStream
 
-MAX_CALL_DELAY_S = 0.25  # a caller that comes back later than this was away
-MAX_RESTARTS = 8  # without a frame shown
+# A call that comes later than this means that the caller was away, not that the device was silent.
+MAX_CALL_DELAY_S = 0.25
+MAX_RESTARTS = 8  # without a frame displayed
 
 
 class Link:
-    """One host talking to one device.
+    """Endpoint of one host that drives one device.
 
     Parameters
     ----------
     session : int
-        1..65535, at random.
+        Number of the first session, 1..65535, at random.
     now : float
-        Seconds on any steady clock; later calls take the same clock.
+        Seconds on any monotonic clock; later calls take the same clock.
     timeout_s : float
-        How long silence lasts before `TransportTimeout`; talk without progress, twice as long.
+        How long silence may last before `TransportTimeout`; answers without progress, twice as
+        long.
+
+    Attributes
+    ----------
+    info : Info or None
+        Of the open session.
+    counters : LinkCounters
+    stream : PacketStream
+        Reader of the received bytes.
 
     """
 
@@ -58,57 +68,66 @@ class Link:
         self._frames = OutgoingFrames()
         self._reads = ReadRequests()
         self._sender = Sender(self._frames, self._reads, self.counters)
-        self._zero_count = 0  # that came before the first session
-        self._shown_ticket = 0  # in this session
+        self._shown_ticket = 0  # of this session
         self._restarts = 0
         self._opening = SessionOpening(session, now)
         self._timer = SilenceTimer(now, timeout_s)
-        self._call_due_s = math.inf  # when the caller should be back
+        self._call_due_s = math.inf  # when `transmit` is expected to be called at the latest
         self._poll_now = False
-        self._status_requested = False  # the caller wants an answer to a STATUS
+        self._status_requested = False
 
-    # -- what the caller wants
+    # -- requests
 
     @property
     def ready(self) -> bool:
-        """Whether a session is open."""
+        """True if a session is open."""
         return self.info is not None
 
     @property
     def idle(self) -> bool:
-        """Whether nothing is on its way or waited for."""
+        """True if nothing is queued, outstanding or requested."""
         return not (self._frames or self._reads or self._sender.outstanding)
 
     @property
     def backlog(self) -> int:
-        """Frames that have been handed over and not shown yet."""
+        """Number of frames that are queued and not displayed yet."""
         return len(self._frames)
 
     @property
     def needs_frame(self) -> bool:
-        """Whether another frame is needed now for the line to stay busy: none is too early."""
+        """True if the line will run idle unless another frame is queued now."""
         return self._sender.delivery_rate.drains_early(self._frames.unsent_bytes)
 
     @property
     def payload_count(self) -> int:
-        """Payloads of all frames that have not been shown yet, as far as they are coded."""
+        """Number of payloads of all frames in the backlog, as far as they are encoded."""
         return self._frames.payload_count
 
     @property
     def unacknowledged_payloads(self) -> int:
-        """Payloads that have not been received yet."""
+        """Number of those payloads that the device has not acknowledged."""
         return self._frames.unsent_payloads + self._sender.outstanding
 
     @property
+    def in_flight_bytes(self) -> int:
+        """Bytes of frames that were sent and are neither acknowledged nor lost."""
+        return self._sender.in_flight_bytes
+
+    @property
+    def partial_info(self) -> str | None:
+        """Description of an answer to HELLO that did not come whole; None if none began."""
+        return self._opening.partial_info
+
+    @property
     def bytes_per_s(self) -> float | None:
-        """What the line has been seen to carry while it was busy; None if it was not yet."""
+        """Measured delivery rate of the busy line; None as long as it had too little to carry."""
         return self._sender.delivery_rate.bytes_per_s
 
     @property
     def payload_bytes(self) -> int:
-        """How long payloads should be now: what suits the line's losses and the device's buffer.
+        """Payload length that suits the line's losses and the device's buffer, in bytes.
 
-        Until a session is open, as long as none has to be cut by any device.
+        Before a session is open it is one that every device takes.
         """
         if self.info is None:
             return spec.LIMIT_MIN_PAYLOAD
@@ -117,7 +136,7 @@ class Link:
 
     @property
     def displayed(self) -> PictureId:
-        """What stands for the picture on display: it changes whenever that may have changed."""
+        """Id of the displayed picture; another whenever that picture may have changed."""
         return self.counters.sessions, self._shown_ticket
 
     def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
@@ -132,7 +151,7 @@ class Link:
         return self._frames.open_frame()
 
     def append_payloads(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
-        """Add payloads to a frame that was begun. See `OutgoingFrames.append_payloads`."""
+        """Append payloads to an open frame: see `OutgoingFrames.append_payloads`."""
         self._frames.append_payloads(ticket, payloads, last=last)
 
     def abandon_open_frame(self) -> None:
@@ -146,19 +165,19 @@ class Link:
         return self._frames.present_difference(base, payloads, whole)
 
     def read(self, start: int, count: int, *, back: bool = False) -> None:
-        """Ask for pixels; `PageReceived` brings them, or the first of them."""
+        """Request a range of voxels; `PageReceived` brings it, or its beginning."""
         self._reads.add(start, count, back=back)
 
     def cancel_reads(self) -> None:
-        """Want no pixels any more that have been asked for."""
+        """Cancel all requests for voxels."""
         self._reads.clear()
 
     def request_status(self) -> None:
-        """Ask what is on display now; `StatusReceived` brings it."""
+        """Request the digest of the front page; `StatusReceived` brings it."""
         self._status_requested = self._poll_now = True
 
     def _reopen(self, now: float) -> None:
-        """Begin a new session; frames that are not shown yet are sent again, whole."""
+        """Open a new session; frames of the backlog are sent again, in full."""
         self._shown_ticket = 0
         self.info = None
         self._sender.close_session()
@@ -167,26 +186,26 @@ class Link:
         self._opening = self._opening.successor(now)
 
     def resume(self, now: float) -> None:
-        """Begin a new session over a new pipe; frames that are not shown yet are sent again."""
+        """Open a new session over a new pipe; frames of the backlog are sent again, in full."""
         self.stream = PacketStream()
         self._sender.reset_delivery_rate()
         self._reopen(now)
         self._timer.note_idle(now)
 
-    # -- what goes out
+    # -- out
 
     def transmit(self, now: float) -> bytes:
-        """Give the bytes to write now: as many as window and credit allow, or a portion of them.
+        """Return the bytes to write now, at most a burst of what window and credit allow.
 
         Raises
         ------
         TransportTimeout
-            If the device has been silent, or has made no progress, for too long; or a packet was
+            If the device was silent, or nothing was delivered, for too long; or if a packet was
             lost too often.
 
         """
-        if (late_s := now - self._call_due_s) > MAX_CALL_DELAY_S:
-            self._timer.extend(late_s)
+        if (delay_s := now - self._call_due_s) > MAX_CALL_DELAY_S:
+            self._timer.extend(delay_s)
         out = self._transmit_hello(now) if self.info is None else self._transmit_session(now)
         self.counters.wire_bytes += len(out)
         timeout_s = self.next_timeout(now)
@@ -204,19 +223,20 @@ class Link:
         if now >= self._timer.deadline_s:
             if self.counters.sessions:
                 raise self._timer.timeout_error(now)
-            raise no_info_error(self._timeout_s, self.stream, self._zero_count)
+            raise self._opening.timeout_error(self._timeout_s, self.stream)
         return self._opening.hello(now)
 
     # -- silence
 
     @property
     def _blocked(self) -> bool:
-        """Whether nothing more can be sent, and an answer that unblocks it might get lost."""
-        starves = self._sender.out_of_credit and not self._sender.in_flight
-        return (starves or self._sender.window_stalled) and not self._timer.poll_outstanding
+        """True if nothing can be sent until an answer comes, and that answer might get lost."""
+        no_credit = self._sender.out_of_credit and not self._sender.in_flight
+        return (no_credit or self._sender.window_stalled) and not self._timer.poll_outstanding
 
     @property
     def _waiting(self) -> bool:
+        """True if an answer of the device is due."""
         return bool(
             self._sender.outstanding
             or self._sender.out_of_credit
@@ -226,48 +246,49 @@ class Link:
         )
 
     def _transmit_poll(self, now: float) -> bytes:
-        """Give a STATUS if it is time for one."""
-        silence = self._timer
+        """Return a STATUS if a poll is due, or HELLO if too many polls were not answered."""
+        timer = self._timer
         if not (self._waiting or self._status_requested):
             return b""
-        due = silence.poll_due_s <= now
-        at_once = self._poll_now or self._blocked
+        due = timer.poll_due_s <= now
+        now_anyway = self._poll_now or self._blocked
         self._poll_now = False
-        if silence.may_poll and (due or at_once):
+        if timer.may_poll and (due or now_anyway):
             tag, wire = self._sender.status()
-            silence.note_poll(tag, now)
+            timer.note_poll(tag, now)
             self.counters.statuses += 1
-            return b"\0" + wire  # the 00 costs no credit, and ends what a lost 00 has left open
-        if due:  # nothing more may be asked; HELLO always may
+            return b"\0" + wire  # the 00 costs no credit, and ends a packet whose own 00 was lost
+        if due:  # no more STATUS is allowed; HELLO always is
             self._restart(now)
-            silence.cancel_polls(doubt=True)
+            timer.cancel_polls(timed_out=True)
             return self._transmit_hello(now)
         return b""
 
     def next_timeout(self, now: float) -> float | None:
-        """Seconds until `transmit` has something to do even if nothing comes; None: never."""
-        silence = self._timer
+        """Return the seconds until `transmit` is to be called even if nothing comes, or None."""
+        timer = self._timer
         if self.info is None:
-            return max(0.0, min(self._opening.due_s, silence.deadline_s) - now)
+            return max(0.0, min(self._opening.due_s, timer.deadline_s) - now)
         if self._sender.has_more:
             return 0.0
         if not self._waiting:
             return None
-        return max(0.0, min(silence.poll_due_s, silence.deadline_s) - now)
+        return max(0.0, min(timer.poll_due_s, timer.deadline_s) - now)
 
-    # -- what comes in
+    # -- in
 
     def receive(self, data: bytes, now: float) -> list[Event]:
-        """Take bytes from the pipe; give what they mean.
+        """Return the events that follow from bytes of the pipe.
 
         Raises
         ------
         RemoteProtocolError
-            If the device breaks protocol.md.
+            If the device breaks protocol.md. The packets behind are not lost: go on with
+            ``receive(b"", now)``.
 
         """
         if not self.counters.sessions:
-            self._zero_count += data.count(0)
+            self._opening.note_received(data)
         events: list[Event] = []
         for packet in self._packets(data):
             events += self._handle(packet, now)
@@ -278,7 +299,7 @@ class Link:
             try:
                 yield from self.stream.feed(data)
             except RemoteProtocolError as error:
-                # Before a session only INFO counts: the rest may be of any version.
+                # Before a session only INFO matters: all else may be of another version.
                 if self.info or error.section == packets.Info.SECTION:
                     raise
                 data = b""
@@ -316,17 +337,17 @@ class Link:
         if ack.boot != info.boot:
             yield self._restart(now)
             return
-        silence = self._timer
+        timer = self._timer
         if ack.flags & spec.ACK_FLAG_ASKED:
-            silence.note_poll_answer(ack.last, now)
+            timer.note_poll_answer(ack.last, now)
             if self._status_requested:
                 self._status_requested = False
-                silence.note_progress(now)
+                timer.note_progress(now)
                 yield StatusReceived(_digest(info, ack))
         round_trip_s = self._sender.acknowledge(ack, now)
         if round_trip_s is not None:
-            silence.note_progress(now)
-            silence.sample_round_trip(round_trip_s)
+            timer.note_progress(now)
+            timer.sample_round_trip(round_trip_s)
         self._poll_now |= self._sender.all_in_flight_damaged and self._waiting
         yield from self._note_shown(info, ack, now)
 
@@ -358,7 +379,7 @@ class Link:
         if self._restarts > MAX_RESTARTS:
             raise TransportTimeout(
                 f"the device has lost the session {self._restarts} times without showing a frame",
-                hint="does it restart by itself? Look at its power supply",
+                hint="does it restart by itself? Check its power supply",
             )
         self._reopen(now)
         return SessionLost()

@@ -1,7 +1,7 @@
-"""The frames that wait to be shown: their payloads, their order, their numbers.
+"""Queue of outgoing frames: their payloads, their order, and their frame ids.
 
-A frame is what it is made of, and how much of that has been put into packets. Knows no window, no
-credit and no clock: when a packet may go out, and whether it has come, is the business of others.
+Must not know window, credit or clock: when a packet is sent, and whether it has arrived, is decided
+elsewhere.
 """
 
 from __future__ import annotations
@@ -17,15 +17,33 @@ from voxdisplay.wire import spec
 _MODULUS = 256
 
 PictureId: TypeAlias = tuple[int, int]
-"""Which picture is on display: how many sessions there were, and the ticket of its frame or 0."""
+"""Identifies the displayed picture: the number of sessions so far, and its frame's ticket or 0."""
 
 
 @dataclass(slots=True)
 class OutgoingFrame:
-    """A frame that is to be shown: its payloads, and how many are in packets already.
+    """Frame that is not displayed yet.
 
-    With a ``base`` they are but the difference from what that stands for, and ``whole`` gives all.
-    An ``open`` one is still being coded: more payloads follow.
+    Attributes
+    ----------
+    ticket : int
+    payloads : list of bytes
+        Ops, one packet each.
+    clear : bool
+        Whether it starts dark; otherwise as a copy of the displayed picture.
+    base : PictureId or None
+        The picture from which the payloads are a difference.
+    full_payloads : callable
+        Returns payloads that draw the frame from the dark, for a difference without its base.
+    open : bool
+        Whether it is still being encoded, so that more payloads follow.
+    frame_id : int
+        On the wire; -1 before its first packet.
+    packetized : int
+        How many of the payloads have been put into packets.
+    unsent_bytes : int
+        Bytes of the other payloads.
+
     """
 
     ticket: int
@@ -36,44 +54,47 @@ class OutgoingFrame:
     open: bool = False
     frame_id: int = -1
     packetized: int = 0
-    unsent_bytes: int = field(init=False)  # of payloads that are in no packet yet
+    unsent_bytes: int = field(init=False)
 
     def __post_init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Begin again: nothing of it is in a packet."""
+        """Return to the state before its first packet."""
         self.frame_id, self.packetized = -1, 0
         self.unsent_bytes = sum(map(len, self.payloads))
 
     def append(self, payloads: list[bytes]) -> None:
-        """Add payloads."""
+        """Append payloads."""
         self.payloads += payloads
         self.unsent_bytes += sum(map(len, payloads))
 
     @property
     def started(self) -> bool:
-        """Whether it has a number, and packets."""
+        """True if it has a frame id, and packets."""
         return self.frame_id >= 0
 
     @property
     def complete(self) -> bool:
-        """Whether all of it is in packets: then the device will show it."""
+        """True if all of it is in packets, so that the device will display it."""
         return self.started and not self.open and self.packetized == len(self.payloads)
 
     @property
     def sendable(self) -> int:
-        """Payloads that may enter now: of an open one the last may be that with COMMIT."""
+        """Number of payloads that may be put into packets now.
+
+        The last payload of an open frame may turn out to be the one with COMMIT, so it waits.
+        """
         return max(0, len(self.payloads) - self.open - self.packetized)
 
     @property
     def next_payload(self) -> bytes:
-        """What the next packet brings, if any is left."""
+        """Payload of the next packet."""
         return self.payloads[self.packetized]
 
 
 class OutgoingFrames:
-    """The frames of one link, the oldest first."""
+    """Frames of one link that are not displayed yet, the oldest first."""
 
     def __init__(self) -> None:
         self._queue: deque[OutgoingFrame] = deque()
@@ -89,33 +110,33 @@ class OutgoingFrames:
     # -- in
 
     def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
-        """Queue a frame; give its ticket.
+        """Queue a frame and return its ticket.
 
         Parameters
         ----------
         payloads : list of bytes
-            Ops, each at most INFO's ``max_payload`` long. None at all is a frame without ops.
+            Ops, each at most INFO's ``max_payload`` long. An empty list is a frame without ops.
         clear : bool
-            Whether the frame starts dark; otherwise as a copy of what is shown.
+            Whether the frame starts dark; otherwise as a copy of the displayed picture.
 
         """
         return self._add(OutgoingFrame(self._new_ticket(), payloads or [b""], clear))
 
     def open_frame(self) -> int:
-        """Queue a frame that starts dark and is still being coded; give its ticket."""
+        """Queue a frame that starts dark and is still being encoded, and return its ticket."""
         return self._add(OutgoingFrame(self._new_ticket(), [], clear=True, open=True))
 
     def append_payloads(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
-        """Add payloads to a frame that was begun; what is not queued any more takes none.
+        """Append payloads to an open frame; do nothing if it is not queued any more.
 
         Parameters
         ----------
         ticket : int
-            Of a frame from `begin`, whose last payloads have not been supplied.
+            From `open_frame`.
         payloads : list of bytes
             As of `present`. All but the last of them may be sent at once.
         last : bool
-            Whether there are no more.
+            Whether no more follow.
 
         """
         for frame in self._queue:
@@ -124,32 +145,37 @@ class OutgoingFrames:
                 frame.open = not last
 
     def abandon_open_frame(self) -> None:
-        """Give up what came from `begin`, if its last payloads are still to come.
+        """Remove the open frame, if there is one.
 
-        What has been sent of it is followed by the next frame, and dropped (section 6, point 6).
+        The device drops what was sent of it when the next frame follows (section 6, point 6).
         """
         self._queue = deque(frame for frame in self._queue if not frame.open)
 
     def present_difference(
-        self, base: PictureId, payloads: list[bytes], whole: Callable[[], list[bytes]]
+        self, base: PictureId, payloads: list[bytes], full_payloads: Callable[[], list[bytes]]
     ) -> int:
-        """Queue a frame as its difference from a picture on display; give its ticket.
+        """Queue a frame as its difference from a displayed picture, and return its ticket.
 
         Parameters
         ----------
-        base : OnDisplay
+        base : PictureId
             The picture.
         payloads : list of bytes
-            Ops that make the frame of it.
-        whole : callable
-            Gives the payloads that draw the frame from the dark. They are sent if the picture is
-            not on display any more when the frame's turn comes, or something is on its way, or the
-            session ends before the frame is shown.
+            Ops that turn the picture into the frame.
+        full_payloads : callable
+            Returns the payloads that draw the frame from the dark. They are sent instead if the
+            picture is not displayed any more when the frame's turn comes, if packets are
+            outstanding then, or if the session ends before the frame is displayed.
 
         """
-        ticket = self._new_ticket()
         return self._add(
-            OutgoingFrame(ticket, payloads or [b""], clear=False, base=base, full_payloads=whole)
+            OutgoingFrame(
+                self._new_ticket(),
+                payloads or [b""],
+                clear=False,
+                base=base,
+                full_payloads=full_payloads,
+            )
         )
 
     def _new_ticket(self) -> int:
@@ -164,44 +190,44 @@ class OutgoingFrames:
 
     @property
     def unsent_bytes(self) -> int:
-        """Bytes of payloads that are in no packet yet, as far as they are coded."""
+        """Bytes of the payloads that are in no packet yet, as far as they are encoded."""
         return sum(frame.unsent_bytes for frame in self._queue)
 
     @property
     def payload_count(self) -> int:
-        """Payloads of all frames, as far as they are coded."""
+        """Number of payloads of all frames, as far as they are encoded."""
         return sum(len(frame.payloads) for frame in self._queue)
 
     @property
     def unsent_payloads(self) -> int:
-        """Payloads that are in no packet yet."""
+        """Number of payloads that are in no packet yet."""
         return sum(len(frame.payloads) - frame.packetized for frame in self._queue)
 
     @property
     def awaiting_swap(self) -> bool:
-        """Whether the device has, or will have, all of a frame that it has not shown yet."""
+        """True if a frame is complete in packets and not displayed yet."""
         return any(frame.complete for frame in self._queue)
 
     # -- out
 
-    def resolve_difference(self, frame: OutgoingFrame, on_display: PictureId | None) -> None:
-        """Make a difference the whole frame if it cannot be sent as such.
+    def resolve_difference(self, frame: OutgoingFrame, displayed: PictureId | None) -> None:
+        """Replace a difference by the full frame if its base is not what the device displays.
 
         Parameters
         ----------
-        frame : QueuedFrame
+        frame : OutgoingFrame
             One whose turn has come.
-        on_display : OnDisplay or None
-            The picture on display; None while something is on its way that may change it.
+        displayed : PictureId or None
+            The displayed picture; None while packets are outstanding that may change it.
 
         """
-        fits = frame.base == on_display and frame is self._queue[0]
-        if frame.base is not None and not fits:
+        applies = frame.base == displayed and frame is self._queue[0]
+        if frame.base is not None and not applies:
             frame.payloads, frame.clear, frame.base = frame.full_payloads() or [b""], True, None
             frame.reset()
 
     def next_packet(self, frame: OutgoingFrame, seq: int) -> packets.Data:
-        """Give a frame's next packet; once that is in the window, `entered` is to be told."""
+        """Return a frame's next packet. Call `mark_packetized` when it is in the window."""
         if not frame.started:
             frame.frame_id = self._next_id
             self._next_id = (frame.frame_id + 1) % _MODULUS
@@ -210,14 +236,18 @@ class OutgoingFrames:
         return packets.Data(seq=seq, frame=frame.frame_id, flags=flags, ops=frame.next_payload)
 
     def mark_packetized(self, frame: OutgoingFrame) -> None:
-        """Note that a frame's next packet is in the window: it will arrive."""
+        """Record that a frame's next packet is in the window, which will deliver it."""
         frame.unsent_bytes -= len(frame.next_payload)
         frame.packetized += 1
 
     def take_shown(self, frame_id: int | None) -> int | None:
-        """Take out the frame of a number that is shown, and all before it; give its ticket.
+        """Remove the frame of a displayed frame id and all before it, and return its ticket.
 
-        None if there is no such frame, or it is not complete: then the number is an older frame's.
+        Returns
+        -------
+        int or None
+            None if there is no such complete frame: then the id is that of an older one.
+
         """
         if not any(frame.complete and frame.frame_id == frame_id for frame in self._queue):
             return None
@@ -226,7 +256,7 @@ class OutgoingFrames:
         return frame.ticket
 
     def reset(self) -> None:
-        """Begin a session: all frames are to be sent again, from their beginnings."""
+        """Have all frames sent again from their beginnings, in a new session."""
         self._next_id = 0
         for frame in self._queue:
             frame.reset()

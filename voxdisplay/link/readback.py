@@ -1,7 +1,6 @@
-"""What has been asked of the device's memory and has not come yet (section 10).
+"""Outstanding READ requests and their PAGE answers (protocol.md, section 10).
 
-Knows packets only as tags and ordinals; what the pixels mean, and when a READ may go out, is the
-business of others.
+Must not know the meaning of pixels, nor credit: packets are tags and ordinals here.
 """
 
 from __future__ import annotations
@@ -14,28 +13,41 @@ from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
-MAX_IN_FLIGHT = 64  # far fewer than there are tags: none comes round before its answer
+MAX_IN_FLIGHT = 64  # far below the number of tags, so that none is used again before its answer
 
 
 @dataclass(slots=True, eq=False)
 class ReadRequest:
-    """A READ that waits for its PAGE."""
+    """READ that waits for its PAGE.
+
+    Attributes
+    ----------
+    start, count : int
+        Range of voxels.
+    back : bool
+        The back page instead of the front page.
+    tag : int
+        Of its latest transmission.
+    ordinal : int
+        Of that; 0 while it is not in flight.
+
+    """
 
     start: int
     count: int
     back: bool
     tag: int = -1
-    ordinal: int = 0  # 0: to be sent
+    ordinal: int = 0
 
     def packet(self, tag: int) -> packets.Read:
-        """Give the READ, under a tag."""
+        """Return the READ packet with a tag, which is remembered."""
         self.tag = tag
         flags = spec.READ_FLAG_BACK * self.back
         return packets.Read(seq=tag, flags=flags, start=self.start, count=self.count)
 
 
 class ReadRequests:
-    """The requests of one link, the oldest first."""
+    """Read requests of one link, the oldest first."""
 
     def __init__(self) -> None:
         self._requests: list[ReadRequest] = []
@@ -44,31 +56,31 @@ class ReadRequests:
         return len(self._requests)
 
     def add(self, start: int, count: int, *, back: bool) -> None:
-        """Want pixels."""
+        """Request a range of voxels."""
         self._requests.append(ReadRequest(start, count, back))
 
     def clear(self) -> None:
-        """Want nothing any more."""
+        """Cancel all requests."""
         self._requests.clear()
 
     @property
     def sendable(self) -> Iterator[ReadRequest]:
-        """Requests that are not on their way, and may be."""
+        """Requests that may be sent now."""
         unsent = (request for request in self._requests if not request.ordinal)
         return islice(unsent, max(0, MAX_IN_FLIGHT - self.in_flight))
 
     @property
     def in_flight(self) -> int:
-        """How many have been sent, and wait for an answer."""
+        """Number of requests that were sent and wait for an answer."""
         return sum(request.ordinal > 0 for request in self._requests)
 
     def mark_lost(self, taken: int) -> None:
-        """Send those again whose PAGE did not come before the answer to something later.
+        """Have those sent again that were sent before ordinal ``taken`` and are not answered.
 
         Parameters
         ----------
         taken : int
-            The newest ordinal that the device has taken.
+            The highest ordinal that the device has taken.
 
         """
         for request in self._requests:
@@ -76,17 +88,17 @@ class ReadRequests:
                 request.ordinal = 0
 
     def reset(self) -> None:
-        """Begin a session: all are to be sent again."""
+        """Have all requests sent again, in a new session."""
         for request in self._requests:
             request.ordinal = 0
 
     def take_answered(self, page: packets.Page) -> bool:
-        """Take out what a PAGE answers; tell whether that was anything.
+        """Remove the request that a PAGE answers; return whether there was one.
 
         Raises
         ------
         RemoteProtocolError
-            If the page brings other pixels than were asked for.
+            If the page has other voxels than were requested.
 
         """
         request = next((r for r in self._requests if r.ordinal and r.tag == page.seq), None)
@@ -95,7 +107,7 @@ class ReadRequests:
         if page.start != request.start or not 1 <= page.count <= request.count:
             raise RemoteProtocolError(
                 f"PAGE covers {page.count} voxels from {page.start}; "
-                f"asked were {request.count} from {request.start}",
+                f"requested were {request.count} from {request.start}",
                 section="10",
                 offset=4,
             )

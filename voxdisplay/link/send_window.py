@@ -1,9 +1,8 @@
-"""Which packets are on their way, which are lost, and how many bytes may follow.
+"""Selective-repeat send window with credit (protocol.md, sections 9.1 to 9.3).
 
-This is sections 9.1 to 9.3 of protocol.md.
-Everything that is sent gets an *ordinal*. The pipe keeps order, so once the device has taken
-something, all that was sent before and has not been received is lost: a fact, not a guess. Knows
-packets only as sequence numbers and sizes; knows no frames and no clock.
+Every transmission gets an *ordinal*. The pipe keeps order, so once the device has taken one, all
+earlier ones that it has not received are known to be lost; no timeout guesses it. Must not know
+frames or a clock: packets are sequence numbers and sizes here.
 """
 
 from __future__ import annotations
@@ -19,100 +18,141 @@ _MODULUS = 256
 
 @dataclass(slots=True)
 class OutstandingPacket:
-    """A DATA packet that the device has not received yet, as far as we know."""
+    """DATA packet that has been sent and not acknowledged: in flight, or lost.
+
+    Attributes
+    ----------
+    wire : bytes
+    ordinal : int
+        Of its latest transmission.
+    sent_s : float
+        Time of its latest transmission.
+    transmission_count : int
+    lost : bool
+    delivered_before : int
+        Bytes that the line had delivered when it was sent last.
+
+    """
 
     wire: bytes
     ordinal: int = 0
     sent_s: float = 0.0
     transmission_count: int = 0
     lost: bool = False
-    delivered_before: int = 0  # bytes that had arrived when it was sent
+    delivered_before: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class _Transmission:
-    """When something was sent, and where in the stream of bytes it ended."""
+    """One transmission: its ordinal, and the offset of its end in the stream of bytes."""
 
     ordinal: int
     end: int
 
 
 class SendWindow:
-    """The sliding window over one session's DATA packets, and its credit."""
+    """Sliding window over the DATA packets of one session, and the credit of that session.
+
+    Parameters
+    ----------
+    credit : int
+        Bytes that the device has room for at first.
+
+    Attributes
+    ----------
+    next_seq : int
+        Sequence number of the next new packet.
+    outstanding : dict of int to OutstandingPacket
+        By sequence number.
+    in_flight : tuple of int
+        Number and bytes of the packets that are outstanding and not lost. Kept up to date rather
+        than counted, because it is read for each packet.
+    taken : int
+        Highest ordinal that the device is known to have taken.
+
+    """
 
     def __init__(self, credit: int) -> None:
         self.next_seq = 0
         self.outstanding: dict[int, OutstandingPacket] = {}
-        self._base = 0  # the lowest number not received
-        self._ordinal = 0
-        self._position = 0
-        self._credit_end = credit  # absolute: bytes of the stream up to here fit
-        self._lost_count = 0  # how many of the flights are
-        # How many are not, and their bytes: asked for with each packet, so not counted anew.
         self.in_flight = (0, 0)
-        self.taken = 0  # the newest ordinal that the device has taken
-        self._data_taken = 0  # and of DATA
-        self._data_transmissions: dict[int, list[_Transmission]] = {}  # of each transmission
+        self.taken = 0
+        self._base = 0  # the lowest sequence number not received
+        self._ordinal = 0
+        self._stream_bytes = 0  # sent in this session
+        self._credit_end = credit  # offset in that stream up to which the device has room
+        self._lost_count = 0
+        self._data_taken = 0  # the highest ordinal of a DATA that the device has taken
+        self._data_transmissions: dict[int, list[_Transmission]] = {}  # by sequence number
         self._tagged_transmissions: dict[int, _Transmission] = {}
 
     @property
     def has_room(self) -> bool:
-        """Whether another sequence number fits the window."""
+        """True if another sequence number fits the window."""
         return (self.next_seq - self._base) % _MODULUS < spec.LIMIT_WINDOW
 
     def has_credit(self, size: int) -> bool:
-        """Tell whether credit allows another ``size`` bytes of DATA or READ.
+        """Return whether credit allows another ``size`` bytes of DATA or READ.
 
-        Four STATUS packets, and there are never more without answer, always fit the reserve.
+        STATUS needs no such question: the at most four outstanding ones fit the reserve.
         """
-        return self._position + size <= self._credit_end - spec.LIMIT_RESERVE
+        return self._stream_bytes + size <= self._credit_end - spec.LIMIT_RESERVE
 
     def first_lost(self) -> int | None:
-        """Give the oldest packet that is known to be lost, or None."""
+        """Return the sequence number of the oldest lost packet, or None."""
         if not self._lost_count:
             return None
         order = sorted(self.outstanding, key=lambda seq: (seq - self._base) % _MODULUS)
         return next((seq for seq in order if self.outstanding[seq].lost), None)
 
     def add(self, wire: bytes) -> int:
-        """Enter a new packet; give its sequence number's flight to `send` next."""
+        """Add a new packet and return its sequence number, which is to be passed to `send`."""
         seq = self.next_seq
         self.outstanding[seq] = OutstandingPacket(wire)
         self.next_seq = (seq + 1) % _MODULUS
         return seq
 
     def send(self, seq: int, now: float, delivered: int = 0) -> bytes:
-        """Note that a packet goes out now, when so much had arrived; give its bytes."""
-        flight = self.outstanding[seq]
-        count, bytes_ = self.in_flight
-        self.in_flight = count + 1, bytes_ + len(flight.wire)
-        self._lost_count -= flight.lost
-        flight.delivered_before = delivered
-        mark = self._transmit(len(flight.wire))
-        if not flight.transmission_count:
-            self._data_transmissions[seq] = []  # the number has come round again
-        self._data_transmissions[seq].append(mark)
-        flight.ordinal, flight.sent_s, flight.lost = mark.ordinal, now, False
-        flight.transmission_count += 1
-        return flight.wire
+        """Record a transmission of an outstanding packet and return its bytes.
+
+        Parameters
+        ----------
+        seq : int
+        now : float
+        delivered : int
+            Bytes that the line has delivered so far.
+
+        """
+        packet = self.outstanding[seq]
+        count, size = self.in_flight
+        self.in_flight = count + 1, size + len(packet.wire)
+        self._lost_count -= packet.lost
+        packet.delivered_before = delivered
+        transmission = self._transmit(len(packet.wire))
+        if not packet.transmission_count:
+            self._data_transmissions[seq] = []  # those of an earlier packet of this number
+        self._data_transmissions[seq].append(transmission)
+        packet.ordinal, packet.sent_s, packet.lost = transmission.ordinal, now, False
+        packet.transmission_count += 1
+        return packet.wire
 
     def send_tagged(self, tag: int, size: int) -> int:
-        """Note that a STATUS or READ goes out now; give its ordinal."""
-        self._tagged_transmissions[tag] = mark = self._transmit(size)
-        return mark.ordinal
+        """Record a transmission of a STATUS or READ and return its ordinal."""
+        self._tagged_transmissions[tag] = transmission = self._transmit(size)
+        return transmission.ordinal
 
     def _transmit(self, size: int) -> _Transmission:
         self._ordinal += 1
-        self._position += size
-        return _Transmission(self._ordinal, self._position)
+        self._stream_bytes += size
+        return _Transmission(self._ordinal, self._stream_bytes)
 
     def acknowledge(self, ack: Ack) -> list[OutstandingPacket]:
-        """Take an ACK; give the packets that it reports as received.
+        """Apply an ACK and return the packets that it newly reports as received.
 
         Raises
         ------
         RemoteProtocolError
-            If it reports as received what was never sent.
+            If it reports a packet that was never sent.
 
         """
         if (ack.next - self._base) % _MODULUS > (self.next_seq - self._base) % _MODULUS:
@@ -124,32 +164,32 @@ class SendWindow:
         received = [seq for seq in self.outstanding if self._is_received(seq, ack)]
         done = [self.outstanding.pop(seq) for seq in received]
         self._base = ack.next
-        if mark := self._transmission_of_last(ack):
-            self._credit_end = max(self._credit_end, mark.end + ack.credit)
-            self.taken = max(self.taken, mark.ordinal)
-            for flight in self.outstanding.values():
-                flight.lost = flight.lost or flight.ordinal <= self.taken
-        sizes = [len(flight.wire) for flight in self.outstanding.values() if not flight.lost]
+        if last := self._transmission_of_last(ack):
+            self._credit_end = max(self._credit_end, last.end + ack.credit)
+            self.taken = max(self.taken, last.ordinal)
+            for packet in self.outstanding.values():
+                packet.lost = packet.lost or packet.ordinal <= self.taken
+        sizes = [len(packet.wire) for packet in self.outstanding.values() if not packet.lost]
         self.in_flight = len(sizes), sum(sizes)
         self._lost_count = len(self.outstanding) - len(sizes)
         return done
 
     def _transmission_of_last(self, ack: Ack) -> _Transmission | None:
-        """Give what ``last`` names, or what was sent before it at the latest.
+        """Return the transmission that ``last`` of an ACK refers to, or the earliest it may be.
 
-        A packet that was taken but dropped (section 6, point 6) and has been sent again has more
-        than one transmission, and an ACK for damage repeats the ``last`` before.
+        A packet that was taken but dropped (section 6, point 6) and has been sent again has several
+        transmissions, and an ACK for damage repeats the ``last`` of the ACK before.
         """
         if ack.flags & spec.ACK_FLAG_ASKED:
             return self._tagged_transmissions.get(ack.last)
-        marks = self._data_transmissions.get(ack.last, [])
+        sent = self._data_transmissions.get(ack.last, [])
         if ack.last in self.outstanding:
-            named = next((mark for mark in marks if mark.ordinal >= self._data_taken), None)
-        else:  # received: it is not sent again after that
-            named = marks[-1] if marks else None
-        if named:
-            self._data_taken = max(self._data_taken, named.ordinal)
-        return named
+            found = next((each for each in sent if each.ordinal >= self._data_taken), None)
+        else:  # received, and after that it is not sent again
+            found = sent[-1] if sent else None
+        if found:
+            self._data_taken = max(self._data_taken, found.ordinal)
+        return found
 
     def _is_received(self, seq: int, ack: Ack) -> bool:
         ahead = (seq - ack.next) % _MODULUS

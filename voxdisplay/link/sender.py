@@ -1,7 +1,7 @@
-"""What goes out next, and when no more may: window, credit and pace of one session together.
+"""Packet scheduler of one link: retransmissions, new DATA, READ, within window, credit and rate.
 
-Knows packets only as bytes with a number or a tag, and a clock only as the ``now`` it is told.
-What the device has said of itself, and how long it has said nothing, is the business of others.
+Must not know INFO, sessions' numbers or silence: packets are bytes with a sequence number or a tag
+here, and the time is an argument.
 """
 
 from __future__ import annotations
@@ -24,15 +24,26 @@ _MODULUS = 256
 
 
 class Sender:
-    """The packets of one link.
+    """Scheduler of the packets of one link.
 
     Parameters
     ----------
-    frames : Frames
-    reads : Reads
-        What there is to be sent.
+    frames : OutgoingFrames
+    reads : ReadRequests
+        What is to be sent.
     counters : LinkCounters
-        Where it is counted.
+        Updated with each packet.
+
+    Attributes
+    ----------
+    loss_rate : LossRate
+    delivery_rate : DeliveryRate
+    has_more : bool
+        Whether the last burst ended at its size, so that another may follow at once.
+    out_of_credit : bool
+        Whether something is to be sent that credit does not allow.
+    all_in_flight_damaged : bool
+        Whether the last ACK reported damage of all that was in flight, so that no other will come.
 
     """
 
@@ -43,22 +54,20 @@ class Sender:
         self._window = SendWindow(0)
         self.loss_rate = LossRate()
         self.delivery_rate = DeliveryRate()
-        self.has_more = False  # there may be more to be sent at once
-        self.out_of_credit = False  # something is to be sent, and there is no credit for it
-        self.all_in_flight_damaged = (
-            False  # all that was on its way at the last ACK: no answer comes of it
-        )
+        self.has_more = False
+        self.out_of_credit = False
+        self.all_in_flight_damaged = False
         self._tag = 0
-        self._damaged_since_taken = 0  # damaged since the device has last taken anything
+        self._damaged_since_taken = 0  # reported since the device last took anything
 
     # -- the session
 
     def open_session(self, credit: int) -> None:
-        """Begin a session with a device that has room for so many bytes."""
+        """Start a session with a device that has room for ``credit`` bytes."""
         self._window = SendWindow(credit)
 
     def close_session(self) -> None:
-        """End the session: all that is not over is to be sent again in the next."""
+        """End the session: what is not finished is sent again in the next."""
         self._window = SendWindow(0)
         self.loss_rate.reset_damage_count()
         self.out_of_credit = False
@@ -67,15 +76,15 @@ class Sender:
         self._reads.reset()
 
     def reset_delivery_rate(self) -> None:
-        """Forget how fast the line was: it may be another."""
+        """Discard the measured delivery rate: the line may be another."""
         self.delivery_rate = DeliveryRate()
 
     # -- out
 
-    def outgoing(self, now: float, on_display: PictureId) -> Iterator[bytes]:
-        """Give what window and credit allow: what is lost comes first, as all waits for it.
+    def outgoing(self, now: float, displayed: PictureId) -> Iterator[bytes]:
+        """Yield the packets that may be sent now, lost ones first because the window needs them.
 
-        Of much it gives a portion, so that the device is at work while the next one is made.
+        It ends after `BURST_BYTES`, so that the device can work while the next burst is made.
 
         Raises
         ------
@@ -87,7 +96,7 @@ class Sender:
         size = 0
         for part in (
             self._retransmissions(now),
-            self._new_packets(now, on_display),
+            self._new_packets(now, displayed),
             self._read_packets(),
         ):
             for wire in part:
@@ -100,7 +109,7 @@ class Sender:
                 return
 
     def status(self) -> tuple[int, bytes]:
-        """Give a STATUS, which always fits the reserve, and its tag."""
+        """Return a STATUS, which always fits the reserve of the credit: its tag and its bytes."""
         self._tag = (self._tag + 1) % _MODULUS
         wire = packets.encode(packets.Status(seq=self._tag))
         self._window.send_tagged(self._tag, len(wire))
@@ -108,22 +117,23 @@ class Sender:
 
     def _retransmissions(self, now: float) -> Iterator[bytes]:
         while (seq := self._window.first_lost()) is not None:
-            flight = self._window.outstanding[seq]
-            if flight.transmission_count >= MAX_TRANSMISSIONS:
+            packet = self._window.outstanding[seq]
+            if packet.transmission_count >= MAX_TRANSMISSIONS:
                 raise TransportTimeout(
-                    f"packet {seq} did not arrive in {flight.transmission_count} tries; the device "
+                    f"packet {seq} did not arrive in {packet.transmission_count} tries; the device "
                     f"counts {self._counters.device_damaged} damaged packets",
-                    hint="the line is too noisy: lower the baud rate, or look at cable and ground",
+                    hint="the line is too noisy: lower the baud rate, or check cable and ground",
                 )
-            if self._exceeds_flight_limit(len(flight.wire)) or self._lacks_credit(len(flight.wire)):
+            size = len(packet.wire)
+            if self._exceeds_flight_limit(size) or self._lacks_credit(size):
                 return
             self._counters.retransmitted += 1
             yield self._send(seq, now)
 
-    def _new_packets(self, now: float, on_display: PictureId) -> Iterator[bytes]:
+    def _new_packets(self, now: float, displayed: PictureId) -> Iterator[bytes]:
         for frame in self._frames:
             if not frame.started:
-                self._frames.resolve_difference(frame, None if self.outstanding else on_display)
+                self._frames.resolve_difference(frame, None if self.outstanding else displayed)
             while frame.sendable:
                 size = packets.max_wire_bytes(len(frame.next_payload) + spec.LIMIT_OVERHEAD)
                 if (
@@ -133,12 +143,12 @@ class Sender:
                 ):
                     return
                 self._counters.packets += 1
-                # In this order: an interrupt leaves no payload out.
+                # In this order, an interrupt skips no payload.
                 data = self._frames.next_packet(frame, self._window.next_seq)
                 seq = self._window.add(packets.encode(data))
                 self._frames.mark_packetized(frame)
                 yield self._send(seq, now)
-            if frame.open:  # those behind it wait for its last
+            if frame.open:  # later frames wait for its last payload
                 return
 
     def _read_packets(self) -> Iterator[bytes]:
@@ -157,9 +167,9 @@ class Sender:
         return wire
 
     def _exceeds_flight_limit(self, size: int) -> bool:
-        """Tell whether enough is on its way: its answers come by themselves."""
-        count, bytes_ = self._window.in_flight
-        return count > 0 and not self.delivery_rate.allows(count + 1, bytes_ + size)
+        """Return whether a packet must wait for the ACKs of those in flight."""
+        count, in_flight_bytes = self._window.in_flight
+        return count > 0 and not self.delivery_rate.allows(count + 1, in_flight_bytes + size)
 
     def _lacks_credit(self, size: int) -> bool:
         self.out_of_credit = not self._window.has_credit(size)
@@ -169,46 +179,56 @@ class Sender:
 
     @property
     def outstanding(self) -> int:
-        """How many packets of frames are not received yet, as far as is known."""
+        """Number of DATA packets sent and not acknowledged, lost ones included."""
         return len(self._window.outstanding)
 
     @property
     def in_flight(self) -> int:
-        """How many packets are neither received nor lost: their answers are to come."""
+        """Number of DATA and READ packets whose answers are still to come."""
         count, _ = self._window.in_flight
         return count + self._reads.in_flight
 
     @property
+    def in_flight_bytes(self) -> int:
+        """Bytes of the DATA packets in flight."""
+        return self._window.in_flight[1]
+
+    @property
     def window_stalled(self) -> bool:
-        """Whether all waits for one or two packets, so that without their answer no other came."""
+        """True if the window is full and at most two packets are in flight.
+
+        Should their answer be lost, no other would come.
+        """
         count, _ = self._window.in_flight
         return 0 < count <= MIN_PACKETS and not (self.has_more or self._window.has_room)
 
     def acknowledge(self, ack: packets.Ack, now: float) -> float | None:
-        """Take an ACK; give how long ago the newest that it reports as received was sent.
+        """Apply an ACK and return the round-trip time of the newest packet that it acknowledges.
 
-        None if it reports nothing new.
+        Returns
+        -------
+        float or None
+            Seconds; None if it acknowledges nothing new.
 
         Raises
         ------
         RemoteProtocolError
-            If it reports as received what was never sent.
+            If it reports a packet that was never sent.
 
         """
         taken = self._window.taken
         done = self._window.acknowledge(ack)
-        for flight in done:
+        for packet in done:
             self.delivery_rate.sample(
-                len(flight.wire), flight.delivered_before, now - flight.sent_s
+                len(packet.wire), packet.delivered_before, now - packet.sent_s
             )
         self._reads.mark_lost(self._window.taken)
-        self._note_damage(ack.damaged, moved=self._window.taken > taken)
+        self._count_damage(ack.damaged, progress=self._window.taken > taken)
         return now - done[-1].sent_s if done else None
 
-    def _note_damage(self, count: int, *, moved: bool) -> None:
-        damaged = self.loss_rate.count_damage(count)
+    def _count_damage(self, counter: int, *, progress: bool) -> None:
+        damaged = self.loss_rate.count_damage(counter)
         self._counters.device_damaged += damaged
-        self._damaged_since_taken = (
-            0 if moved else self._damaged_since_taken + damaged
-        )  # before what was taken: explained
+        # Damage before something that was taken is accounted for: those packets are lost.
+        self._damaged_since_taken = 0 if progress else self._damaged_since_taken + damaged
         self.all_in_flight_damaged = damaged > 0 and self._damaged_since_taken >= self.in_flight

@@ -53,8 +53,8 @@ def test_hellos_that_may_still_be_in_the_buffer_cost_credit():
         (b"login: ", "no packet: b'login: '", "baud rate"),
         (b"login\0\0", "no packet: b'login'", "baud rate"),
         (bytes(3000), "only zeros came, 3000 of them", "held low"),
-        (packets.encode(ack()), "packets came, but none that answers", "another program"),
-        (document.on_wire(b"\xf0\0\0\0"), "packets came, but none", "another program"),
+        (packets.encode(ack()), "1 valid packet came, but no INFO", "another program"),
+        (document.on_wire(b"\xf0\0\0\0"), "1 valid packet came", "another program"),
     ],
 )
 def test_a_hello_that_nobody_answers(came, said, hint):
@@ -65,6 +65,46 @@ def test_a_hello_that_nobody_answers(came, said, hint):
         link.transmit(1.0)
     assert said in str(caught.value)
     assert hint in caught.value.hint
+
+
+def timeout_after(came):
+    link = Link(SESSION, 0.0, timeout_s=1)
+    link.receive(came, 0.5)
+    link.transmit(0.9)
+    with pytest.raises(TransportTimeout) as caught:
+        link.transmit(1.0)
+    return str(caught.value), caught.value.hint
+
+
+WHOLE_INFO = packets.encode(dataclasses.replace(INFO, name="cube", serial="A1"))
+
+
+@pytest.mark.parametrize("before", [b"", b"boot 1.2\r\n\0", bytes(40)])
+@pytest.mark.parametrize("count", [3, 4, 7, 12, len(WHOLE_INFO) - 1])
+def test_a_device_that_stops_in_the_middle_of_its_info(before, count):
+    message, hint = timeout_after(before + WHOLE_INFO[:count])
+    assert f"an incomplete INFO, of which {count} bytes came" in message
+    assert "nothing answered" not in message
+    assert "stopped in the middle" in hint
+
+
+def test_a_device_that_stops_in_the_middle_of_its_info_after_each_hello():
+    message, _ = timeout_after(WHOLE_INFO[:17] * 4)
+    assert "an incomplete INFO, of which 17 bytes came" in message
+    message, _ = timeout_after((WHOLE_INFO[:17] + b"\0") * 4)
+    assert "an INFO that is incomplete or damaged, of which 17 bytes came" in message
+
+
+def test_the_info_of_another_session_is_no_incomplete_one_of_ours():
+    other = packets.encode(dataclasses.replace(INFO, session=SESSION ^ 0x0101))
+    assert "no packet" in timeout_after(other[:20])[0]
+
+
+def test_a_line_that_echoes():
+    """RX and TX connected, or a terminal with echo: what comes are our own packets."""
+    message, hint = timeout_after(Link(SESSION, 0.0).transmit(0.0) * 2)
+    assert "the HELLO itself" in message
+    assert "RX and TX" in hint
 
 
 def test_before_a_session_all_but_info_is_dropped():

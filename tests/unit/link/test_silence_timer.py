@@ -42,7 +42,7 @@ def test_a_device_that_answers_nothing_but_hello_is_as_good_as_silent():
             now += max(link.next_timeout(now) or 0.0, 0.001)
 
     with pytest.raises(
-        TransportTimeout, match=r"answers HELLO, and has said nothing else for 5\.0 s"
+        TransportTimeout, match=r"answers HELLO, and has sent nothing else for 5\.0 s"
     ):
         answer_hello()
     assert hellos
