@@ -18,9 +18,9 @@ from space_curves import Function
 import voxdisplay as vd
 from voxdisplay.compute import kernel_backend
 from voxdisplay.curves import Bezier, Curve
-from voxdisplay.voxelization.index_ranges import insert
-from voxdisplay.voxelization.thinning import reduce
-from voxdisplay.voxelization.voxel_events import Events
+from voxdisplay.voxelization.index_ranges import insert_columns
+from voxdisplay.voxelization.thinning import thin_events
+from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 pytest.importorskip("numba")
 
@@ -84,16 +84,16 @@ def test_thinning_walks_that_repeat_and_leap(seed: int, tips: bool) -> None:
     rng = np.random.default_rng(seed)
     steps = rng.integers(-1, 2, (3, 500)) * rng.choice([1, 1, 1, 1, 1, 4], 500)
     steps[:, rng.random(500) < 0.3] = (np.arange(3) == 0)[:, None]  # straight, for a while
-    events = Events(
+    events = VoxelEvents(
         np.sort(rng.integers(0, 4, 500)).astype(np.int32),
         np.sort(rng.uniform(0, 1, 500)),
         np.cumsum(steps, axis=1).astype(np.int32),
         rng.choice([-1, 0, 0, 0, 0, 0, 0, 2], 500).astype(np.int8),
     )
     with kernels(False):
-        plain = reduce(events, tips=tips)
+        plain = thin_events(events, keep_tips=tips)
     with kernels(True):
-        fast = reduce(events, tips=tips)
+        fast = thin_events(events, keep_tips=tips)
     for name in ("piece", "t", "voxels", "heading"):
         assert np.array_equal(getattr(plain, name), getattr(fast, name))
 
@@ -104,7 +104,7 @@ def test_insertion(at: list[int]) -> None:
     fresh = -np.arange(3.0 * len(at)).reshape(3, -1)
     for choice in (False, True):
         with kernels(choice):
-            merged, line = insert(where, (rows, rows[0]), (fresh, fresh[0]))
+            merged, line = insert_columns(where, (rows, rows[0]), (fresh, fresh[0]))
         assert np.array_equal(merged, np.insert(rows, where, fresh, axis=1))
         assert np.array_equal(line, merged[0])
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from voxdisplay.voxelization.index_ranges import blocks, insert, spread
-from voxdisplay.voxelization.thinning import WINDOW, furthest
+from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns, split_blocks
+from voxdisplay.voxelization.thinning import WINDOW, furthest_shortcuts
 
 LENGTHS = st.lists(st.integers(1, 40), min_size=1, max_size=12)
 UNIT = st.integers(-1, 1)
@@ -19,7 +19,7 @@ STEPS = st.lists(st.tuples(UNIT, UNIT, st.just(0)), min_size=8, max_size=40) | s
 def test_blocks_cut_where_curves_begin_or_in_long_ones(lengths: list[int], size: int) -> None:
     ends = np.cumsum(lengths)
     starts, stop = ends - lengths, int(ends[-1])
-    found = list(blocks(starts, stop, size))
+    found = list(split_blocks(starts, stop, size))
     assert [low for low, _ in found] + [stop] == [0] + [high for _, high in found]
     for low, high in found:
         assert high - low <= size
@@ -36,8 +36,8 @@ def test_blocks_cut_where_curves_begin_or_in_long_ones(lengths: list[int], size:
 def test_a_curve_is_cut_in_the_same_places_whatever_comes_before_it(lengths: list[int]) -> None:
     own, before = 45, int(np.sum(lengths))
     starts = np.append(np.cumsum(lengths) - lengths, before)
-    alone = [high for _, high in blocks(np.array([0]), own, 10)]
-    cuts = [high - before for _, high in blocks(starts, before + own, 10)]
+    alone = [high for _, high in split_blocks(np.array([0]), own, 10)]
+    cuts = [high - before for _, high in split_blocks(starts, before + own, 10)]
     assert [cut for cut in cuts if cut > 0] == alone
 
 
@@ -45,7 +45,7 @@ def test_a_curve_is_cut_in_the_same_places_whatever_comes_before_it(lengths: lis
 def test_ranges_are_written_out(ranges: list[tuple[int, int]]) -> None:
     low, count = np.array(ranges, dtype=np.int64).reshape(-1, 2).T
     expected = [i for begin, n in ranges for i in range(begin, begin + n)]
-    assert spread(low, count).tolist() == expected
+    assert expand_ranges(low, count).tolist() == expected
 
 
 @given(st.lists(st.integers(0, 6), max_size=9).map(sorted))
@@ -53,7 +53,7 @@ def test_columns_are_put_before_others(places: list[int]) -> None:
     at, line = np.array(places, dtype=np.int64), np.arange(6)
     rows = np.arange(18).reshape(3, 6)
     fresh = -1 - np.arange(at.size), -1 - np.arange(3 * at.size).reshape(3, -1)
-    one, three = insert(at, (line, rows), fresh)
+    one, three = insert_columns(at, (line, rows), fresh)
     assert one.tolist() == np.insert(line, at, fresh[0]).tolist()
     assert three.tolist() == np.insert(rows, at, fresh[1], axis=1).tolist()
 
@@ -83,4 +83,4 @@ def test_a_short_cut_goes_as_far_as_can_be(
         max([w for w in range(2, WINDOW + 1) if i + w < size and leads(i, i + w)], default=1)
         for i in range(size)
     ]
-    assert furthest(voxels, stretch).tolist() == expected
+    assert furthest_shortcuts(voxels, stretch).tolist() == expected

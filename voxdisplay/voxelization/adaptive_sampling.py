@@ -15,48 +15,52 @@ from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.curves.curve import NO_BREAKS
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.curve_batch import AXES, Batch, Samples
+from voxdisplay.voxelization.curve_batch import AXES, CurveBatch, Samples
 
 # More than this is no picture on a display (256^3 has 17 million voxels in all) but a mistake.
-MOST_VOXELS = 10_000_000
-MOST_SAMPLES = 4_000_000
+MAX_VOXELS = 10_000_000
+MAX_SAMPLES = 4_000_000
 # A knot interval may be this long (voxels, along its longest axis) and bend this far off its
 # chord (voxels). No guarantee rests on these: they only decide how small a feature is seen.
-CHORD = 3.0
-BEND = 0.05
+MAX_CHORD = 3.0
+MAX_SAG = 0.05
 # Into how many parts an interval is cut at once, at most.
-PARTS = 16
+MAX_PARTS = 16
 # What has to be cut is cut so much finer than it looks to need: parts that just fail would take
 # one more look at everything, which takes longer than a few more knots.
-AMPLY = 1.3
+OVERSPLIT = 1.3
 # A step wider than this between neighbouring parameters is a jump; a narrower one cannot be told
 # from a step between adjacent voxels.
-JUMP = 1.0
+MIN_JUMP = 1.0
 
 # The first look at a curve: so many steps. A polynomial turns so rarely that fewer show it.
-LOOK = 64
-LOOK_PER_COEFFICIENT = 4
+INITIAL_STEPS = 64
+INITIAL_STEPS_PER_COEFFICIENT = 4
 
 
 @cache
-def _look(degree: int | None) -> Floats:
+def _initial_shares(degree: int | None) -> Floats:
     """Give the parameters of the first look, as shares of the range.
 
     They are spread evenly but for a jitter (multiples of the golden ratio, modulo 1), so that no
     oscillation can hide between them by having their period.
     """
-    steps = LOOK if degree is None else min(LOOK_PER_COEFFICIENT * (degree + 1), LOOK)
+    steps = (
+        INITIAL_STEPS
+        if degree is None
+        else min(INITIAL_STEPS_PER_COEFFICIENT * (degree + 1), INITIAL_STEPS)
+    )
     look = np.linspace(0.0, 1.0, steps + 1)
     look[1:-1] += (np.arange(1, steps) * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6 / steps
     return look
 
 
-def knots(batch: Batch) -> Samples:
+def sample_adaptively(batch: CurveBatch) -> Samples:
     """Sample curves finely enough to see their features, and cut them at their jumps.
 
-    Steps are split until none is longer than ``CHORD`` or bends more than ``BEND``; the bend
+    Steps are split until none is longer than ``MAX_CHORD`` or bends more than ``MAX_SAG``; the bend
     h^2 |P''| / 8 is taken from second divided differences. A step that is still wider than
-    ``JUMP`` where parameters cannot be told apart any more is a jump.
+    ``MIN_JUMP`` where parameters cannot be told apart any more is a jump.
 
     Parameters
     ----------
@@ -74,60 +78,62 @@ def knots(batch: Batch) -> Samples:
         If a curve runs off, does not settle, or would need too many voxels.
 
     """
-    return cut_at_jumps(batch, settle(batch, first_look(batch)))
+    return split_at_jumps(batch, refine_samples(batch, initial_samples(batch)))
 
 
-def settle(batch: Batch, samples: Samples) -> Samples:
+def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
     """Split steps of samples, one piece for each curve, as far as `knots` says."""
     while True:
-        parts, chord = needed_parts(samples, batch.resolution)
+        parts, chord = subdivision_counts(samples, batch.resolution)
         if not (parts > 1).any():
             return samples
-        _check_size(batch, samples, parts, chord)
-        samples = batch.split(samples, parts)
+        _check_limits(batch, samples, parts, chord)
+        samples = batch.subdivide(samples, parts)
 
 
 @np.errstate(all="ignore")  # between pieces, a step has no meaning and may be of any size
-def refine(batch: Batch, samples: Samples, longest: float) -> Samples:
+def limit_chords(batch: CurveBatch, samples: Samples, longest: float) -> Samples:
     """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
     while True:
         chord = np.abs(samples.points[:, 1:] - samples.points[:, :-1]).max(axis=0)
         curve = samples.curve[samples.piece[:-1]]
         possible = np.floor((samples.t[1:] - samples.t[:-1]) / batch.resolution[curve])
-        wanted = np.minimum(np.ceil(chord / longest), np.minimum(possible, PARTS))
+        wanted = np.minimum(np.ceil(chord / longest), np.minimum(possible, MAX_PARTS))
         parts = np.maximum(wanted, 1).astype(np.int64)
         parts[~samples.joined] = 1
         if not (parts > 1).any():
             return samples
         count = np.bincount(curve, parts * samples.joined, len(batch.curves))
-        if (count > MOST_SAMPLES).any():
-            raise _too_rough(batch, int(np.argmax(count)))
-        samples = batch.split(samples, parts)
+        if (count > MAX_SAMPLES).any():
+            raise _roughness_error(batch, int(np.argmax(count)))
+        samples = batch.subdivide(samples, parts)
 
 
-def first_look(batch: Batch) -> Samples:
+def initial_samples(batch: CurveBatch) -> Samples:
     """Sample curves, one piece for each, before anything is known of them."""
     degrees = batch.degrees
     index = np.arange(len(degrees))
     if degrees.count(degrees[0]) == len(degrees):  # as most often, and it takes half the time
-        look = np.tile(_look(degrees[0]), len(degrees))
+        look = np.tile(_initial_shares(degrees[0]), len(degrees))
         piece = index.repeat(look.size // len(degrees))
     else:
-        looks = list(map(_look, degrees))
+        looks = list(map(_initial_shares, degrees))
         look = np.concatenate(looks)
         piece = index.repeat([each.size for each in looks])
     t = batch.first[piece] + (batch.last - batch.first)[piece] * look
     t[np.append(piece[1:] != piece[:-1], True)] = batch.last
     breaks = [curve.breaks for curve in batch.curves]
     if any(each.size for each in breaks if each is not NO_BREAKS):
-        piece, t = _with_breaks(batch, piece, t, breaks)
+        piece, t = _insert_breaks(batch, piece, t, breaks)
     fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
     if not fresh.all():  # a break was there, or a range has fewer parameters than it has looks
         piece, t = piece[fresh], t[fresh]
     return Samples(piece, t, batch.evaluate(piece, t), index)
 
 
-def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> tuple[Ints, Floats]:
+def _insert_breaks(
+    batch: CurveBatch, piece: Ints, t: Floats, breaks: list[Floats]
+) -> tuple[Ints, Floats]:
     """Put the parameters where curves may turn sharply between others."""
     of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
     turn = np.concatenate(breaks)
@@ -139,7 +145,7 @@ def _with_breaks(batch: Batch, piece: Ints, t: Floats, breaks: list[Floats]) -> 
 
 @with_kernel
 @np.errstate(all="ignore")
-def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     """Tell into how many parts each step should be cut, and how long it is in max norm."""
     joined = samples.joined
     h = np.where(joined, samples.t[1:] - samples.t[:-1], 1.0)
@@ -153,77 +159,78 @@ def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
     second[1:] = turn
     second[:-1] = np.maximum(second[:-1], turn)
     bend = h * h * second / 4
-    wanted = np.maximum(chord / CHORD, np.sqrt(bend / BEND))
+    wanted = np.maximum(chord / MAX_CHORD, np.sqrt(bend / MAX_SAG))
     parts = np.ones(h.size, dtype=np.int64)
     cut = (joined & (wanted > 1)).nonzero()[0]  # not where the bend is not a number
     if cut.size:
         # Parts must stay distinct parameters.
         possible = np.floor(h[cut] / resolution[samples.curve[samples.piece[cut]]])
-        ample = np.ceil(AMPLY * wanted[cut])
-        parts[cut] = np.maximum(np.minimum(np.minimum(ample, possible), PARTS), 1)
+        ample = np.ceil(OVERSPLIT * wanted[cut])
+        parts[cut] = np.maximum(np.minimum(np.minimum(ample, possible), MAX_PARTS), 1)
     return parts, chord
 
 
-def _check_size(batch: Batch, samples: Samples, parts: Ints, chord: Floats) -> None:
+def _check_limits(batch: CurveBatch, samples: Samples, parts: Ints, chord: Floats) -> None:
     """Stop before the work gets out of hand: ``parts`` is what comes next."""
-    if parts.sum() <= MOST_SAMPLES // 16 and chord.sum() <= MOST_VOXELS:
+    if parts.sum() <= MAX_SAMPLES // 16 and chord.sum() <= MAX_VOXELS:
         return
     starts = samples.bounds[:-1]
     length = np.add.reduceat(chord, starts)
     count = np.add.reduceat(parts * samples.joined, starts)
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
     # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
-    wriggles = count > MOST_SAMPLES // 16 + 3 * length
+    wriggles = count > MAX_SAMPLES // 16 + 3 * length
     grows = np.maximum.reduceat(parts, starts) > 1  # others are done, and no concern of these
-    over = grows & ((length > MOST_VOXELS) | (count > MOST_SAMPLES) | wriggles)
+    over = grows & ((length > MAX_VOXELS) | (count > MAX_SAMPLES) | wriggles)
     excess = over.nonzero()[0]
     if not excess.size:
         return
     index = int(excess[0])
     worst = int(np.argmax(np.where(samples.piece[:-1] == index, chord, -1.0)))
     if chord[worst] > max(0.1 * length[index], 1e3):
-        raise _runs_off(batch, index, samples, worst)
-    if length[index] > MOST_VOXELS:
+        raise _divergence_error(batch, index, samples, worst)
+    if length[index] > MAX_VOXELS:
         raise CurveError(
-            f"{batch.name(index)}the curve is too long: {length[index]:.3g} voxels at least, "
-            f"and {MOST_VOXELS} is the limit",
+            f"{batch.message_prefix(index)}the curve is too long: "
+            f"{length[index]:.3g} voxels at least, and {MAX_VOXELS} is the limit",
             hint="shorten the range of t, scale the curve down, or slow its oscillation",
         )
-    raise _too_rough(batch, index)
+    raise _roughness_error(batch, index)
 
 
-def _too_rough(batch: Batch, index: int) -> CurveError:
+def _roughness_error(batch: CurveBatch, index: int) -> CurveError:
     return CurveError(
-        f"{batch.name(index)}the curve is too rough: however closely one looks it does not settle",
+        f"{batch.message_prefix(index)}the curve is too rough: "
+        "however finely it is sampled, it does not settle",
         hint="slow its oscillation, or shorten the range of t",
     )
 
 
-def _runs_off(batch: Batch, index: int, samples: Samples, at: int) -> CurveError:
+def _divergence_error(batch: CurveBatch, index: int, samples: Samples, at: int) -> CurveError:
     """Name the axis that leaps in the step after sample ``at``, and find out where."""
     t, points = samples.t[at : at + 2], samples.points[:, at : at + 2]
     row = int(np.argmax(np.abs(points[:, 1] - points[:, 0])))
     while t[1] - t[0] > batch.resolution[index]:
-        t = np.linspace(t[0], t[1], PARTS + 1)
+        t = np.linspace(t[0], t[1], MAX_PARTS + 1)
         points = batch.evaluate(np.full(t.size, index), t)  # raises where it is not finite
         leap = int(np.argmax(np.abs(np.diff(points[row]))))
         t, points = t[leap : leap + 2], points[:, leap : leap + 2]
     return CurveError(
-        f"{batch.name(index)}{AXES[row]} does not settle near t = {float(t[0])!r}: "
+        f"{batch.message_prefix(index)}{AXES[row]} does not settle near t = {float(t[0])!r}: "
         f"it leaps from {points[row, 0]:.6g} to {points[row, 1]:.6g}",
         axis=AXES[row],
         hint="shorten the range of t so that it keeps away from this parameter",
     )
 
 
-def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
+def split_at_jumps(batch: CurveBatch, samples: Samples) -> Samples:
     """Make pieces of what settled, ending where a curve jumps."""
     finest = samples.t[1:] - samples.t[:-1] < 2 * batch.resolution[samples.piece[:-1]]
     finest &= samples.joined
     if not finest.any():
         return samples
     chord = np.abs(np.diff(samples.points, axis=1)).max(axis=0)
-    torn = finest & (chord > JUMP)
+    torn = finest & (chord > MIN_JUMP)
     if not torn.any():
         return samples
     # A jump tears one step, or two if a knot sits right on it. Where whole stretches are torn
@@ -231,6 +238,6 @@ def cut_at_jumps(batch: Batch, samples: Samples) -> Samples:
     stretch = torn[2:] & torn[1:-1] & torn[:-2]
     if stretch.any():
         at = int(np.argmax(np.where(stretch, chord[1:-1], -1.0))) + 1
-        raise _runs_off(batch, int(samples.piece[at]), samples, at)
+        raise _divergence_error(batch, int(samples.piece[at]), samples, at)
     opens = np.concatenate(([True], torn | ~samples.joined))
     return Samples(np.cumsum(opens) - 1, samples.t, samples.points, samples.piece[opens])

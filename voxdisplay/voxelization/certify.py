@@ -41,9 +41,9 @@ END_ERROR = 0.8661
 # What is computed here is off by much less.
 ROUNDING = 1e-9
 # Boxes nearer than this to a voxel are near enough not to look for a nearer one.
-NEAR = 1.4
+CLOSE_ENOUGH = 1.4
 # How many voxels before and after the one nearest in t are tried for a box, at first and at last.
-REACH = (0, 2, 24)
+SEARCH_SPANS = (0, 2, 24)
 # Parameters tried for a voxel in each round, and rounds.
 TRIES, ROUNDS = 17, 3
 
@@ -99,12 +99,12 @@ def certify(
     following = np.roll(centres, -1, axis=1) if closed else centres[:, 1:]
     if (np.abs(following - centres[:, : following.shape[1]]) > 1).any():
         return "the voxels are not connected"
-    far = reach(box_ends, boxes, centres, t, closed=closed)
+    far = box_distances(box_ends, boxes, centres, t, closed=closed)
     coverage = float(far.max(initial=0.0)) + ROUNDING
     if not coverage <= COVERAGE:
         where = float(box_ends[0][np.argmax(far)])
         return f"near t = {where!r} the curve may be {coverage:.3g} voxels from the nearest voxel"
-    off = _errors(curve, centres, t)
+    off = _voxel_errors(curve, centres, t)
     ends = np.zeros(t.size, dtype=bool)
     ends[0] = True
     ends[-1] |= not closed or off[-1] > ERROR
@@ -116,7 +116,7 @@ def certify(
     return Certificate(coverage, error, end_error)
 
 
-def reach(
+def box_distances(
     box_ends: tuple[Floats, Floats],
     boxes: tuple[Floats, Floats],
     centres: Floats,
@@ -134,19 +134,19 @@ def reach(
     nearest = np.searchsorted(t, (box_ends[0] + box_ends[1]) / 2)
     best = np.full(nearest.size, np.inf)
     todo = np.arange(nearest.size)
-    for reach in REACH:
+    for reach in SEARCH_SPANS:
         for shift in range(-reach - 1, reach + 1):
             index = nearest[todo] + shift
             index = index % t.size if closed else np.clip(index, 0, t.size - 1)
             far = (np.abs(centres[:, index] - middle[:, todo]) + half[:, todo]).max(axis=0)
             best[todo] = np.minimum(best[todo], far)
-        todo = todo[~(best[todo] <= NEAR)]
+        todo = todo[~(best[todo] <= CLOSE_ENOUGH)]
         if not todo.size:
             break
     return best
 
 
-def _errors(curve: Curve, centres: Floats, t: Floats) -> Floats:
+def _voxel_errors(curve: Curve, centres: Floats, t: Floats) -> Floats:
     """Bound how far centres, (3, N), are from the curve: (N,)."""
     off = _distances(curve, centres, t)
     # Where the point at t will not do, another one may: the foot of a perpendicular.

@@ -19,12 +19,12 @@ from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.batch_evaluation import BatchEvaluator
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.index_ranges import insert, spread
+from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns
 
 AXES = "xyz"
 
 # Voxel indices are int32, and sums and differences of a few of them must be as well.
-FARTHEST = 2.0**30
+MAX_COORDINATE = 2.0**30
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Samples:
         return self.bounds[self.curve.searchsorted(np.arange(curves))]
 
 
-class Batch:
+class CurveBatch:
     """Curves that are voxelised together.
 
     Parameters
@@ -93,24 +93,24 @@ class Batch:
         if not good.all():
             index = int(np.argmin(good))
             raise CurveError(
-                f"{self.name(index)}the range of t must be finite and ascending, "
+                f"{self.message_prefix(index)}the range of t must be finite and ascending, "
                 f"not {self.first[index]} to {self.last[index]}"
             )
-        self._together = BatchEvaluator(self.curves)
+        self._evaluator = BatchEvaluator(self.curves)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
     @property
     def thread_safe(self) -> bool:
         """Whether `evaluate` may be called from several threads at once."""
-        return all(self._together.map_curves(attrgetter("thread_safe")))
+        return all(self._evaluator.map_curves(attrgetter("thread_safe")))
 
     @property
     def degrees(self) -> list[int | None]:
         """Those of the curves, see `Curve.degree`."""
-        return self._together.map_curves(attrgetter("degree"))
+        return self._evaluator.map_curves(attrgetter("degree"))
 
-    def name(self, index: int) -> str:
+    def message_prefix(self, index: int) -> str:
         """Give the beginning of a message about a curve: nothing if it is the only one."""
         return "" if self._number is None else f"curve {self._number + index}: "
 
@@ -124,24 +124,24 @@ class Batch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        points = self._together.positions(curve, t)
+        points = self._evaluator.positions(curve, t)
         # And so not where P is not a number: it would be least and greatest.
-        near = points.min(initial=0) > -FARTHEST and points.max(initial=0) < FARTHEST
+        near = points.min(initial=0) > -MAX_COORDINATE and points.max(initial=0) < MAX_COORDINATE
         if not near:
-            at = int(np.argmin((np.abs(points) < FARTHEST).all(axis=0)))
-            raise self._out_of_reach(int(curve[at]), float(t[at]), points[:, at])
+            at = int(np.argmin((np.abs(points) < MAX_COORDINATE).all(axis=0)))
+            raise self._position_error(int(curve[at]), float(t[at]), points[:, at])
         return points
 
-    def _out_of_reach(self, index: int, t: float, point: Floats) -> CurveError:
-        row = int(np.argmin(np.abs(point) < FARTHEST))
-        where = f"{self.name(index)}{AXES[row]} = {point[row]:.6g} at t = {t!r}"
+    def _position_error(self, index: int, t: float, point: Floats) -> CurveError:
+        row = int(np.argmin(np.abs(point) < MAX_COORDINATE))
+        where = f"{self.message_prefix(index)}{AXES[row]} = {point[row]:.6g} at t = {t!r}"
         if not np.isfinite(point[row]):
             hint = "shorten the range of t so that it keeps away from this parameter"
             return CurveError(f"{where} is not finite", axis=AXES[row], hint=hint)
         hint = "shorten the range of t, or scale the curve down"
         return CurveError(f"{where} is too far out to have a voxel", axis=AXES[row], hint=hint)
 
-    def split(self, samples: Samples, parts: Ints) -> Samples:
+    def subdivide(self, samples: Samples, parts: Ints) -> Samples:
         """Cut steps of samples into equal parts.
 
         Parameters
@@ -155,12 +155,12 @@ class Batch:
         cut = (parts > 1).nonzero()[0]
         count = parts[cut] - 1
         left = cut.repeat(count)
-        nth = spread(np.ones_like(count), count)
+        nth = expand_ranges(np.ones_like(count), count)
         t_left = samples.t[left]
         t_fresh = t_left + (samples.t[left + 1] - t_left) * (nth / parts[left])
         piece_fresh = samples.piece[left]
 
         points = self.evaluate(samples.curve[piece_fresh], t_fresh)
         mine = (samples.piece, samples.t, samples.points)
-        piece, t, points = insert(left + 1, mine, (piece_fresh, t_fresh, points))
+        piece, t, points = insert_columns(left + 1, mine, (piece_fresh, t_fresh, points))
         return Samples(piece, t, points, samples.curve)

@@ -19,26 +19,30 @@ from voxdisplay.compute import kernel_backend, parallel
 from voxdisplay.compute.array_types import Ints
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.adaptive_sampling import cut_at_jumps, first_look, settle
+from voxdisplay.voxelization.adaptive_sampling import (
+    initial_samples,
+    refine_samples,
+    split_at_jumps,
+)
 from voxdisplay.voxelization.certify import Certificate, certify
-from voxdisplay.voxelization.curve_batch import Batch, Samples
-from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose, see
-from voxdisplay.voxelization.grid_plane import trace, trace_everything
+from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
+from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose_curves, sample_overlooked
+from voxdisplay.voxelization.grid_plane import trace_all_planes, trace_curves
 from voxdisplay.voxelization.loop_closing import close_loop
-from voxdisplay.voxelization.restoring import mend
+from voxdisplay.voxelization.restoring import restore_coverage
 from voxdisplay.voxelization.sequence import Sequence
-from voxdisplay.voxelization.thinning import reduce
-from voxdisplay.voxelization.voxel_events import Events
+from voxdisplay.voxelization.thinning import thin_events
+from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 # Curves handled at once: enough to forget what a batch costs, but not many if they are long. So
 # many voxels may be in hand on all processors together.
-CURVES = 4096
-VOXELS = 2_000_000
+MAX_BATCH_CURVES = 4096
+MAX_BATCH_VOXELS = 2_000_000
 # Batches for each processor until it is seen whether the curves are still as long, and the fastest
 # has to wait for the others.
-BATCHES = 8
+BATCHES_PER_PROCESSOR = 8
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
-TOUCH = 1e-3
+CLOSURE_TOLERANCE = 1e-3
 
 ONE_PIECE = np.zeros(1, dtype=np.int64)
 ONE_PIECE.flags.writeable = False
@@ -50,9 +54,9 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     sequences: list[Sequence] = []
 
     def one_batch(low: int, size: int) -> list[Sequence]:
-        batch = Batch(curves[low : low + size], low if len(curves) > 1 else None)
+        batch = CurveBatch(curves[low : low + size], low if len(curves) > 1 else None)
         ahead = (len(curves) - low) / len(batch.curves)
-        return _digitise(batch, ahead, certified=certified)
+        return _digitise_batch(batch, ahead, certified=certified)
 
     size, batches = 16, 1
     while (begin := len(sequences)) < len(curves):
@@ -64,21 +68,21 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
             sequences += fresh
         voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
         at_once = parallel.cpu_count()
-        batches = at_once * (BATCHES if apart else 1)
-        size = min(CURVES, VOXELS // at_once * (end - begin) // voxels + 1)
+        batches = at_once * (BATCHES_PER_PROCESSOR if apart else 1)
+        size = min(MAX_BATCH_CURVES, MAX_BATCH_VOXELS // at_once * (end - begin) // voxels + 1)
     return sequences
 
 
-def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
+def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list[Sequence]:
     begin = perf_counter()
-    samples = settle(batch, first_look(batch))
+    samples = refine_samples(batch, initial_samples(batch))
     kernel_backend.enable_if_worthwhile(samples.t.size, ahead)
-    boxes = enclose(batch, samples) if certified else None
+    boxes = enclose_curves(batch, samples) if certified else None
     if boxes:
-        samples = settle(batch, see(batch, samples, boxes))
-    samples = cut_at_jumps(batch, samples)
-    traced = trace(batch, samples)
-    events = reduce(traced, samples, tips=certified)
+        samples = refine_samples(batch, sample_overlooked(batch, samples, boxes))
+    samples = split_at_jumps(batch, samples)
+    traced = trace_curves(batch, samples)
+    events = thin_events(traced, samples, keep_tips=certified)
     closed = _closed(batch, samples)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
@@ -90,7 +94,7 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
     seconds = (perf_counter() - begin) / len(voxels)
     spans = zip(batch.curves, bounds, bounds[1:], strict=False)
     if not boxes and all(single) and not any(closed):  # as most are
-        with _nothing_to_collect():
+        with _garbage_collection_paused():
             return [
                 Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
                 for curve, a, b in spans
@@ -110,7 +114,7 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
         sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
         if boxes:
             thin = events.take(np.arange(low, high))
-            sequence = _proven(batch, sequence, boxes, index, thin, traced)
+            sequence = _with_proof(batch, sequence, boxes, index, thin, traced)
             spent = seconds * len(sequence) + perf_counter() - begin
             sequence = replace(sequence, seconds=spent)
         sequences.append(sequence)
@@ -118,7 +122,7 @@ def _digitise(batch: Batch, ahead: float, *, certified: bool) -> list[Sequence]:
 
 
 @contextmanager
-def _nothing_to_collect() -> Iterator[None]:
+def _garbage_collection_paused() -> Iterator[None]:
     """Keep Python from looking for garbage while many objects are made, all of which stay.
 
     With every so many it would go through all there are. If its collector is off, that stays so.
@@ -133,12 +137,17 @@ def _nothing_to_collect() -> Iterator[None]:
         gc.enable()
 
 
-def _proven(
-    batch: Batch, sequence: Sequence, boxes: Boxes, index: int, thin: Events, traced: Events
+def _with_proof(
+    batch: CurveBatch,
+    sequence: Sequence,
+    boxes: Boxes,
+    index: int,
+    thin: VoxelEvents,
+    traced: VoxelEvents,
 ) -> Sequence:
     """Give the sequence with its proof, mended if need be, or with what is in the way of one."""
-    if index in boxes.doubts:
-        return replace(sequence, proof=boxes.doubts[index])
+    if index in boxes.obstacles:
+        return replace(sequence, proof=boxes.obstacles[index])
     if len(sequence.starts) > 1:
         return replace(sequence, proof="the curve jumps")
     own = boxes.of_curve(index)
@@ -154,11 +163,11 @@ def _proven(
             of = np.full(t.size, index)
             points = batch.evaluate(of, t)
             samples = Samples(np.zeros_like(of), t, points, np.array([index]))
-            full = trace_everything(batch, samples)
-            thin = reduce(full, samples, tips=True)
+            full = trace_all_planes(batch, samples)
+            thin = thin_events(full, samples, keep_tips=True)
         else:
             full = traced.take(traced.piece == thin.piece[0])
-        mended = mend(thin, full, ends, box, closed=closed)
+        mended = restore_coverage(thin, full, ends, box, closed=closed)
         voxels = np.ascontiguousarray(mended.voxels.T)
         voxels.flags.writeable = mended.t.flags.writeable = False
         second = certify(curve, ends, box, voxels, mended.t, closed=closed)
@@ -167,7 +176,7 @@ def _proven(
     return replace(sequence, proof=proof)
 
 
-def _starts(events: Events) -> Ints:
+def _starts(events: VoxelEvents) -> Ints:
     """Find where pieces begin. A gap that could not be bridged is a jump like any other."""
     ends = np.flatnonzero(events.piece[1:] != events.piece[:-1])
     gaps = events.gaps()
@@ -175,22 +184,24 @@ def _starts(events: Events) -> Ints:
     return np.concatenate(([0], ends + 1))
 
 
-def _closed(batch: Batch, samples: Samples) -> list[bool]:
+def _closed(batch: CurveBatch, samples: Samples) -> list[bool]:
     """Tell which curves are closed, and stop at those that only say so."""
     first = samples.curve_starts(len(batch.curves))
     last = np.append(first[1:], samples.t.size) - 1
     apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
-    closed: list[bool] = (apart <= TOUCH).tolist()
-    for index in np.flatnonzero(apart <= TOUCH).tolist():
+    closed: list[bool] = (apart <= CLOSURE_TOLERANCE).tolist()
+    for index in np.flatnonzero(apart <= CLOSURE_TOLERANCE).tolist():
         own = samples.points[:, first[index] : last[index] + 1]
-        closed[index] = bool(np.abs(own - own[:, :1]).max() > TOUCH)  # a mere point is not
+        closed[index] = bool(
+            np.abs(own - own[:, :1]).max() > CLOSURE_TOLERANCE
+        )  # a mere point is not
     told = [(at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None]
     for index, says in told:
         ends = samples.points[:, [first[index], last[index]]]
         closed[index] = says
         if says and (np.abs(np.diff(np.floor(ends))) > 1).any():
             raise CurveError(
-                f"{batch.name(index)}the curve is said to be closed, but its ends are "
+                f"{batch.message_prefix(index)}the curve is said to be closed, but its ends are "
                 f"{apart[index]:.6g} voxels apart",
                 hint="leave out `closed`, or complete the curve",
             )

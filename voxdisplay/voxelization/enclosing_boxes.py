@@ -13,23 +13,23 @@ from itertools import pairwise
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
-from voxdisplay.voxelization.curve_batch import AXES, Batch, Samples
-from voxdisplay.voxelization.index_ranges import spread
+from voxdisplay.voxelization.curve_batch import AXES, CurveBatch, Samples
+from voxdisplay.voxelization.index_ranges import expand_ranges
 
 # Boxes are narrower than this on every axis, in voxels.
 WIDTH = 1.0
 # A part of the curve that may be further than this from the straight line between two samples, in
 # voxels along an axis, was overlooked: samples are put in.
-ASIDE = 0.5
+MAX_DEVIATION = 0.5
 # More boxes than this for one curve are not worth their proof.
-MOST_BOXES = 2_000_000
+MAX_BOXES = 2_000_000
 # Intervals of which nothing is known lie around single parameters; as many as these, beside those
 # that a curve has to begin with, are a stretch without values, which cutting cannot settle.
-MOST_UNKNOWN = 4096
+MAX_UNBOUNDED = 4096
 # Into how many parts an interval is cut at once, at most.
-PARTS = 16
+MAX_PARTS = 16
 # Intervals whose bounds are found at once: what is computed stays in a core's cache.
-CALL = 1 << 12
+INTERVALS_PER_CALL = 1 << 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +57,14 @@ class Boxes:
     t_hi: Floats
     low: Floats
     high: Floats
-    doubts: dict[int, str]
+    obstacles: dict[int, str]
 
     def of_curve(self, index: int) -> slice:
         """Find the boxes of a curve."""
         return slice(*np.searchsorted(self.curve, (index, index + 1)))
 
 
-def enclose(batch: Batch, samples: Samples) -> Boxes:
+def enclose_curves(batch: CurveBatch, samples: Samples) -> Boxes:
     """Put curves into boxes narrower than ``WIDTH``.
 
     Parameters
@@ -81,13 +81,13 @@ def enclose(batch: Batch, samples: Samples) -> Boxes:
         if curve.enclosure(batch.first[index : index + 1], batch.first[index : index + 1]) is None
     }
     step = np.flatnonzero(samples.joined)
-    step = step[_certain(samples.piece[step], doubts)]
+    step = step[_provable(samples.piece[step], doubts)]
     chord = np.abs(samples.points[:, step + 1] - samples.points[:, step]).max(axis=0, initial=0.0)
     # As long as bounds are tight, that many boxes are needed.
-    parts = np.clip(np.ceil(1.05 * chord / WIDTH), 1, PARTS).astype(np.int64)
-    step, t_lo, t_hi = _cut(step, samples.t[step], samples.t[step + 1], parts)
+    parts = np.clip(np.ceil(1.05 * chord / WIDTH), 1, MAX_PARTS).astype(np.int64)
+    step, t_lo, t_hi = _subdivide(step, samples.t[step], samples.t[step + 1], parts)
     settled = []
-    most_unknown = np.bincount(samples.piece[step], minlength=len(batch.curves)) + MOST_UNKNOWN
+    most_unknown = np.bincount(samples.piece[step], minlength=len(batch.curves)) + MAX_UNBOUNDED
     count = np.zeros(len(batch.curves), dtype=np.int64)
     while step.size:
         curve = samples.piece[step]
@@ -104,18 +104,18 @@ def enclose(batch: Batch, samples: Samples) -> Boxes:
             doubts[int(curve[at])] = (
                 f"{axis} may jump, or have no value, near t = {float(t_lo[at])!r}"
             )
-        left = ~good & _certain(curve, doubts)
-        parts = np.where(np.isnan(width), 2, np.clip(1.1 * width / WIDTH, 2, PARTS))
+        left = ~good & _provable(curve, doubts)
+        parts = np.where(np.isnan(width), 2, np.clip(1.1 * width / WIDTH, 2, MAX_PARTS))
         parts = np.minimum(np.ceil(parts), possible)[left].astype(np.int64)
         count_next = count + np.bincount(curve[left], parts, count.size).astype(np.int64)
-        for index in np.flatnonzero(count_next > MOST_BOXES).tolist():
-            doubts[index] = f"more than {MOST_BOXES} boxes would be needed"
+        for index in np.flatnonzero(count_next > MAX_BOXES).tolist():
+            doubts[index] = f"more than {MAX_BOXES} boxes would be needed"
         unknown = np.bincount(curve[left], np.isnan(width[left]), count.size)
         for index in np.flatnonzero(unknown > most_unknown).tolist():
             near = float(t_lo[left][(curve[left] == index) & np.isnan(width[left])][0])
             doubts[index] = f"there may be no curve at all near t = {near!r}"
-        on = _certain(curve[left], doubts)
-        step, t_lo, t_hi = _cut(step[left][on], t_lo[left][on], t_hi[left][on], parts[on])
+        on = _provable(curve[left], doubts)
+        step, t_lo, t_hi = _subdivide(step[left][on], t_lo[left][on], t_hi[left][on], parts[on])
     if not settled:
         nothing = np.empty(0)
         rows = np.empty((3, 0))
@@ -129,13 +129,13 @@ def enclose(batch: Batch, samples: Samples) -> Boxes:
     )
 
 
-def _certain(curve: Ints, doubts: dict[int, str]) -> Bools:
+def _provable(curve: Ints, doubts: dict[int, str]) -> Bools:
     return ~np.isin(curve, list(doubts)) if doubts else np.ones(curve.size, dtype=bool)
 
 
-def _cut(step: Ints, t_lo: Floats, t_hi: Floats, parts: Ints) -> tuple[Ints, Floats, Floats]:
+def _subdivide(step: Ints, t_lo: Floats, t_hi: Floats, parts: Ints) -> tuple[Ints, Floats, Floats]:
     """Cut intervals into equal parts, which share their ends to the last bit."""
-    nth = spread(np.zeros_like(parts), parts)
+    nth = expand_ranges(np.zeros_like(parts), parts)
     step, t_lo, t_hi = np.repeat(step, parts), np.repeat(t_lo, parts), np.repeat(t_hi, parts)
     parts = np.repeat(parts, parts)
     begin = t_lo + (t_hi - t_lo) * (nth / parts)
@@ -143,22 +143,22 @@ def _cut(step: Ints, t_lo: Floats, t_hi: Floats, parts: Ints) -> tuple[Ints, Flo
     return step, begin, end
 
 
-def _bounds(batch: Batch, curve: Ints, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
+def _bounds(batch: CurveBatch, curve: Ints, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats]:
     low, high = np.empty((3, t_lo.size)), np.empty((3, t_lo.size))
     order = np.argsort(curve, kind="stable")
     edges = np.flatnonzero(np.diff(curve[order])) + 1
     with np.errstate(all="ignore"):
         for start, stop in pairwise([0, *edges.tolist(), curve.size]):
             enclosure = batch.curves[curve[order[start]]].enclosure
-            for begin in range(start, stop, CALL):
-                some = order[begin : min(begin + CALL, stop)]
+            for begin in range(start, stop, INTERVALS_PER_CALL):
+                some = order[begin : min(begin + INTERVALS_PER_CALL, stop)]
                 box = enclosure(t_lo[some], t_hi[some])
                 if box is not None:
                     low[:, some], high[:, some] = box
     return low, high
 
 
-def see(batch: Batch, samples: Samples, boxes: Boxes) -> Samples:
+def sample_overlooked(batch: CurveBatch, samples: Samples, boxes: Boxes) -> Samples:
     """Put samples where the curve may be elsewhere than the samples there are suggest.
 
     Parameters
@@ -172,8 +172,8 @@ def see(batch: Batch, samples: Samples, boxes: Boxes) -> Samples:
     Returns
     -------
     Samples
-        The same, and more in the steps that have boxes ``ASIDE``: at the ends of all of these
-        steps' boxes. Between two of them the curve moves by less than ``WIDTH``.
+        The same, with the box ends of every step of which a box lies more than ``MAX_DEVIATION``
+        off its chord. Between two of them the curve moves by less than ``WIDTH``.
 
     """
     before, after = boxes.step, boxes.step + 1
@@ -182,7 +182,7 @@ def see(batch: Batch, samples: Samples, boxes: Boxes) -> Samples:
     ends = [begin + way * ((each - t) / h) for each in (boxes.t_lo, boxes.t_hi)]
     under = np.minimum(*ends) - boxes.low
     over = boxes.high - np.maximum(*ends)
-    aside = np.maximum(under, over).max(axis=0) > ASIDE
+    aside = np.maximum(under, over).max(axis=0) > MAX_DEVIATION
     wild = np.zeros(samples.t.size, dtype=bool)
     wild[before[aside]] = True
     fresh = np.flatnonzero(wild[before] & (boxes.t_lo > t))

@@ -13,7 +13,7 @@ Crossings of all planes give more voxels than needed. Where one axis dominates, 
 do, and of a face's corners the one nearest to the *line* through the crossing is better than the
 one nearest to the point. Both are liberties: where they tear the sequence, they are taken back.
 
-This module ends with connected events; thinning them out is ``reduce.py``.
+This module ends with connected events; thinning them is `thinning`.
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ import numpy as np
 
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
-from voxdisplay.voxelization.adaptive_sampling import refine
-from voxdisplay.voxelization.curve_batch import Batch, Samples
-from voxdisplay.voxelization.index_ranges import insert
-from voxdisplay.voxelization.plane_crossings import NUDGE, Crossings, dominant_crossings
-from voxdisplay.voxelization.root_finding import cross
-from voxdisplay.voxelization.voxel_events import OTHER, Events, Voxels, near
+from voxdisplay.voxelization.adaptive_sampling import limit_chords
+from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
+from voxdisplay.voxelization.index_ranges import insert_columns
+from voxdisplay.voxelization.plane_crossings import TIE_TOLERANCE, Crossings, dominant_crossings
+from voxdisplay.voxelization.root_finding import find_roots
+from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, Voxels, adjacent
 
 # Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
 # Below 1 a step passes at most one plane of an axis; each further try is a finer look.
-LOOKS = (0.7, 0.35, 0.17, 0.08)
+STEP_LIMITS = (0.7, 0.35, 0.17, 0.08)
 # Where curves are sampled at first between two such events: so closely that hardly a crossing
 # needs a second guess.
 EIGHTHS = np.linspace(0.0, 1.0, 9)
 
 
-def trace(batch: Batch, knots: Samples) -> Events:
+def trace_curves(batch: CurveBatch, samples: Samples) -> VoxelEvents:
     """Follow curves through the mid-planes.
 
     Parameters
     ----------
     batch : Batch
         The curves.
-    knots : Samples
+    samples : Samples
         Points along them, in connected pieces.
 
     Returns
@@ -55,46 +55,46 @@ def trace(batch: Batch, knots: Samples) -> Events:
         0.7072 of the curve, those within 0.8661.
 
     """
-    crossings = dominant_crossings(batch, knots)
-    events = choose_corners(crossings, knots)
-    return _bridge_gaps(batch, events, knots.curve)
+    crossings = dominant_crossings(batch, samples)
+    events = choose_corners(crossings, samples)
+    return _bridge_gaps(batch, events, samples.curve)
 
 
-def trace_everything(batch: Batch, samples: Samples) -> Events:
+def trace_all_planes(batch: CurveBatch, samples: Samples) -> VoxelEvents:
     """Follow curves through all mid-planes they pass between samples: as `trace`, but slowly.
 
     Where a curve wriggles across its own way, the axis that changes most hides the others.
     """
-    samples = refine(batch, samples, LOOKS[0])
+    samples = limit_chords(batch, samples, STEP_LIMITS[0])
     piece, t, voxels = _all_crossings(batch, samples)
-    inner = Events(piece.astype(np.int32), t, voxels, np.full(t.size, OTHER))
+    inner = VoxelEvents(piece.astype(np.int32), t, voxels, np.full(t.size, NO_HEADING))
     crossings = Crossings(inner, voxels, np.full(t.size, np.inf))
     return _bridge_gaps(batch, _with_ends(crossings, samples).events, samples.curve)
 
 
-def _with_ends(crossings: Crossings, knots: Samples) -> Crossings:
+def _with_ends(crossings: Crossings, samples: Samples) -> Crossings:
     """Put the voxels of each piece's first and last point around its crossings."""
-    inner, bounds = crossings.events, knots.bounds
+    inner, bounds = crossings.events, samples.bounds
     ends = bounds.repeat(2)[1:-1]
     ends[1::2] -= 1
-    piece = knots.piece[ends].astype(np.int32)
+    piece = samples.piece[ends].astype(np.int32)
     around = inner.piece.searchsorted(np.arange(bounds.size))
     at = around.repeat(2)[1:-1]
 
-    voxels = np.floor(knots.points.take(ends, axis=1)).astype(np.int32)
-    heading, gain = np.full(ends.size, OTHER), np.full(ends.size, np.inf)
-    *events, better, gain = insert(
+    voxels = np.floor(samples.points.take(ends, axis=1)).astype(np.int32)
+    heading, gain = np.full(ends.size, NO_HEADING), np.full(ends.size, np.inf)
+    *events, better, gain = insert_columns(
         at,
         (inner.piece, inner.t, inner.voxels, inner.heading, crossings.better, crossings.gain),
-        (piece, knots.t[ends], voxels, heading, voxels, gain),
+        (piece, samples.t[ends], voxels, heading, voxels, gain),
     )
-    return Crossings(Events(*events), better, gain)
+    return Crossings(VoxelEvents(*events), better, gain)
 
 
 @with_kernel
-def choose_corners(crossings: Crossings, knots: Samples) -> Events:
+def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
     """Prefer the better corners where neighbours stay neighbours; ends of pieces are added."""
-    crossings = _with_ends(crossings, knots)
+    crossings = _with_ends(crossings, samples)
     events, better, gain = crossings.events, crossings.better, crossings.gain
     nearest = events.voxels
     gaps = events.gaps()
@@ -111,30 +111,30 @@ def choose_corners(crossings: Crossings, knots: Samples) -> Events:
         look = np.unique(np.concatenate((back - 1, back)))
         look = look[(look >= 0) & (look < events.t.size - 1)]
         look = look[events.piece[look] == events.piece[look + 1]]
-        torn = look[~near(voxels[:, look], voxels[:, look + 1])]
+        torn = look[~adjacent(voxels[:, look], voxels[:, look + 1])]
     return events.with_voxels(voxels)
 
 
-def _bridge_gaps(batch: Batch, events: Events, curve: Ints) -> Events:
+def _bridge_gaps(batch: CurveBatch, events: VoxelEvents, curve: Ints) -> VoxelEvents:
     """Fill in the crossings of all planes where consecutive voxels are not neighbours."""
-    for look in LOOKS:
+    for look in STEP_LIMITS:
         gaps = events.gaps()
         if not gaps.size:
             return events
         samples = _samples_between(batch, events, gaps, curve, look)
         gap, t, voxels = _all_crossings(batch, samples)
-        events = _fill(events, gaps, gap, t, voxels)
+        events = _insert_voxels(events, gaps, gap, t, voxels)
     gaps = events.gaps()
     if gaps.size:
         # Rough down to the resolution of t: draw with the voxels that hold the samples.
-        samples = _samples_between(batch, events, gaps, curve, LOOKS[-1])
+        samples = _samples_between(batch, events, gaps, curve, STEP_LIMITS[-1])
         voxels = np.floor(samples.points).astype(np.int32)
-        events = _fill(events, gaps, samples.piece, samples.t, voxels)
+        events = _insert_voxels(events, gaps, samples.piece, samples.t, voxels)
     return events
 
 
 def _samples_between(
-    batch: Batch, events: Events, gaps: Ints, curve: Ints, longest: float
+    batch: CurveBatch, events: VoxelEvents, gaps: Ints, curve: Ints, longest: float
 ) -> Samples:
     """Sample the curves from event k to k + 1 for each k in ``gaps``; a "piece" is one gap."""
     begin, end = events.t[gaps, None], events.t[gaps + 1, None]
@@ -142,10 +142,10 @@ def _samples_between(
     gap = np.arange(gaps.size).repeat(EIGHTHS.size)
     of_gap = curve[events.piece[gaps]]
     points = batch.evaluate(of_gap[gap], t)
-    return refine(batch, Samples(gap, t, points, of_gap), longest)
+    return limit_chords(batch, Samples(gap, t, points, of_gap), longest)
 
 
-def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
+def _all_crossings(batch: CurveBatch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
     """Find the crossings of mid-planes of all axes, in order: piece, t and nearest voxel."""
     cells = np.floor(samples.points - 0.5)
     passed = np.abs(cells[:, 1:] - cells[:, :-1]) == 1
@@ -155,16 +155,18 @@ def _all_crossings(batch: Batch, samples: Samples) -> tuple[Ints, Floats, Voxels
     piece = samples.piece[step]
     bracket = samples.t[step], samples.t[step + 1]
     ends = samples.points.take(at) - level, samples.points.take(at + 1) - level
-    t, points, found = cross(batch, samples.curve[piece], axis, level, bracket, ends)
-    voxels = np.floor(points + NUDGE)
+    t, points, found = find_roots(batch, samples.curve[piece], axis, level, bracket, ends)
+    voxels = np.floor(points + TIE_TOLERANCE)
     voxels[axis, np.arange(axis.size)] = level - 0.5
     order = np.lexsort((t, piece))
     order = order[found[order]]
     return piece[order], t[order], voxels.take(order, axis=1).astype(np.int32)
 
 
-def _fill(events: Events, gaps: Ints, gap: Ints, t: Floats, voxels: Voxels) -> Events:
+def _insert_voxels(
+    events: VoxelEvents, gaps: Ints, gap: Ints, t: Floats, voxels: Voxels
+) -> VoxelEvents:
     """Insert voxels into gaps: ``gap`` says into which."""
     at = gaps[gap]
-    other = Events(events.piece[at], t, voxels, np.full(t.size, OTHER))
+    other = VoxelEvents(events.piece[at], t, voxels, np.full(t.size, NO_HEADING))
     return events.insert(at + 1, other)

@@ -14,14 +14,14 @@ from voxdisplay.compute.kernel_backend import with_kernel
 Arrays = tuple[NDArray[Any], ...]
 
 
-def spread(low: Ints, count: Ints) -> Ints:
+def expand_ranges(low: Ints, count: Ints) -> Ints:
     """Write out ranges: low, low + 1, ... ``count`` numbers for each."""
     end: Ints = count.cumsum()
     total = int(end[-1]) if end.size else 0
     return np.asarray((low - (end - count)).repeat(count) + np.arange(total))
 
 
-def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
+def split_blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
     """Cut [0, stop) into blocks of about ``size``.
 
     Cuts are made at ``starts``, where curves begin, and at multiples of ``size`` from there, so
@@ -37,7 +37,7 @@ def blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
 
 
 @with_kernel
-def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
+def insert_columns(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
     """Put columns between those of arrays, (M,) or (3, M): before the ones ``at``, ascending."""
     size = arrays[0].shape[-1]
     old = np.ones(size + at.size, dtype=bool)

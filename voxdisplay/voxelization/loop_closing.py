@@ -16,19 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Floats
-from voxdisplay.voxelization.thinning import REACH, WINDOW, furthest
-from voxdisplay.voxelization.voxel_events import OTHER, Events, near
+from voxdisplay.voxelization.thinning import MAX_UNCOVERED, WINDOW, furthest_shortcuts
+from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, adjacent
 
 Voxel = tuple[int, int, int]
 
 # How far from the seam voxels may be replaced, and by how many on each side.
-SPAN = 7
-DETOUR = 3
+MAX_REPLACED = 7
+MAX_DETOUR = 3
 # Samples per voxel of the sequence, to tell how far voxels are from the curve.
-DENSE = 16
+SAMPLES_PER_VOXEL = 16
 
 
-def close_loop(loop: Events, position: Callable[[Floats], Floats], end: float) -> Events:
+def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: float) -> VoxelEvents:
     """Make a closed sequence of one that returns to its first voxel.
 
     Parameters
@@ -64,7 +64,7 @@ def _touches_at_seam(voxels: NDArray[np.int32]) -> bool:
     reach = min(WINDOW - 1, size - 1)
     around = np.arange(-reach, reach + 1)
     ring = voxels[:, around % size]
-    touch = near(ring[:, :, None], ring[:, None, :])
+    touch = adjacent(ring[:, :, None], ring[:, None, :])
     before, after = np.meshgrid(around, around, indexing="ij")
     # Cyclic distance from 2 to WINDOW: more than a step, and no chord that the window let be.
     apart = after - before
@@ -73,12 +73,12 @@ def _touches_at_seam(voxels: NDArray[np.int32]) -> bool:
     return bool((touch & across).any())
 
 
-def _thin_across(loop: Events) -> Events:
+def _thin_across(loop: VoxelEvents) -> VoxelEvents:
     """Take the short cut across the seam, the first there is. It skips the first voxel."""
     size = loop.t.size
     reach = min(WINDOW, (size - 1) // 2)
     around = np.arange(-reach, reach + 1) % size
-    leap = furthest(loop.voxels[:, around], np.zeros(around.size, dtype=np.int64))
+    leap = furthest_shortcuts(loop.voxels[:, around], np.zeros(around.size, dtype=np.int64))
     over = np.arange(reach) + leap[:reach] > reach
     if not over.any():
         return loop
@@ -88,20 +88,20 @@ def _thin_across(loop: Events) -> Events:
 
 
 def _lead_through(
-    ring: Events, loop: Events, position: Callable[[Floats], Floats], end: float
-) -> Events | None:
+    ring: VoxelEvents, loop: VoxelEvents, position: Callable[[Floats], Floats], end: float
+) -> VoxelEvents | None:
     """Lead a ring through the first voxel of ``loop``, without chords; None if there is no way."""
     size = ring.t.size
     if size == loop.t.size:
         return None  # a chord, but what is between its ends goes its own way
-    reach = min(SPAN, size // 2 - 1)
+    reach = min(MAX_REPLACED, size // 2 - 1)
     if reach < 1:
         return None
     start = _as_voxels(loop.voxels[:, :1])[0]
     after = _as_voxels(ring.voxels[:, :reach])
     before = _as_voxels(ring.voxels[:, : -reach - 1 : -1])
-    t_before = np.linspace(ring.t[-reach], end, DENSE * reach)
-    t_after = np.linspace(loop.t[0], ring.t[reach - 1], DENSE * reach)
+    t_before = np.linspace(ring.t[-reach], end, SAMPLES_PER_VOXEL * reach)
+    t_after = np.linspace(loop.t[0], ring.t[reach - 1], SAMPLES_PER_VOXEL * reach)
     points = position(np.concatenate((t_before, t_after)))
     square = _square_distances(points, {*after, *before})
     detour = _best_detour(start, after, before, points, square)
@@ -119,7 +119,7 @@ def _lead_through(
         )
     )
     voxels = np.concatenate((lead, kept.voxels, tail), axis=1)
-    return Events(np.full(t.size, loop.piece[0]), t, voxels, np.full(t.size, OTHER))
+    return VoxelEvents(np.full(t.size, loop.piece[0]), t, voxels, np.full(t.size, NO_HEADING))
 
 
 def _best_detour(
@@ -140,24 +140,25 @@ def _best_detour(
     near_by = [voxel for voxel, far in square.items() if far <= 0.5]
     best, least = None, np.inf
     for (out, j), (back, i) in product(
-        list(_ways(start, after, near_by)), list(_ways(start, before, near_by))
+        list(_chordless_paths(start, after, near_by)),
+        list(_chordless_paths(start, before, near_by)),
     ):
         touching = (
-            any(_near(a, b) for a in [*out, after[j]] for b in [*back, before[i]])
-            or any(_near(a, b) for a in out for b in before[i:])
-            or any(_near(a, b) for a in back for b in after[j:])
+            any(_adjacent(a, b) for a in [*out, after[j]] for b in [*back, before[i]])
+            or any(_adjacent(a, b) for a in out for b in before[i:])
+            or any(_adjacent(a, b) for a in back for b in after[j:])
         )
         voxels = [*out, *back, *after[j:], *before[i:]]
         cost = sum(square[voxel] for voxel in voxels)
-        if not touching and cost < least and _shown(points, [start, *voxels]):
+        if not touching and cost < least and _covered(points, [start, *voxels]):
             best, least = (out, j, back, i), cost
     return best
 
 
-def _ways(
+def _chordless_paths(
     start: Voxel, side: list[Voxel], near_by: list[Voxel]
 ) -> Iterator[tuple[list[Voxel], int]]:
-    """List chordless ways from ``start`` over at most ``DETOUR`` voxels to one side of the ring.
+    """List chordless paths from ``start`` over at most ``MAX_DETOUR`` voxels to a side of the ring.
 
     Yields
     ------
@@ -170,17 +171,19 @@ def _ways(
 
     def extend(way: list[Voxel]) -> Iterator[tuple[list[Voxel], int]]:
         tip = way[-1]
-        touched = [j for j, voxel in enumerate(side) if _near(tip, voxel)]
+        touched = [j for j, voxel in enumerate(side) if _adjacent(tip, voxel)]
         if touched:
             # The furthest it touches is where it must join: any other would leave a chord.
             join = touched[-1]
-            if not any(_near(voxel, side[k]) for voxel in way[:-1] for k in range(join, len(side))):
+            if not any(
+                _adjacent(voxel, side[k]) for voxel in way[:-1] for k in range(join, len(side))
+            ):
                 yield way[1:], join
-        if len(way) > DETOUR:
+        if len(way) > MAX_DETOUR:
             return
         for voxel in near_by:
-            free = voxel != tip and not any(_near(other, voxel) for other in way[:-1])
-            if free and _near(tip, voxel):
+            free = voxel != tip and not any(_adjacent(other, voxel) for other in way[:-1])
+            if free and _adjacent(tip, voxel):
                 yield from extend([*way, voxel])
 
     yield from extend([start])
@@ -199,14 +202,14 @@ def _square_distances(points: Floats, known: set[Voxel]) -> dict[Voxel, float]:
     return dict(zip(voxels, (apart * apart).sum(axis=0).min(axis=1).tolist(), strict=True))
 
 
-def _shown(points: Floats, voxels: list[Voxel]) -> bool:
-    """Tell whether all points, (3, n), are within ``REACH`` of a voxel."""
+def _covered(points: Floats, voxels: list[Voxel]) -> bool:
+    """Tell whether all points, (3, n), are within ``MAX_UNCOVERED`` of a voxel."""
     centres = np.array(voxels, dtype=float).T + 0.5
     apart = centres[:, :, None] - points[:, None, :]
-    return bool(((apart * apart).sum(axis=0).min(axis=0) <= REACH * REACH).all())
+    return bool(((apart * apart).sum(axis=0).min(axis=0) <= MAX_UNCOVERED * MAX_UNCOVERED).all())
 
 
-def _near(a: Voxel, b: Voxel) -> bool:
+def _adjacent(a: Voxel, b: Voxel) -> bool:
     return abs(a[0] - b[0]) <= 1 and abs(a[1] - b[1]) <= 1 and abs(a[2] - b[2]) <= 1
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.curve import Curve
-from voxdisplay.voxelization.index_ranges import spread
-from voxdisplay.voxelization.spatial_hash import COLUMNS, Cells
+from voxdisplay.voxelization.index_ranges import expand_ranges
+from voxdisplay.voxelization.spatial_hash import COLUMNS, SpatialHash
 
 Voxels = NDArray[np.integer]
 
@@ -21,7 +21,7 @@ Voxels = NDArray[np.integer]
 SEGMENT = 0.5
 SAG = 0.01
 # No distance is looked for along a polyline of more segments than this.
-MOST_SEGMENTS = 50_000_000
+MAX_SEGMENTS = 50_000_000
 # A candidate segment may be this much further away than the nearest, and hold the nearest point.
 SLACK = 4 * SAG
 GOLDEN = (5**0.5 - 1) / 2
@@ -48,7 +48,7 @@ def gaps(voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None) 
         The i for which voxels i and i + 1 (N - 1 and 0) are neither 26-adjacent nor equal.
 
     """
-    return np.flatnonzero(_joints(len(voxels), closed, starts) & ~_next_near(voxels))
+    return np.flatnonzero(_joins_next(len(voxels), closed, starts) & ~_adjacent_to_next(voxels))
 
 
 def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
@@ -67,7 +67,7 @@ def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
         All i < j of 26-adjacent or equal voxels with j - i > 1, cyclically if closed; ascending.
 
     """
-    pairs = _touching(voxels)
+    pairs = _adjacent_pairs(voxels)
     distance = pairs[:, 1] - pairs[:, 0]
     far = distance > 1
     if closed:
@@ -79,11 +79,11 @@ def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
 def count_contacts(voxels: Voxels, *, closed: bool = False) -> int:
     """Count the pairs that `contacts` would list, without listing them."""
     total = 0
-    cells = Cells(voxels.T)
+    cells = SpatialHash(voxels.T)
     for offset in COLUMNS[:5]:
         low, high = _later(cells, voxels, offset)
         total += int((high - low).sum())
-    follow = _next_near(voxels)
+    follow = _adjacent_to_next(voxels)
     if not closed or len(voxels) < 3:
         follow = follow[:-1]
     return total - int(np.count_nonzero(follow))
@@ -107,15 +107,15 @@ def neighbour_violations(
 
     """
     size = len(voxels)
-    joint = _joints(size, closed, starts)
+    joint = _joins_next(size, closed, starts)
     expected = joint.astype(np.int64) + np.roll(joint, 1)
     if closed and size == 2:
         expected[:] = 1
-    pairs = _touching(voxels)
+    pairs = _adjacent_pairs(voxels)
     return np.flatnonzero(np.bincount(pairs.reshape(-1), minlength=size) != expected)
 
 
-def _joints(size: int, closed: bool, starts: Voxels | None) -> Bools:
+def _joins_next(size: int, closed: bool, starts: Voxels | None) -> Bools:
     """Tell after which voxels, (N,), the next one must follow: the first after the last."""
     joint = np.ones(size, dtype=bool)
     if size:
@@ -126,27 +126,27 @@ def _joints(size: int, closed: bool, starts: Voxels | None) -> Bools:
     return joint
 
 
-def _next_near(voxels: Voxels) -> Bools:
+def _adjacent_to_next(voxels: Voxels) -> Bools:
     """Tell which voxels are near the next one, the first after the last."""
     wide = voxels.astype(np.int64)
     return np.asarray((np.abs(np.roll(wide, -1, axis=0) - wide) <= 1).all(axis=1))
 
 
-def _touching(voxels: Voxels) -> Ints:
+def _adjacent_pairs(voxels: Voxels) -> Ints:
     """List all pairs i < j of 26-adjacent or equal voxels, (c, 2)."""
-    cells = Cells(voxels.T)
+    cells = SpatialHash(voxels.T)
     found = []
     for offset in COLUMNS[:5]:
         low, high = _later(cells, voxels, offset)
         count = high - low
         one = np.repeat(cells.order, count)
-        found.append(np.stack((one, cells.order[spread(low, count)]), axis=1))
+        found.append(np.stack((one, cells.order[expand_ranges(low, count)]), axis=1))
     return np.sort(np.concatenate(found), axis=1)
 
 
-def _later(cells: Cells, voxels: Voxels, offset: tuple[int, int]) -> tuple[Ints, Ints]:
+def _later(cells: SpatialHash, voxels: Voxels, offset: tuple[int, int]) -> tuple[Ints, Ints]:
     """Look up the neighbours in a column; in a voxel's own column only those sorted after it."""
-    low, high = cells.column(voxels[cells.order].T, offset)
+    low, high = cells.column_ranges(voxels[cells.order].T, offset)
     if offset == (0, 0):
         low = np.arange(1, len(voxels) + 1)
     return low, high
@@ -184,15 +184,15 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
     todo = np.arange(best.size)
     size = 1.5
     while todo.size:
-        cells = Cells(np.floor(middle / size))
-        for of, segment in cells.around(np.floor(centres[:, todo] / size)):
+        cells = SpatialHash(np.floor(middle / size))
+        for of, segment in cells.neighbours(np.floor(centres[:, todo] / size)):
             centre = centres[:, todo[of]]
-            rough = _from_segment(centre, begin[:, segment], end[:, segment])
-            voxel, nearest = _least(of, rough)
+            rough = _segment_distances(centre, begin[:, segment], end[:, segment])
+            voxel, nearest = _group_minima(of, rough)
             close = rough <= nearest[np.searchsorted(voxel, of)] + SLACK
             arc = segment[close]
-            exact = _from_arc(curve, centre[:, close], t[arc], t_end[arc])
-            _, best[todo[voxel]] = _least(of[close], exact)
+            exact = _arc_distances(curve, centre[:, close], t[arc], t_end[arc])
+            _, best[todo[voxel]] = _group_minima(of[close], exact)
         # Whatever was not looked at is further off than a cell, less half a segment.
         todo = todo[best[todo] > size - SEGMENT / 2 - SLACK]
         size *= 4
@@ -224,10 +224,10 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     todo = np.arange(best.size)
     size = 1.5
     while todo.size:
-        cells = Cells(np.floor(centres / size))
-        for of, voxel in cells.around(np.floor(points[:, todo] / size)):
+        cells = SpatialHash(np.floor(centres / size))
+        for of, voxel in cells.neighbours(np.floor(points[:, todo] / size)):
             apart = points[:, todo[of]] - centres[:, voxel]
-            point, nearest = _least(of, np.sqrt((apart * apart).sum(axis=0)))
+            point, nearest = _group_minima(of, np.sqrt((apart * apart).sum(axis=0)))
             best[todo[point]] = nearest
         todo = todo[best[todo] > size]
         size *= 4
@@ -266,7 +266,7 @@ def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats
         points = np.insert(points, index + 1, there, axis=1)
         settled = np.insert(settled, index, fine)
         settled[index + np.arange(1, index.size + 1)] = fine
-        if t.size > MOST_SEGMENTS:
+        if t.size > MAX_SEGMENTS:
             raise ValueError("the curve is too long or too rough to measure distances from it")
     length = np.diff(points, axis=1)
     return t, points, np.asarray((length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT)
@@ -281,7 +281,7 @@ def _position(curve: Curve, t: Floats) -> Floats:
     return points
 
 
-def _from_segment(point: Floats, begin: Floats, end: Floats) -> Floats:
+def _segment_distances(point: Floats, begin: Floats, end: Floats) -> Floats:
     """Distances, (n,), of points from segments, (3, n) each."""
     along, apart = end - begin, point - begin
     length = np.maximum((along * along).sum(axis=0), np.finfo(float).tiny)
@@ -290,7 +290,7 @@ def _from_segment(point: Floats, begin: Floats, end: Floats) -> Floats:
     return np.asarray(np.sqrt((apart * apart).sum(axis=0)))
 
 
-def _from_arc(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
+def _arc_distances(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
     """Least distances, (n,), of points (3, n) from P(t), low <= t <= high, one arc for each."""
 
     def square(t: Floats) -> Floats:
@@ -320,7 +320,7 @@ def _from_arc(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
     return np.asarray(np.sqrt(best))
 
 
-def _least(group: Ints, values: Floats) -> tuple[Ints, Floats]:
+def _group_minima(group: Ints, values: Floats) -> tuple[Ints, Floats]:
     """Give the groups there are, of an ascending list (n,), and the least value of each."""
     first = np.flatnonzero(np.diff(group, prepend=-1))
     return group[first], np.minimum.reduceat(values, first) if first.size else values

@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
-from voxdisplay.voxelization.curve_batch import Batch, Samples
-from voxdisplay.voxelization.index_ranges import blocks, spread
-from voxdisplay.voxelization.root_finding import TOLERANCE, cross
-from voxdisplay.voxelization.voxel_events import Events, Voxels
+from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
+from voxdisplay.voxelization.index_ranges import expand_ranges, split_blocks
+from voxdisplay.voxelization.root_finding import TOLERANCE, find_roots
+from voxdisplay.voxelization.voxel_events import VoxelEvents, Voxels
 
 # Knot intervals handled at once: enough to forget what a call costs, few enough for what is
 # computed per crossing to stay in cache.
 BLOCK = 1 << 15
 # So many blocks are worth threads.
-MANY = 8
+MIN_PARALLEL_BLOCKS = 8
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
 # the last bit, or lines along edges and diagonals waver.
-NUDGE = 1e-9
+TIE_TOLERANCE = 1e-9
 # A corner must be better by this much, in square voxels, to be preferred to the nearest one.
-MARGIN = 1e-8
+MIN_GAIN = 1e-8
 
 Ends = tuple[Floats, Floats]
 
@@ -43,23 +43,23 @@ class Crossings:
     the tangent; infinite where there is no better one.
     """
 
-    events: Events
+    events: VoxelEvents
     better: Voxels
     gain: Floats
 
 
-class Aims(NamedTuple):
+class CrossingGuesses(NamedTuple):
     """Where curves should cross the planes of the axis that changes most, one entry per plane."""
 
     knot: Ints  # the last before it
     axis: NDArray[np.int8]
     descends: NDArray[np.bool_]
     level: Floats  # of the plane: i + 1/2
-    tau: Floats  # where it is crossed, in steps between knots
+    tau: Floats  # where it is crossed, in steps between samples
     t: Floats  # the parameter there
 
 
-class Corners(NamedTuple):
+class CornerChoices(NamedTuple):
     """Corners of the faces crossed, as the voxels they are the centres of: see `corners`."""
 
     nearest: Voxels
@@ -68,24 +68,24 @@ class Corners(NamedTuple):
     foot: Floats
 
 
-def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
-    """Find all crossings between knots, along curves, of planes of the axis that changes most.
+def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
+    """Find all crossings between samples, along curves, of planes of the axis that changes most.
 
     Their events are connected only where one axis goes on to dominate.
     """
-    slopes = slopes_at(knots)
+    slopes = slopes_at(samples)
 
     def crossings_of(block: tuple[int, int]) -> Crossings:
-        return _crossings_of(batch, knots, slopes, aim(knots, slopes, *block))
+        return _block_crossings(batch, samples, slopes, guess_crossings(samples, slopes, *block))
 
-    parts = [(0, knots.t.size)]
-    if knots.t.size > BLOCK:
-        parts = list(blocks(knots.curve_starts(len(batch.curves)), knots.t.size, BLOCK))
-    apart = len(parts) >= MANY and batch.thread_safe
+    parts = [(0, samples.t.size)]
+    if samples.t.size > BLOCK:
+        parts = list(split_blocks(samples.curve_starts(len(batch.curves)), samples.t.size, BLOCK))
+    apart = len(parts) >= MIN_PARALLEL_BLOCKS and batch.thread_safe
     found = list((parallel.ordered_map if apart else map)(crossings_of, parts))
     crossings = found[0]
     if len(found) > 1:
-        events = Events(
+        events = VoxelEvents(
             np.concatenate([part.events.piece for part in found]),
             np.concatenate([part.events.t for part in found]),
             np.concatenate([part.events.voxels for part in found], axis=1),
@@ -104,16 +104,16 @@ def dominant_crossings(batch: Batch, knots: Samples) -> Crossings:
 
 @with_kernel
 @np.errstate(all="ignore")
-def slopes_at(knots: Samples) -> Floats:
-    """Estimate dP/dt at the knots, (3, K), from parabolas through three of them."""
-    joined = knots.joined
-    h = np.where(joined, knots.t[1:] - knots.t[:-1], 1.0)
-    slopes = np.zeros_like(knots.points)
-    velocity = (knots.points[:, 1:] - knots.points[:, :-1]) / h
+def slopes_at(samples: Samples) -> Floats:
+    """Estimate dP/dt at the samples, (3, K), from parabolas through three of them."""
+    joined = samples.joined
+    h = np.where(joined, samples.t[1:] - samples.t[:-1], 1.0)
+    slopes = np.zeros_like(samples.points)
+    velocity = (samples.points[:, 1:] - samples.points[:, :-1]) / h
     slopes[:, 1:-1] = (velocity[:, :-1] * h[1:] + velocity[:, 1:] * h[:-1]) / (h[1:] + h[:-1])
-    inner = np.zeros(knots.t.size, dtype=bool)
+    inner = np.zeros(samples.t.size, dtype=bool)
     inner[1:-1] = joined[1:] & joined[:-1]
-    bounds = knots.bounds
+    bounds = samples.bounds
     first, last = bounds[:-1], bounds[1:] - 1
     alone = first == last
     if alone.any():
@@ -128,27 +128,27 @@ def slopes_at(knots: Samples) -> Floats:
 
 @with_kernel
 @np.errstate(all="ignore")
-def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
-    """Guess, by cubics, where steps from knots low..high-1 cross planes of their dominant axis."""
-    stop = min(high + 1, knots.t.size)
-    points = knots.points[:, low:stop]
+def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> CrossingGuesses:
+    """Guess, by cubics, where the steps from samples low..high-1 cross their dominant planes."""
+    stop = min(high + 1, samples.t.size)
+    points = samples.points[:, low:stop]
     cells = np.floor(points - 0.5)
     length = np.abs(points[:, 1:] - points[:, :-1])
-    length[0] *= 1 + NUDGE
-    length[2] *= 1 - NUDGE
+    length[0] *= 1 + TIE_TOLERANCE
+    length[2] *= 1 - TIE_TOLERANCE
     axis = np.where(
         (length[0] >= length[1]) & (length[0] >= length[2]), 0, 2 - (length[1] >= length[2])
     ).astype(np.int8)
-    passed = _of_axis(cells[:, 1:] - cells[:, :-1], axis)
-    step = ((passed != 0) & (knots.piece[low + 1 : stop] == knots.piece[low : stop - 1])).nonzero()[
-        0
-    ]
+    passed = _select_axis(cells[:, 1:] - cells[:, :-1], axis)
+    step = (
+        (passed != 0) & (samples.piece[low + 1 : stop] == samples.piece[low : stop - 1])
+    ).nonzero()[0]
     axis, passed = axis[step], passed[step]
     left = low + step
-    at = axis.astype(np.int64) * knots.t.size + left  # of flat rows
-    h = knots.t[left + 1] - knots.t[left]
-    begin = knots.points.take(at)
-    length = knots.points.take(at + 1) - begin
+    at = axis.astype(np.int64) * samples.t.size + left  # of flat rows
+    h = samples.t[left + 1] - samples.t[left]
+    begin = samples.points.take(at)
+    length = samples.points.take(at + 1) - begin
     m_left = length / (slopes.take(at) * h)
     m_right = length / (slopes.take(at + 1) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
@@ -160,27 +160,29 @@ def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
     planes = np.abs(passed).astype(np.int64)
     # From here on everything is per crossing.
     of = np.repeat(np.arange(left.size), planes)
-    nth = spread(np.zeros_like(planes), planes)
+    nth = expand_ranges(np.zeros_like(planes), planes)
     level: Floats = first[of] + np.sign(passed)[of] * nth
     u = (level - begin[of]) / length[of]
     rest = 1.0 - u
     tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
     knot = left[of]
-    t_left = knots.t[knot]
-    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), knots.t[knot + 1])
-    return Aims(knot, axis[of], passed[of] < 0, level, tau, t)
+    t_left = samples.t[knot]
+    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), samples.t[knot + 1])
+    return CrossingGuesses(knot, axis[of], passed[of] < 0, level, tau, t)
 
 
-def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> Crossings:
-    aims, points = _corrected(batch, knots, aims)
-    piece, t = knots.piece[aims.knot], aims.t
-    curve = knots.curve[piece]
-    nearest, better, gain, foot = corners(knots, slopes, aims, points)
+def _block_crossings(
+    batch: CurveBatch, samples: Samples, slopes: Floats, aims: CrossingGuesses
+) -> Crossings:
+    aims, points = _refine_crossings(batch, samples, aims)
+    piece, t = samples.piece[aims.knot], aims.t
+    curve = samples.curve[piece]
+    nearest, better, gain, foot = rank_corners(samples, slopes, aims, points)
     check = np.isfinite(foot).nonzero()[0]
     if check.size:  # at the foot of the perpendicular the curve must be near enough
         left = aims.knot[check]
         t_foot = np.clip(
-            t[check] + foot[check] * (knots.t[left + 1] - knots.t[left]),
+            t[check] + foot[check] * (samples.t[left + 1] - samples.t[left]),
             batch.first[curve[check]],
             batch.last[curve[check]],
         )
@@ -189,39 +191,43 @@ def _crossings_of(batch: Batch, knots: Samples, slopes: Floats, aims: Aims) -> C
         gain[far] = np.inf
 
     heading = (2 * aims.axis + aims.descends).astype(np.int8)
-    return Crossings(Events(piece.astype(np.int32), t, nearest, heading), better, gain)
+    return Crossings(VoxelEvents(piece.astype(np.int32), t, nearest, heading), better, gain)
 
 
-def _corrected(batch: Batch, knots: Samples, aims: Aims) -> tuple[Aims, Floats]:
+def _refine_crossings(
+    batch: CurveBatch, samples: Samples, aims: CrossingGuesses
+) -> tuple[CrossingGuesses, Floats]:
     """Find where planes are crossed, and the points there, but not those that are jumped over."""
-    curve = knots.curve[knots.piece[aims.knot]]
+    curve = samples.curve[samples.piece[aims.knot]]
     points = batch.evaluate(curve, aims.t)
-    miss = _of_axis(points, aims.axis) - aims.level
+    miss = _select_axis(points, aims.axis) - aims.level
     off = (np.abs(miss) > TOLERANCE).nonzero()[0]
     if not off.size:
         return aims, points
-    bracket, ends = _brackets(knots, aims, miss, off)
+    bracket, ends = _brackets(samples, aims, miss, off)
     axis = aims.axis[off].astype(np.int64)
-    aims.t[off], points[:, off], found = cross(
+    aims.t[off], points[:, off], found = find_roots(
         batch, curve[off], axis, aims.level[off], bracket, ends
     )
     hit = off[found]
     left = aims.knot[hit]
-    aims.tau[hit] = (aims.t[hit] - knots.t[left]) / (knots.t[left + 1] - knots.t[left])
+    aims.tau[hit] = (aims.t[hit] - samples.t[left]) / (samples.t[left + 1] - samples.t[left])
     if found.all():
         return aims, points
     kept = np.ones(aims.t.size, dtype=bool)
     kept[off] = found
-    return Aims._make(each[kept] for each in aims), points[:, kept]
+    return CrossingGuesses._make(each[kept] for each in aims), points[:, kept]
 
 
-def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends, Ends]:
+def _brackets(
+    samples: Samples, aims: CrossingGuesses, miss: Floats, off: Ints
+) -> tuple[Ends, Ends]:
     """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
     left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
-    begin = _of_axis(knots.points[:, left], axis)
-    length = _of_axis(knots.points[:, left + 1], axis) - begin
-    h = knots.t[left + 1] - knots.t[left]
-    low, high = knots.t[left], knots.t[left] + h
+    begin = _select_axis(samples.points[:, left], axis)
+    length = _select_axis(samples.points[:, left + 1], axis) - begin
+    h = samples.t[left + 1] - samples.t[left]
+    low, high = samples.t[left], samples.t[left] + h
     at_low, at_high = begin - level, begin + length - level
     after = (miss[off] < 0) == (at_low < 0)  # the crossing comes after the guess
     bracket = np.where(after, t, low), np.where(after, high, t)
@@ -230,7 +236,9 @@ def _brackets(knots: Samples, aims: Aims, miss: Floats, off: Ints) -> tuple[Ends
 
 @with_kernel
 @np.errstate(all="ignore")
-def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
+def rank_corners(
+    samples: Samples, slopes: Floats, aims: CrossingGuesses, points: Floats
+) -> CornerChoices:
     """Look for the corners of the crossed faces that are nearest to the tangents.
 
     For a line, and up to the second order for a curve, that is the best voxel among all with
@@ -238,10 +246,10 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
 
     Parameters
     ----------
-    knots : Samples
+    samples : Samples
         Along the curves.
     slopes : (3, K) float64 array
-        dP/dt at the knots.
+        dP/dt at the samples.
     aims : Aims
         Which planes are crossed, where.
     points : (3, n) float64 array
@@ -256,15 +264,15 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
         ``nearest`` is the best.
     foot : (n,) float64 array
         Where the better corner is further than sqrt(1/2) from the crossing: the way to the foot of
-        the perpendicular along the tangent, in steps between knots. Infinite elsewhere.
+        the perpendicular along the tangent, in steps between samples. Infinite elsewhere.
 
     """
     left, axis, tau = aims.knot, aims.axis, aims.tau
-    nearest = np.floor(points + NUDGE)
+    nearest = np.floor(points + TIE_TOLERANCE)
     plane = aims.level - 0.5
     for row in range(3):
         np.copyto(nearest[row], plane, where=axis == row)
-    h = knots.t[left + 1] - knots.t[left]
+    h = samples.t[left + 1] - samples.t[left]
     tangent = slopes.take(left, axis=1) * h  # per step, not per t
     after = slopes.take(left + 1, axis=1) * h
     tangent += tau * (after - tangent)
@@ -277,15 +285,15 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
     # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
     # with p = D.w and s = w.e_b. Two such steps change it by the sum of both minus 2 s s'.
     changes, shifts = [], []
-    for off, way in zip(_across(apart, axis), _across(along, axis), strict=True):
+    for off, way in zip(_other_axes(apart, axis), _other_axes(along, axis), strict=True):
         shift = np.where(off > 0, -way, way)
         shifts.append(shift)
         changes.append(1.0 - 2.0 * np.abs(off) - (2.0 * project + shift) * shift)
-    best = np.where(changes[0] < -MARGIN, changes[0], 0.0)
-    other = changes[1] < best - MARGIN
+    best = np.where(changes[0] < -MIN_GAIN, changes[0], 0.0)
+    other = changes[1] < best - MIN_GAIN
     best = np.where(other, changes[1], best)
     total = changes[0] + changes[1] - 2.0 * shifts[0] * shifts[1]
-    both = total < best - MARGIN
+    both = total < best - MIN_GAIN
     best = np.where(both, total, best)
 
     nearest = nearest.astype(np.int32)
@@ -302,14 +310,14 @@ def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corne
         apart[across, each] += step
     far = ((apart * apart).sum(axis=0) > 0.5).nonzero()[0]
     foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
-    return Corners(nearest, better, gain, foot)
+    return CornerChoices(nearest, better, gain, foot)
 
 
-def _across(rows: Floats, axis: NDArray[np.int8]) -> tuple[Floats, Floats]:
+def _other_axes(rows: Floats, axis: NDArray[np.int8]) -> tuple[Floats, Floats]:
     """Pick from three rows, (3, n), the two that are not named by ``axis`` (n,), in order."""
     return np.where(axis == 0, rows[1], rows[0]), np.where(axis == 2, rows[1], rows[2])
 
 
-def _of_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:
+def _select_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:
     """Pick from three rows, (3, n), the one named by ``axis`` (n,)."""
     return np.asarray(np.where(axis == 0, rows[0], np.where(axis == 1, rows[1], rows[2])))

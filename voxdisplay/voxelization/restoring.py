@@ -10,19 +10,19 @@ from __future__ import annotations
 import numpy as np
 
 from voxdisplay.compute.array_types import Floats
-from voxdisplay.voxelization.certify import COVERAGE, ROUNDING, reach
-from voxdisplay.voxelization.thinning import without_repeats
-from voxdisplay.voxelization.voxel_events import Events
+from voxdisplay.voxelization.certify import COVERAGE, ROUNDING, box_distances
+from voxdisplay.voxelization.thinning import drop_repeats
+from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 
-def mend(
-    thin: Events,
-    full: Events,
+def restore_coverage(
+    thin: VoxelEvents,
+    full: VoxelEvents,
     box_ends: tuple[Floats, Floats],
     boxes: tuple[Floats, Floats],
     *,
     closed: bool,
-) -> Events:
+) -> VoxelEvents:
     """Put voxels back where boxes are too far from any.
 
     Parameters
@@ -38,7 +38,7 @@ def mend(
     if thin.t.size < 2:
         return full
     centres = thin.voxels.astype(np.float64) + 0.5
-    far = reach(box_ends, boxes, centres, thin.t, closed=False)
+    far = box_distances(box_ends, boxes, centres, thin.t, closed=False)
     bad = far > COVERAGE - ROUNDING
     middle = (box_ends[0][bad] + box_ends[1][bad]) / 2
     at = np.searchsorted(thin.t, middle)
@@ -55,7 +55,7 @@ def mend(
     voxels = np.concatenate((thin.voxels[:, kept], full.voxels[:, back]), axis=1)[:, order]
     heading = np.concatenate((thin.heading[kept], full.heading[back]))[order]
     piece = np.full(t.size, thin.piece[0])
-    whole = without_repeats(Events(piece, t[order], voxels, heading))
+    whole = drop_repeats(VoxelEvents(piece, t[order], voxels, heading))
     if closed and whole.t.size > 1 and (whole.voxels[:, 0] == whole.voxels[:, -1]).all():
         return whole.take(np.arange(whole.t.size - 1))
     return whole

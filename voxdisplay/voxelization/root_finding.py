@@ -8,15 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
-from voxdisplay.voxelization.curve_batch import Batch
+from voxdisplay.voxelization.curve_batch import CurveBatch
 
 # How far from its mid-plane a crossing may be found, in voxels: sqrt(1/2 + 0.002^2) < 0.7072.
 TOLERANCE = 2e-3
 
 
 @np.errstate(all="ignore")
-def cross(
-    batch: Batch,
+def find_roots(
+    batch: CurveBatch,
     curve: Ints,
     axis: Ints,
     level: Floats,

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Ints
-from voxdisplay.voxelization.index_ranges import spread
+from voxdisplay.voxelization.index_ranges import expand_ranges
 
 # Pairs that are worked on at once: what bounds the memory of a search.
-PAIRS = 1 << 17
+PAIRS_PER_BLOCK = 1 << 17
 
 # Offsets (dx, dy) of the columns of cells around a cell; the first five with no pair twice.
 COLUMNS = ((0, 0), (0, 1), (1, -1), (1, 0), (1, 1), (0, -1), (-1, 1), (-1, 0), (-1, -1))
 
 
-class Cells:
+class SpatialHash:
     """Items sorted by the cell they are in.
 
     Parameters
@@ -41,7 +41,9 @@ class Cells:
         self.order: Ints = np.argsort(key, kind="stable")
         self._keys = key[self.order]
 
-    def column(self, cells: NDArray[np.integer], offset: tuple[int, int]) -> tuple[Ints, Ints]:
+    def column_ranges(
+        self, cells: NDArray[np.integer], offset: tuple[int, int]
+    ) -> tuple[Ints, Ints]:
         """Find the items near cells, (3, n), in one column.
 
         Returns
@@ -60,7 +62,7 @@ class Cells:
         known = self._columns[number] == wanted
         return np.where(known, low, 0), np.where(known, np.maximum(high, low), 0)
 
-    def around(self, cells: NDArray[np.integer]) -> Iterator[tuple[Ints, Ints]]:
+    def neighbours(self, cells: NDArray[np.integer]) -> Iterator[tuple[Ints, Ints]]:
         """Pair cells, (3, n), with the items in the 27 cells around each.
 
         Yields
@@ -69,17 +71,17 @@ class Cells:
             Indices of cells, ascending, and of items. All pairs of a cell come together.
 
         """
-        ranges = [self.column(cells, offset) for offset in COLUMNS]
+        ranges = [self.column_ranges(cells, offset) for offset in COLUMNS]
         low = np.stack([low for low, _ in ranges], axis=1)
         count = np.stack([high for _, high in ranges], axis=1) - low
         total = np.cumsum(count.sum(axis=1))
         start = 0
         while start < total.size:
             done = int(total[start - 1]) if start else 0
-            stop = max(int(np.searchsorted(total, done + PAIRS, side="right")), start + 1)
+            stop = max(int(np.searchsorted(total, done + PAIRS_PER_BLOCK, side="right")), start + 1)
             flat = count[start:stop].reshape(-1)
             of = np.repeat(np.arange(start, stop), count[start:stop].sum(axis=1))
-            yield of, self.order[spread(low[start:stop].reshape(-1), flat)]
+            yield of, self.order[expand_ranges(low[start:stop].reshape(-1), flat)]
             start = stop
 
 

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.curve_batch import Batch
+from voxdisplay.voxelization.curve_batch import CurveBatch
 from voxdisplay.voxelization.sequence import Sequence
 
 # Estimates the parameters, (n,), at which a curve is near points, (3, n); the second argument is
 # the parameter found for the voxel before.
-Guess = Callable[[Floats, float], Floats]
+ParameterEstimate = Callable[[Floats, float], Floats]
 
 # Pitch of the search for the nearest point, by variant, and how far it goes to either side, if not
 # said otherwise: see `follow` for the units.
@@ -39,11 +39,11 @@ MOST_TESTS = 1000
 # The matrix M of the paper without the signs: one step along one, two or three axes.
 MOVES = np.array(sorted(product((0, 1), repeat=3), key=sum)[1:]).T
 # A march this many times as long as its curve does not arrive.
-PATIENCE = 4
+MAX_LENGTH_RATIO = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class MarchTrace:
     """A march, as the paper reports it.
 
     Attributes
@@ -69,7 +69,7 @@ def march(
     tangent: str | None = None,
     pitch: float | None = None,
     reach: float | None = None,
-    guess: Guess | None = None,
+    guess: ParameterEstimate | None = None,
 ) -> Sequence:
     """Voxelise a curve by the tangent march. Parameters are those of `follow`."""
     begin = perf_counter()
@@ -91,8 +91,8 @@ def follow(
     tangent: str | None = None,
     pitch: float | None = None,
     reach: float | None = None,
-    guess: Guess | None = None,
-) -> Trail:
+    guess: ParameterEstimate | None = None,
+) -> MarchTrace:
     """March along a curve.
 
     Parameters
@@ -130,7 +130,7 @@ def follow(
 
     """
     pitch, reach = search_steps(variant, pitch, reach)
-    walk = _Walk(curve, variant, tangent, (pitch, reach), guess)
+    walk = _MarchingCurve(curve, variant, tangent, (pitch, reach), guess)
     first, last = curve.t_range
     ends = np.floor(walk.position(np.array([first, last])))
     target = ends[:, 1]
@@ -142,7 +142,7 @@ def follow(
     for _ in range(walk.longest):
         # A closed curve begins in its last voxel, and a short one need not leave it.
         if t >= last or ((t > middle or walk.still) and bool((voxel == target).all())):
-            return Trail(
+            return MarchTrace(
                 np.array(voxels).astype(np.int32), np.array(parameters), np.array(distances)
             )
         sign = np.where(walk.tangent(t) < 0, -1.0, 1.0)
@@ -179,7 +179,7 @@ def search_steps(variant: int, pitch: float | None, reach: float | None) -> tupl
     return pitch, reach
 
 
-class _Walk:
+class _MarchingCurve:
     """How one march looks at its curve."""
 
     def __init__(
@@ -188,9 +188,9 @@ class _Walk:
         variant: int,
         tangent: str | None,
         search: tuple[float, float],
-        guess: Guess | None,
+        guess: ParameterEstimate | None,
     ) -> None:
-        self._batch = Batch([curve])
+        self._batch = CurveBatch([curve])
         self._curve = curve
         self._parabola = variant == 3
         has_derivative = curve.derivative(np.array(curve.t_range[:1])) is not None
@@ -203,9 +203,9 @@ class _Walk:
         t = np.linspace(*curve.t_range, 1025)
         points = self.position(t)
         length = np.abs(np.diff(points, axis=1)).sum(axis=1)
-        self.longest = int(PATIENCE * length.sum()) + 16
+        self.longest = int(MAX_LENGTH_RATIO * length.sum()) + 16
         self.still = bool((np.floor(points) == np.floor(points[:, :1])).all())
-        angle = around_axis(t, points)
+        angle = azimuth_estimate(t, points)
         self._cylinder = angle is not None
         if self._cylinder:
             self._pitch, reach = np.radians(search)
@@ -257,7 +257,7 @@ class _Walk:
         return np.asarray(np.where(inside, vertex, apart[row, least]))
 
 
-def around_axis(t: Floats, points: Floats) -> Guess | None:
+def azimuth_estimate(t: Floats, points: Floats) -> ParameterEstimate | None:
     """Give equation 11 for a curve x0 + R cos t, y0 + R sin t, z(t), if these points are on one."""
     cosine, sine = np.cos(t), np.sin(t)
     one, none = np.ones(t.size), np.zeros(t.size)

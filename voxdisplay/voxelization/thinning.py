@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.curve_batch import Samples
-from voxdisplay.voxelization.index_ranges import spread
-from voxdisplay.voxelization.voxel_events import OTHER, Events, near
+from voxdisplay.voxelization.index_ranges import expand_ranges
+from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, adjacent
 
 # How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
 WINDOW = 12
@@ -22,22 +22,24 @@ WINDOW = 12
 BLOCK = 1 << 12
 # How far from the voxels at both ends of a short cut samples of the curve may be between them, in
 # voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
-# which is much more than `knots.BEND` at cusps.
-REACH = 2.0
+# which is much more than `adaptive_sampling.MAX_SAG` at cusps.
+MAX_UNCOVERED = 2.0
 
 
-def without_repeats(events: Events) -> Events:
+def drop_repeats(events: VoxelEvents) -> VoxelEvents:
     """Drop events whose voxel is that of the event before them in the piece."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
     return events.take(np.concatenate(([True], ~same))) if same.any() else events
 
 
 @with_kernel
-def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
+def thin_events(
+    events: VoxelEvents, samples: Samples | None = None, *, keep_tips: bool = False
+) -> VoxelEvents:
     """Take short cuts, event i to event J(i), from the first to the last event of every piece.
 
     J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
-    with every event between them adjacent to i (a prefix) or to j (the rest). On the way so found
+    with every event between them adjacent to i (a prefix) or to j (the rest). On the path so found
     no two voxels are neighbours but consecutive ones, unless the curve leaves their surroundings
     between them: a chord from a to c across b would have made c, not b, the J(a).
 
@@ -45,10 +47,10 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
     ----------
     events : Events
         Consecutive ones 26-adjacent or equal within a piece.
-    way : Samples, optional
-        Points along the same pieces. Short cuts that leave one of them further than ``REACH``
-        from both ends are not taken: what chords remain are the curve's own.
-    tips : bool
+    samples : Samples, optional
+        Points along the same pieces. Short cuts that leave one of them further than
+        ``MAX_UNCOVERED`` from both ends are not taken: the chords that remain are the curve's.
+    keep_tips : bool
         Take no short cut over a tip: a voxel that sticks out of the box around both ends, where
         the sequence comes back so near to itself that it would still be touching without the tip.
 
@@ -60,27 +62,27 @@ def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) ->
     """
     if not events.t.size:
         return events
-    full, thin = events, without_repeats(events)
-    start, stop = _short_cuts(thin, way, tips=tips)
+    full, thin = events, drop_repeats(events)
+    start, stop = _shortcuts(thin, samples, keep_tips=keep_tips)
     if start.size:
         change = np.zeros(thin.t.size, dtype=np.int8)
         change[start + 1] += 1
         change[stop] -= 1
-        thin = without_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
+        thin = drop_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
     # A piece ends where it ends, even if its last voxel was reached before.
     last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
     thin.t[thin_last] = full.t[last]
     return thin
 
 
-def runs_on(events: Events) -> NDArray[np.bool_]:
+def continues_run(events: VoxelEvents) -> NDArray[np.bool_]:
     """Tell which events, (M,), are one step further than the last on the axis both head along.
 
     Events that run on have no chord among them: they are as far apart as their indices are.
     """
     heading, size = events.heading, events.t.size
     on = np.zeros(size, dtype=bool)
-    on[1:] = events.joined & (heading[1:] == heading[:-1]) & (heading[1:] != OTHER)
+    on[1:] = events.joined & (heading[1:] == heading[:-1]) & (heading[1:] != NO_HEADING)
     along = on.nonzero()[0]
     at = (heading[along] >> 1).astype(np.int64) * size + along  # of flat rows
     step = events.voxels.take(at) - events.voxels.take(at - 1)
@@ -88,29 +90,29 @@ def runs_on(events: Events) -> NDArray[np.bool_]:
     return on
 
 
-def _short_cuts(
-    events: Events, way: Samples | None, *, tips: bool
+def _shortcuts(
+    events: VoxelEvents, samples: Samples | None, *, keep_tips: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the short cuts i, J(i) with J(i) > i + 1 on the way from the start of each piece."""
+    """Find the short cuts i, J(i) with J(i) > i + 1 on the path from the start of each piece."""
     size = events.t.size
     # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
-    turn = (~runs_on(events)).nonzero()[0]
+    turn = (~continues_run(events)).nonzero()[0]
     reach = np.bincount(np.maximum(turn - WINDOW, 0), minlength=size + 1)
     reach -= np.bincount(np.minimum(turn + WINDOW, size), minlength=size + 1)
     look = (np.cumsum(reach[:-1]) > 0).nonzero()[0]
     if look.size < 3:
         return look[:0], look[:0]
     stretch = look - np.arange(look.size) + events.piece[look]
-    leap = furthest(events.voxels.take(look, axis=1), stretch)
+    leap = furthest_shortcuts(events.voxels.take(look, axis=1), stretch)
     short = (leap > 1).nonzero()[0]
     if not short.size:
         return short, short
     starts, stops = look[short], look[short] + leap[short]
-    if tips:
-        keep = ~_over_tips(events, starts, stops)
+    if keep_tips:
+        keep = ~_skips_tip(events, starts, stops)
         starts, stops = starts[keep], stops[keep]
-    if way:
-        keep = ~_leave_behind(events, way, starts, stops)
+    if samples:
+        keep = ~_uncovers_curve(events, samples, starts, stops)
         starts, stops = starts[keep], stops[keep]
     taken = []
     end = -1
@@ -121,17 +123,17 @@ def _short_cuts(
     return starts[taken], stops[taken]
 
 
-def _over_tips(
-    events: Events, starts: NDArray[np.intp], stops: NDArray[np.intp]
+def _skips_tip(
+    events: VoxelEvents, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """Tell which short cuts would take a tip and still leave a chord beside them."""
     voxels, size = events.voxels, events.t.size
     before, after = np.maximum(starts - 1, 0), np.minimum(stops + 1, size - 1)
     piece = events.piece
     apart = (before == starts) | (piece[before] != piece[starts])
-    touches = near(voxels[:, before], voxels[:, stops]) & ~apart
+    touches = adjacent(voxels[:, before], voxels[:, stops]) & ~apart
     apart = (after == stops) | (piece[after] != piece[stops])
-    touches |= near(voxels[:, starts], voxels[:, after]) & ~apart
+    touches |= adjacent(voxels[:, starts], voxels[:, after]) & ~apart
     low = np.minimum(voxels[:, starts], voxels[:, stops])
     high = np.maximum(voxels[:, starts], voxels[:, stops])
     out = np.zeros(starts.size, dtype=bool)
@@ -141,28 +143,28 @@ def _over_tips(
     return np.asarray(touches & out)
 
 
-def _leave_behind(
-    events: Events, way: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
+def _uncovers_curve(
+    events: VoxelEvents, samples: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Tell which short cuts leave a point of the curve out of ``REACH``."""
+    """Tell which short cuts leave a point of the curve out of ``MAX_UNCOVERED``."""
     # Complex numbers are ordered by their real parts, then by their imaginary ones.
-    order = way.piece + 1j * way.t
+    order = samples.piece + 1j * samples.t
     ends = np.stack((starts, stops))
     low, high = np.searchsorted(order, events.piece[starts] + 1j * events.t[ends])
     count = high - low
     of = np.arange(starts.size).repeat(count)
-    points = way.points.take(spread(low, count), axis=1)
+    points = samples.points.take(expand_ranges(low, count), axis=1)
     apart = points[:, None] - (events.voxels.take(ends[:, of], axis=1) + 0.5)
-    far = ((apart * apart).sum(axis=0) > REACH * REACH).all(axis=0)
+    far = ((apart * apart).sum(axis=0) > MAX_UNCOVERED * MAX_UNCOVERED).all(axis=0)
     behind = np.zeros(starts.size, dtype=bool)
     behind[of[far]] = True
     return behind
 
 
-def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
+def furthest_shortcuts(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
     """Give J(i) - i for each of n voxels, (3, n), which are looked at within stretches (n,)."""
     leap = np.ones(stretch.size, dtype=np.int8)
-    touch = _touching(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
+    touch = _adjacency_in_window(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
     w, start = touch[1:].nonzero()
     if start.size:
         w += 2
@@ -176,7 +178,7 @@ def furthest(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray
     return leap
 
 
-def _touching(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _adjacency_in_window(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Tell which of n voxels touch the ones after them: [w - 1, i] for voxels i and i + w.
 
     A fourth row, twice the stretch, keeps those of different stretches apart.

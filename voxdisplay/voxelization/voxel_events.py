@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.kernel_backend import with_kernel
-from voxdisplay.voxelization.index_ranges import insert
+from voxdisplay.voxelization.index_ranges import insert_columns
 
 Voxels = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
-class Events:
+class VoxelEvents:
     """Voxels along pieces of curves, each with the parameter where the curve calls for it.
 
     Attributes
@@ -30,7 +30,7 @@ class Events:
         Rows x, y, z.
     heading : (M,) int8 array
         The axis along which the curve passes the voxel's mid-plane and the sense in which it does,
-        2 * axis + (1 if it descends). ``OTHER`` for what is not part of such a run. Two
+        2 * axis + (1 if it descends). ``NO_HEADING`` for what is not part of such a run. Two
         neighbours of one heading are one apart on its axis.
 
     """
@@ -40,19 +40,19 @@ class Events:
     voxels: Voxels
     heading: NDArray[np.int8]
 
-    def take(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Events:
+    def take(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> VoxelEvents:
         """Give the events at an index array or under a mask."""
         if index.dtype == bool:
             (index,) = index.nonzero()
         voxels = self.voxels.take(index, axis=1)
-        return Events(self.piece[index], self.t[index], voxels, self.heading[index])
+        return VoxelEvents(self.piece[index], self.t[index], voxels, self.heading[index])
 
-    def insert(self, at: NDArray[np.intp], other: Events) -> Events:
+    def insert(self, at: NDArray[np.intp], other: VoxelEvents) -> VoxelEvents:
         """Put other events before those at the indices ``at``, which ascend."""
         mine, others = ((each.piece, each.t, each.voxels, each.heading) for each in (self, other))
-        return Events(*insert(at, mine, others))
+        return VoxelEvents(*insert_columns(at, mine, others))
 
-    def with_voxels(self, voxels: Voxels) -> Events:
+    def with_voxels(self, voxels: Voxels) -> VoxelEvents:
         """Give the same events with other voxels."""
         return replace(self, voxels=voxels)
 
@@ -63,20 +63,20 @@ class Events:
 
     def gaps(self) -> NDArray[np.intp]:
         """Find the steps within a piece between voxels that are not neighbours: k for k, k + 1."""
-        return torn(self.piece, self.voxels)
+        return find_gaps(self.piece, self.voxels)
 
 
-OTHER = np.int8(-1)
+NO_HEADING = np.int8(-1)
 
 
-def near(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
+def adjacent(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
     """Tell which voxels, (3, n) each, are 26-adjacent or equal."""
     close = np.abs(here - there) <= 1
     return np.asarray(close[0] & close[1] & close[2])
 
 
 @with_kernel
-def torn(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
+def find_gaps(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
     """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
-    apart = (piece[1:] == piece[:-1]) & ~near(voxels[:, :-1], voxels[:, 1:])
+    apart = (piece[1:] == piece[:-1]) & ~adjacent(voxels[:, :-1], voxels[:, 1:])
     return np.asarray(apart.nonzero()[0])

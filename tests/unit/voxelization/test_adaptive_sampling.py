@@ -9,18 +9,23 @@ from space_curves import Function
 
 from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.adaptive_sampling import LOOK, first_look, knots, refine
-from voxdisplay.voxelization.curve_batch import Batch, Samples
+from voxdisplay.voxelization.adaptive_sampling import (
+    INITIAL_STEPS,
+    initial_samples,
+    limit_chords,
+    sample_adaptively,
+)
+from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
 
 
 def test_curves_are_looked_at_as_closely_as_their_degree_asks() -> None:
     rng = np.random.default_rng(1)
     unknown = Function(lambda t: (9 * t, 0.0, 0.0))
     beziers = [Bezier(rng.uniform(0, 9, (degree + 1, 3))) for degree in (1, 3, 40)]
-    batch = Batch([unknown, *beziers])
-    samples = first_look(batch)
+    batch = CurveBatch([unknown, *beziers])
+    samples = initial_samples(batch)
     sizes = np.bincount(samples.piece).tolist()
-    assert sizes[1] < sizes[2] < sizes[3] == sizes[0] == LOOK + 1
+    assert sizes[1] < sizes[2] < sizes[3] == sizes[0] == INITIAL_STEPS + 1
     for index in range(4):
         t = samples.t[samples.piece == index]
         assert (t[0], t[-1]) == (0.0, 1.0)
@@ -29,7 +34,7 @@ def test_curves_are_looked_at_as_closely_as_their_degree_asks() -> None:
 
 def test_breaks_are_looked_at_once() -> None:
     chain = Polyline([[0, 0, 0], [2, 9, 1], [4, 0, 2], [6, 9, 3]])
-    samples = first_look(Batch([Segment((0, 0, 0), (1, 2, 3)), chain, chain]))
+    samples = initial_samples(CurveBatch([Segment((0, 0, 0), (1, 2, 3)), chain, chain]))
     for index in (1, 2):
         t = samples.t[samples.piece == index]
         assert {0.0, 1.0, 2.0, 3.0} <= set(t.tolist())
@@ -41,22 +46,26 @@ def test_no_parameter_is_looked_at_twice() -> None:
     # There are 33 numbers in this range, fewer than there are looks at it.
     coarse = Function(lambda t: (3.5 * (t - 1e15), 0.0, 0.0), 1e15, 1e15 + 4)
     chain = Polyline([[0, 0, 0], [2, 9, 1], [4, 0, 2]])
-    looks = [first_look(batch) for batch in (Batch([coarse]), Batch([coarse, chain]))]
+    looks = [
+        initial_samples(batch) for batch in (CurveBatch([coarse]), CurveBatch([coarse, chain]))
+    ]
     alone, beside = (look.t[look.piece == 0] for look in looks)
     assert (np.diff(alone) > 0).all()
     assert np.array_equal(alone, beside)
 
 
-@pytest.mark.parametrize("look", [knots, lambda batch: refine(batch, first_look(batch), 0.1)])
+@pytest.mark.parametrize(
+    "look", [sample_adaptively, lambda batch: limit_chords(batch, initial_samples(batch), 0.1)]
+)
 def test_curves_are_too_rough_alone_or_not_at_all(
-    look: Callable[[Batch], Samples], monkeypatch: pytest.MonkeyPatch
+    look: Callable[[CurveBatch], Samples], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wriggle = Function(lambda t: (t, 0.4 * np.sin(700 * t), 0.0))
 
     def settles(limit: int, curves: int) -> bool:
-        monkeypatch.setattr("voxdisplay.voxelization.adaptive_sampling.MOST_SAMPLES", limit)
+        monkeypatch.setattr("voxdisplay.voxelization.adaptive_sampling.MAX_SAMPLES", limit)
         try:
-            look(Batch([wriggle] * curves))
+            look(CurveBatch([wriggle] * curves))
         except CurveError:
             return False
         return True
@@ -74,7 +83,7 @@ def test_no_turn_of_a_polynomial_is_missed(degree: int) -> None:
     wave = 20 * np.prod(t[:, None] - roots, axis=1) * 2.0 ** (degree - 1)
     samples = np.linspace(0, 1, degree + 1)
     curve = Bezier(_control(samples, np.stack((30 * samples, wave, 0 * t), axis=1)))
-    found = knots(Batch([curve]))
+    found = sample_adaptively(CurveBatch([curve]))
     fine = np.linspace(0, 1, 20_001)
     straight = np.stack([np.interp(fine, found.t, row) for row in found.points])
     assert np.abs(straight - curve.position(fine)).max() < 0.1
@@ -82,14 +91,16 @@ def test_no_turn_of_a_polynomial_is_missed(degree: int) -> None:
 
 def test_one_more_look_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     looks = []
-    evaluate = Batch.evaluate
+    evaluate = CurveBatch.evaluate
 
-    def counted(batch: Batch, curve: np.ndarray, t: np.ndarray) -> np.ndarray:
+    def counted(batch: CurveBatch, curve: np.ndarray, t: np.ndarray) -> np.ndarray:
         looks.append(t.size)
         return evaluate(batch, curve, t)
 
-    monkeypatch.setattr(Batch, "evaluate", counted)
-    found = knots(Batch([Parametric("80*cos(t)", "80*sin(t)", "80*(1 - cos(4*t))", t=(-3, 3))]))
+    monkeypatch.setattr(CurveBatch, "evaluate", counted)
+    found = sample_adaptively(
+        CurveBatch([Parametric("80*cos(t)", "80*sin(t)", "80*(1 - cos(4*t))", t=(-3, 3))])
+    )
     assert len(looks) == 2
     assert sum(looks) == found.t.size
 

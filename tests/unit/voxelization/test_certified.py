@@ -15,8 +15,8 @@ from voxdisplay.compute.kernel_backend import set_enabled
 from voxdisplay.curves import Transformed
 from voxdisplay.voxelization import measure, voxelize, voxelize_many
 from voxdisplay.voxelization.certify import COVERAGE, END_ERROR, ERROR, Certificate, certify
-from voxdisplay.voxelization.restoring import mend
-from voxdisplay.voxelization.voxel_events import OTHER, Events
+from voxdisplay.voxelization.restoring import restore_coverage
+from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents
 
 POINTS = np.random.default_rng(3).normal(size=(7, 3)) * 30
 ANY = {
@@ -227,7 +227,7 @@ def test_a_batch_proves_what_each_proves_alone():
 
 
 def test_what_one_curve_needs_for_its_proof_is_no_fault_beside_another(monkeypatch):
-    monkeypatch.setattr("voxdisplay.voxelization.adaptive_sampling.MOST_SAMPLES", 16_000)
+    monkeypatch.setattr("voxdisplay.voxelization.adaptive_sampling.MAX_SAMPLES", 16_000)
 
     class Loose(vd.Segment):
         def enclosure(self, t_lo, t_hi):
@@ -304,7 +304,7 @@ def test_what_thinning_took_is_put_back():
     ends = np.linspace(0, 10, 300)
     boxes = thin.curve.enclosure(ends[:-1], ends[1:])
     args = (ends[:-1], ends[1:]), boxes
-    mended = mend(cut, full, *args, closed=False)
+    mended = restore_coverage(cut, full, *args, closed=False)
     assert cut.t.size < mended.t.size <= full.t.size
     assert isinstance(
         certify(thin.curve, *args, mended.voxels.T, mended.t, closed=False), Certificate
@@ -313,8 +313,11 @@ def test_what_thinning_took_is_put_back():
 
 def _events(sequence):
     size = len(sequence)
-    return Events(
-        np.zeros(size, np.int32), sequence.t.copy(), sequence.voxels.T.copy(), np.full(size, OTHER)
+    return VoxelEvents(
+        np.zeros(size, np.int32),
+        sequence.t.copy(),
+        sequence.voxels.T.copy(),
+        np.full(size, NO_HEADING),
     )
 
 

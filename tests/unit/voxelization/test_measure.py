@@ -139,7 +139,7 @@ def test_a_curve_without_points_is_not_measured() -> None:
 
 
 def test_a_curve_without_end_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "MOST_SEGMENTS", 1000)
+    monkeypatch.setattr(measure, "MAX_SEGMENTS", 1000)
     with pytest.raises(ValueError, match="too rough to measure"):
         measure.distances(
             np.zeros((1, 3), dtype=int), Function(lambda t: (t, t, 40 * np.sin(1e9 * t)))

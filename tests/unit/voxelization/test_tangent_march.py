@@ -6,7 +6,7 @@ from space_curves import Function, fourier_curve, paper_curve
 
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization import voxelize
-from voxdisplay.voxelization.tangent_march import Trail, follow, march
+from voxdisplay.voxelization.tangent_march import MarchTrace, follow, march
 
 # Variant, radius = amplitude, frequency; number of voxels, greatest and mean error, as printed but
 # for two misprints: .843 is .803 in table II's other column, .391 is variant 2's.
@@ -31,7 +31,7 @@ class WithDerivative(Function):
         return (self.position(t + 1e-6) - self.position(t - 1e-6)) / 2e-6
 
 
-def paper_trail(variant: int, radius: int, frequency: int) -> Trail:
+def paper_trail(variant: int, radius: int, frequency: int) -> MarchTrace:
     # The paper's voxel centres are at whole numbers, ours at + 1/2: as ``paper_curve`` has it.
     return follow(paper_curve(radius, frequency, 1.25 * radius), variant)
 

@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from voxdisplay.voxelization.thinning import WINDOW, reduce
-from voxdisplay.voxelization.voxel_events import OTHER, Events
+from voxdisplay.voxelization.thinning import WINDOW, thin_events
+from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents
 
 
-def events(*pieces: list[tuple[int, int, int]]) -> Events:
+def events(*pieces: list[tuple[int, int, int]]) -> VoxelEvents:
     voxels = [voxel for piece in pieces for voxel in piece]
-    return Events(
+    return VoxelEvents(
         np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces]).astype(np.int32),
         np.arange(len(voxels), dtype=float),
         np.array(voxels, dtype=np.int32).reshape(-1, 3).T,
-        np.full(len(voxels), OTHER),
+        np.full(len(voxels), NO_HEADING),
     )
 
 
 def thinned(*pieces: list[tuple[int, int, int]]) -> list[tuple[int, ...]]:
-    return [tuple(voxel) for voxel in reduce(events(*pieces)).voxels.T.tolist()]
+    return [tuple(voxel) for voxel in thin_events(events(*pieces)).voxels.T.tolist()]
 
 
 def test_nothing_and_one_voxel() -> None:
@@ -57,9 +57,9 @@ def test_a_hairpin_stays() -> None:
 
 def test_straight_runs_need_no_look() -> None:
     run = events([(x, x // 3, 0) for x in range(5 * WINDOW)])
-    straight = Events(run.piece, run.t, run.voxels, np.zeros(run.t.size, dtype=np.int8))
-    assert np.array_equal(reduce(straight).voxels, reduce(run).voxels)
-    assert np.array_equal(reduce(straight).voxels, run.voxels)
+    straight = VoxelEvents(run.piece, run.t, run.voxels, np.zeros(run.t.size, dtype=np.int8))
+    assert np.array_equal(thin_events(straight).voxels, thin_events(run).voxels)
+    assert np.array_equal(thin_events(straight).voxels, run.voxels)
 
 
 def test_pieces_are_thinned_apart() -> None:
@@ -71,7 +71,7 @@ def test_pieces_are_thinned_apart() -> None:
 def test_random_walks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     walk = np.cumsum(rng.integers(-1, 2, (400, 3)), axis=0)
-    thin = reduce(events([tuple(voxel) for voxel in walk.tolist()])).voxels.T
+    thin = thin_events(events([tuple(voxel) for voxel in walk.tolist()])).voxels.T
     assert np.array_equal(thin[0], walk[0])
     assert np.array_equal(thin[-1], walk[-1])
     step = np.abs(np.diff(thin, axis=0)).max(axis=1)

@@ -5,16 +5,26 @@ functions of the same name say what and why. One loop takes the place of many ar
 looks at nothing twice.
 """
 
-from voxdisplay.voxelization.kernels.sampling import aim, corners, needed_parts, slopes_at
-from voxdisplay.voxelization.kernels.thinning import choose_corners, insert, reduce, torn
+from voxdisplay.voxelization.kernels.sampling import (
+    guess_crossings,
+    rank_corners,
+    slopes_at,
+    subdivision_counts,
+)
+from voxdisplay.voxelization.kernels.thinning import (
+    choose_corners,
+    find_gaps,
+    insert_columns,
+    thin_events,
+)
 
 __all__ = [
-    "aim",
     "choose_corners",
-    "corners",
-    "insert",
-    "needed_parts",
-    "reduce",
+    "find_gaps",
+    "guess_crossings",
+    "insert_columns",
+    "rank_corners",
     "slopes_at",
-    "torn",
+    "subdivision_counts",
+    "thin_events",
 ]

@@ -1,4 +1,4 @@
-"""From samples to the voxels of crossings: the twins of `knots` and `crossings`.
+"""From samples to the voxels of crossings: the twins of `adaptive_sampling` and `plane_crossings`.
 
 Several threads may be in them at once.
 """
@@ -9,10 +9,15 @@ import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.compute.kernel_backend import jit
-from voxdisplay.voxelization.adaptive_sampling import AMPLY, BEND, CHORD, PARTS
+from voxdisplay.voxelization.adaptive_sampling import MAX_CHORD, MAX_PARTS, MAX_SAG, OVERSPLIT
 from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.kernels.contiguous import Bytes, packed
-from voxdisplay.voxelization.plane_crossings import MARGIN, NUDGE, Aims, Corners
+from voxdisplay.voxelization.plane_crossings import (
+    MIN_GAIN,
+    TIE_TOLERANCE,
+    CornerChoices,
+    CrossingGuesses,
+)
 from voxdisplay.voxelization.voxel_events import Voxels
 
 Limits = tuple[float, float, float, float]
@@ -20,14 +25,14 @@ Limits = tuple[float, float, float, float]
 TINY = float(np.finfo(float).tiny)
 
 
-def needed_parts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
-    """See `knots.needed_parts`."""
-    points, limits = packed(samples.points), (CHORD, BEND, AMPLY, float(PARTS))
-    return _needed_parts(samples.piece, samples.t, points, resolution[samples.curve], limits)
+def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
+    """See `adaptive_sampling.subdivision_counts`."""
+    points, limits = packed(samples.points), (MAX_CHORD, MAX_SAG, OVERSPLIT, float(MAX_PARTS))
+    return _subdivision_counts(samples.piece, samples.t, points, resolution[samples.curve], limits)
 
 
 @jit
-def _most(a: float, b: float) -> float:
+def _larger(a: float, b: float) -> float:
     """Give the larger, or the one that is not a number, as numpy does."""
     return a if a >= b or a != a else b  # noqa: PLR0124 - that is how to tell
 
@@ -38,14 +43,14 @@ def _parts(h: float, chord: float, second: float, resolution: float, limits: Lim
     bend = h * h * second / 4
     if (chord <= 0.99 * most_chord) & (bend <= 0.99 * most_bend):
         return 1
-    wanted = _most(chord / most_chord, np.sqrt(bend / most_bend))
+    wanted = _larger(chord / most_chord, np.sqrt(bend / most_bend))
     if not wanted > 1:  # or not a number
         return 1
     return max(int(min(np.ceil(amply * wanted), np.floor(h / resolution), most_parts)), 1)
 
 
 @jit
-def _needed_parts(
+def _subdivision_counts(
     piece: Ints, t: Floats, points: Floats, resolution: Floats, limits: Limits
 ) -> tuple[Ints, Floats]:
     size = t.size
@@ -61,13 +66,13 @@ def _needed_parts(
             x = points[0, k + 1] - points[0, k]
             y = points[1, k + 1] - points[1, k]
             z = points[2, k + 1] - points[2, k]
-            chord[k] = _most(_most(abs(x), abs(y)), abs(z))
+            chord[k] = _larger(_larger(abs(x), abs(y)), abs(z))
             x, y, z = x / h, y / h, z / h
             if inside:
-                turn = _most(_most(abs(x - before_x), abs(y - before_y)), abs(z - before_z))
+                turn = _larger(_larger(abs(x - before_x), abs(y - before_y)), abs(z - before_z))
                 turn /= h + before_h
         if inside:
-            second = _most(before_turn, turn)
+            second = _larger(before_turn, turn)
             parts[k - 1] = _parts(before_h, chord[k - 1], second, resolution[piece[k]], limits)
         inside, before_h, before_turn = joined, h, turn
         before_x, before_y, before_z = x, y, z
@@ -77,9 +82,9 @@ def _needed_parts(
     return parts, chord
 
 
-def slopes_at(knots: Samples) -> Floats:
-    """See `crossings.slopes_at`."""
-    return _slopes_at(knots.piece, knots.t, packed(knots.points))
+def slopes_at(samples: Samples) -> Floats:
+    """See `plane_crossings.slopes_at`."""
+    return _slopes_at(samples.piece, samples.t, packed(samples.points))
 
 
 @jit
@@ -110,10 +115,14 @@ def _slopes_at(piece: Ints, t: Floats, points: Floats) -> Floats:
     return slopes
 
 
-def aim(knots: Samples, slopes: Floats, low: int, high: int) -> Aims:
-    """See `crossings.aim`."""
-    points = packed(knots.points)
-    return Aims(*_aim(knots.piece, knots.t, points, packed(slopes), low, high, NUDGE))
+def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> CrossingGuesses:
+    """See `plane_crossings.guess_crossings`."""
+    points = packed(samples.points)
+    return CrossingGuesses(
+        *_guess_crossings(
+            samples.piece, samples.t, points, packed(slopes), low, high, TIE_TOLERANCE
+        )
+    )
 
 
 @jit
@@ -122,7 +131,7 @@ def _monotone(slope: float) -> float:
 
 
 @jit
-def _aim(
+def _guess_crossings(
     piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int, nudge: float
 ) -> tuple[Ints, Bytes, Bools, Floats, Floats, Floats]:
     stop = min(high, t.size - 1)
@@ -173,10 +182,14 @@ def _aim(
     return knot, axes, descends, levels, taus, times
 
 
-def corners(knots: Samples, slopes: Floats, aims: Aims, points: Floats) -> Corners:
-    """See `crossings.corners`."""
+def rank_corners(
+    samples: Samples, slopes: Floats, aims: CrossingGuesses, points: Floats
+) -> CornerChoices:
+    """See `plane_crossings.rank_corners`."""
     aimed = aims.knot, aims.axis, aims.level, aims.tau
-    return Corners(*_corners(knots.t, packed(slopes), *aimed, packed(points), NUDGE, MARGIN))
+    return CornerChoices(
+        *_rank_corners(samples.t, packed(slopes), *aimed, packed(points), TIE_TOLERANCE, MIN_GAIN)
+    )
 
 
 @jit
@@ -190,7 +203,7 @@ def _dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> fl
 
 
 @jit
-def _corners(
+def _rank_corners(
     t: Floats,
     slopes: Floats,
     knot: Ints,
@@ -215,7 +228,7 @@ def _corners(
         along_x = _between(slopes[0, left] * h, slopes[0, left + 1] * h, share)
         along_y = _between(slopes[1, left] * h, slopes[1, left + 1] * h, share)
         along_z = _between(slopes[2, left] * h, slopes[2, left + 1] * h, share)
-        length = _most(np.sqrt(_dot(along_x, along_y, along_z, along_x, along_y, along_z)), TINY)
+        length = _larger(np.sqrt(_dot(along_x, along_y, along_z, along_x, along_y, along_z)), TINY)
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
         project = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
         # The two axes of the face.

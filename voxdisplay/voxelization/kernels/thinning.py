@@ -1,4 +1,4 @@
-"""From the voxels of crossings to sequences: the twins of `grid_plane`, `reduce` and others.
+"""From the voxels of crossings to sequences: the twins of `grid_plane`, `thinning` and others.
 
 Several threads may be in them at once.
 """
@@ -16,17 +16,17 @@ from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.index_ranges import Arrays
 from voxdisplay.voxelization.kernels.contiguous import Bytes, Pieces, packed
 from voxdisplay.voxelization.plane_crossings import Crossings
-from voxdisplay.voxelization.thinning import REACH, WINDOW
-from voxdisplay.voxelization.voxel_events import Events, Voxels
+from voxdisplay.voxelization.thinning import MAX_UNCOVERED, WINDOW
+from voxdisplay.voxelization.voxel_events import VoxelEvents, Voxels
 
-PLAIN = -1  # `events.OTHER`
+NO_HEADING = -1  # `voxel_events.NO_HEADING`
 NO_POINTS = np.empty((3, 0))
 NO_NUMBERS = np.empty(0)
 NO_PIECES = np.empty(0, dtype=np.int64)
 
 
 @jit
-def _near(voxels: Voxels, i: int, j: int) -> bool:
+def _adjacent(voxels: Voxels, i: int, j: int) -> bool:
     return bool(  # without a branch between
         (abs(voxels[0, i] - voxels[0, j]) <= 1)
         & (abs(voxels[1, i] - voxels[1, j]) <= 1)
@@ -35,25 +35,25 @@ def _near(voxels: Voxels, i: int, j: int) -> bool:
 
 
 @jit
-def torn(piece: Pieces, voxels: Voxels) -> Ints:
-    """See `events.torn`."""
+def find_gaps(piece: Pieces, voxels: Voxels) -> Ints:
+    """See `voxel_events.find_gaps`."""
     count = 0
     for k in range(piece.size - 1):
-        count += (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1))
+        count += (piece[k] == piece[k + 1]) & (not _adjacent(voxels, k, k + 1))
     found = np.empty(count, dtype=np.int64)
     if count:  # which is rare
         count = 0
         for k in range(piece.size - 1):
-            if (piece[k] == piece[k + 1]) & (not _near(voxels, k, k + 1)):
+            if (piece[k] == piece[k + 1]) & (not _adjacent(voxels, k, k + 1)):
                 found[count] = k
                 count += 1
     return found
 
 
-def choose_corners(crossings: Crossings, knots: Samples) -> Events:
+def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
     """See `grid_plane.choose_corners`."""
     inner = crossings.events
-    return Events(
+    return VoxelEvents(
         *_choose_corners(
             inner.piece,
             inner.t,
@@ -61,9 +61,9 @@ def choose_corners(crossings: Crossings, knots: Samples) -> Events:
             inner.heading,
             packed(crossings.better),
             crossings.gain,
-            knots.t,
-            packed(knots.points),
-            knots.bounds,
+            samples.t,
+            packed(samples.points),
+            samples.bounds,
         )
     )
 
@@ -76,7 +76,7 @@ def _choose_corners(
     inner_heading: Bytes,
     inner_better: Voxels,
     inner_gain: Floats,
-    knots_t: Floats,
+    sample_t: Floats,
     points: Floats,
     bounds: Ints,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
@@ -98,20 +98,20 @@ def _choose_corners(
             nearest[row, at + 1 : stop] = inner_voxels[row, begin:end]
             voxels[row, at + 1 : stop] = inner_better[row, begin:end]
         for tip, knot in ((at, bounds[number]), (stop, bounds[number + 1] - 1)):
-            t[tip], heading[tip], gain[tip] = knots_t[knot], PLAIN, np.inf
+            t[tip], heading[tip], gain[tip] = sample_t[knot], NO_HEADING, np.inf
             for row in range(3):
                 nearest[row, tip] = voxels[row, tip] = int(np.floor(points[row, knot]))
         at, begin = stop + 1, end
 
     bridged = np.zeros(size, dtype=np.bool_)
     for k in range(size):
-        if k + 1 < size and piece[k] == piece[k + 1] and not _near(nearest, k, k + 1):
+        if k + 1 < size and piece[k] == piece[k + 1] and not _adjacent(nearest, k, k + 1):
             bridged[k] = True
             gain[k] = gain[k + 1] = np.inf
         if not np.isfinite(gain[k]):
             for row in range(3):
                 voxels[row, k] = nearest[row, k]
-    apart = torn(piece, voxels)
+    apart = find_gaps(piece, voxels)
     while apart.size:
         back = np.empty(apart.size, dtype=np.int64)
         count = 0
@@ -130,7 +130,7 @@ def _choose_corners(
                     0 <= step < size - 1
                     and piece[step] == piece[step + 1]
                     and not bridged[step]
-                    and not _near(voxels, step, step + 1)
+                    and not _adjacent(voxels, step, step + 1)
                 ):
                     look[fresh] = step
                     fresh += 1
@@ -138,17 +138,17 @@ def _choose_corners(
     return piece, t, voxels, heading
 
 
-def insert(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
-    """See `ranges.insert`."""
+def insert_columns(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
+    """See `index_ranges.insert_columns`."""
     merged = []
     for array, other in zip(arrays, fresh, strict=True):
-        both = _insert(at, *(packed(np.atleast_2d(each)) for each in (array, other)))
+        both = _insert_columns(at, *(packed(np.atleast_2d(each)) for each in (array, other)))
         merged.append(both if array.ndim > 1 else both[0])
     return tuple(merged)
 
 
 @jit
-def _insert(at: Ints, array: NDArray[Any], fresh: NDArray[Any]) -> NDArray[Any]:
+def _insert_columns(at: Ints, array: NDArray[Any], fresh: NDArray[Any]) -> NDArray[Any]:
     rows, size = array.shape
     both = np.empty((rows, size + at.size), dtype=array.dtype)
     for row in range(rows):
@@ -164,20 +164,28 @@ def _insert(at: Ints, array: NDArray[Any], fresh: NDArray[Any]) -> NDArray[Any]:
     return both
 
 
-def reduce(events: Events, way: Samples | None = None, *, tips: bool = False) -> Events:
-    """See `reduce.reduce`."""
-    known = (way.piece, way.t, packed(way.points)) if way else (NO_PIECES, NO_NUMBERS, NO_POINTS)
+def thin_events(
+    events: VoxelEvents, samples: Samples | None = None, *, keep_tips: bool = False
+) -> VoxelEvents:
+    """See `thinning.thin_events`."""
+    known = (
+        (samples.piece, samples.t, packed(samples.points))
+        if samples
+        else (NO_PIECES, NO_NUMBERS, NO_POINTS)
+    )
     full = events.piece, events.t, packed(events.voxels), events.heading
-    return Events(*_reduce(*full, *known, tips, WINDOW, REACH * REACH))
+    return VoxelEvents(
+        *_thin_events(*full, *known, keep_tips, WINDOW, MAX_UNCOVERED * MAX_UNCOVERED)
+    )
 
 
 @jit
-def _look(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> Bools:
-    """Tell where a turn is within reach: see `reduce.runs_on`."""
+def _near_turns(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> Bools:
+    """Tell where a turn is within reach: see `thinning.continues_run`."""
     size = piece.size
     reach = np.zeros(size + 1, dtype=np.int32)
     for k in range(size):
-        on = k > 0 and piece[k] == piece[k - 1] and heading[k] == heading[k - 1] != PLAIN
+        on = k > 0 and piece[k] == piece[k - 1] and heading[k] == heading[k - 1] != NO_HEADING
         if on:
             axis = heading[k] >> 1
             on = voxels[axis, k] - voxels[axis, k - 1] == 1 - 2 * (heading[k] & 1)
@@ -193,10 +201,12 @@ def _look(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> Bools:
 
 
 @jit
-def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool, window: int) -> int:
+def _furthest_shortcut(
+    voxels: Voxels, i: int, begin: int, end: int, connected: bool, window: int
+) -> int:
     """Give J(i) - i within a stretch."""
     ahead = 0
-    while ahead < window and i + ahead + 1 < end and _near(voxels, i, i + ahead + 1):
+    while ahead < window and i + ahead + 1 < end and _adjacent(voxels, i, i + ahead + 1):
         ahead += 1
     w = min(window, end - 1 - i) + 1
     while w > 2:
@@ -214,7 +224,7 @@ def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool, window:
             while (
                 ahead + behind < w - 1
                 and j - behind - 1 >= begin
-                and _near(voxels, j - behind - 1, j)
+                and _adjacent(voxels, j - behind - 1, j)
             ):
                 behind += 1
             if ahead + behind >= w - 1:
@@ -223,9 +233,9 @@ def _leap(voxels: Voxels, i: int, begin: int, end: int, connected: bool, window:
 
 
 @jit
-def _over_tip(piece: Pieces, voxels: Voxels, i: int, j: int) -> bool:
-    before = i > 0 and piece[i - 1] == piece[i] and _near(voxels, i - 1, j)
-    after = j + 1 < piece.size and piece[j + 1] == piece[j] and _near(voxels, i, j + 1)
+def _skips_tip(piece: Pieces, voxels: Voxels, i: int, j: int) -> bool:
+    before = i > 0 and piece[i - 1] == piece[i] and _adjacent(voxels, i - 1, j)
+    after = j + 1 < piece.size and piece[j + 1] == piece[j] and _adjacent(voxels, i, j + 1)
     if not (before or after):
         return False
     for k in range(i + 1, j):
@@ -247,15 +257,15 @@ def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
 
 
 @jit
-def _reduce(
+def _thin_events(
     full_piece: Pieces,
     full_t: Floats,
     full_voxels: Voxels,
     full_heading: Bytes,
-    way_piece: Ints,
-    way_t: Floats,
+    sample_piece: Ints,
+    sample_t: Floats,
     points: Floats,
-    tips: bool,
+    keep_tips: bool,
     window: int,
     farthest: float,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
@@ -280,7 +290,7 @@ def _reduce(
         for row in range(3):
             for k in range(size):
                 voxels[row, k] = full_voxels[row, number[k]]
-    look = _look(piece, voxels, heading, window)
+    look = _near_turns(piece, voxels, heading, window)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
     count = p = i = 0
@@ -304,18 +314,18 @@ def _reduce(
                 connected = True
                 while end < size and look[end] and piece[end] == piece[i]:
                     end += 1
-                    connected &= end == i + 1 or _near(voxels, end - 2, end - 1)
-            leap = _leap(voxels, i, begin, end, connected, window)
-        if leap > 1 and tips and _over_tip(piece, voxels, i, i + leap):
+                    connected &= end == i + 1 or _adjacent(voxels, end - 2, end - 1)
+            leap = _furthest_shortcut(voxels, i, begin, end, connected, window)
+        if leap > 1 and keep_tips and _skips_tip(piece, voxels, i, i + leap):
             leap = 1
-        if leap > 1 and way_t.size:
+        if leap > 1 and sample_t.size:
             j = i + leap
-            while p < way_t.size and (
-                way_piece[p] < piece[i] or (way_piece[p] == piece[i] and way_t[p] < t[i])
+            while p < sample_t.size and (
+                sample_piece[p] < piece[i] or (sample_piece[p] == piece[i] and sample_t[p] < t[i])
             ):
                 p += 1
             q = p
-            while q < way_t.size and way_piece[q] == piece[i] and way_t[q] < t[j]:
+            while q < sample_t.size and sample_piece[q] == piece[i] and sample_t[q] < t[j]:
                 nearest = min(_square(voxels, i, points, q), _square(voxels, j, points, q))
                 if nearest > farthest:
                     leap = 1
