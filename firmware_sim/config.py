@@ -171,14 +171,15 @@ def parse_baud(text: str) -> int:
 
 
 def parse_size(text: str) -> tuple[int, int, int]:
-    """Read a grid such as ``128x128x128``.
+    """Parse a grid such as ``128x128x128`` or ``128,128,128``.
 
     Raises
     ------
     ValueError
-        If it is not three numbers with an x between them.
+        If it is not three numbers joined by x or by commas.
     """
-    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})x([0-9]{1,9})", text, re.IGNORECASE)
+    number = "([0-9]{1,9})"
+    match = re.fullmatch(f"{number}[x,]{number}[x,]{number}", text, re.IGNORECASE)
     if not match:
         raise ValueError(f"{text!r} is no grid: write three numbers of voxels like 128x128x128")
     nx, ny, nz = map(int, match.groups())

@@ -86,11 +86,11 @@ def test_files_that_cannot_be_read(run, tmp_path):
     ("arguments", "words"),
     [
         (["push"], ["SCENE"]),
-        (["psuh", "x"], ["psuh"]),
+        (["psuh", "x"], ["psuh", "push"]),
         (["push", "x", "--fitt", "none"], ["--fit"]),
         (["push", "x", "--fit", "cover"], ["contain"]),
         (["push", "x", "--timeout", "0"], ["--timeout"]),
-        (["push", "x", "--timeout", "nan"], ["--timeout", "is no time"]),
+        (["push", "x", "--timeout", "nan"], ["--timeout", "is not a number of seconds"]),
         (["push", "x", "--reconnect", "inf"], ["--reconnect"]),
         (["voxelize", PAPER, "-o", "x.obj"], [".npy"]),
         (["voxelize", PAPER, "--clip", "0x5x7"], ["128x128x128"]),

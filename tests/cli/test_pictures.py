@@ -27,7 +27,7 @@ def pixels(path):
 
 def test_a_scene_as_a_picture(run, tmp_path):
     path = tmp_path / "x.png"
-    options = ["--size", "320x200", "--view-angle", "-90,10", "--zoom", "1.3"]
+    options = ["--pixels", "320x200", "--view-angle", "-90,10", "--zoom", "1.3"]
     done = run("preview", TREFOIL, "-o", path, *options)
     assert done.returncode == 0
     assert done.stdout == ""
@@ -45,7 +45,7 @@ def test_a_scene_as_a_picture(run, tmp_path):
 
 def test_on_another_display(run, tmp_path):
     path = tmp_path / "x.png"
-    options = ["--display-size", "9,12,20", "--format", "mono1", "--size", "200x200", "--plain"]
+    options = ["--size", "9,12,20", "--format", "mono1", "--pixels", "200x200", "--plain"]
     done = run("preview", TREFOIL, "-o", path, *options)
     assert "scaled by" in done.stderr
     assert "on 9x12x20 mono1" in done.stderr
@@ -58,7 +58,7 @@ def test_on_another_display(run, tmp_path):
 
 def test_a_film(run, tmp_path):
     path = tmp_path / "x.gif"
-    options = ["--size", "120x90", "--seconds", "0.5", "--fps", "10"]
+    options = ["--pixels", "120x90", "--seconds", "0.5", "--fps", "10"]
     assert run("preview", TREFOIL, "-o", path, *options).returncode == 0
     with Image.open(path) as film:
         assert film.n_frames == 5
@@ -73,12 +73,12 @@ def test_a_film(run, tmp_path):
         (["preview", TREFOIL, "-o", "x."], [".png"]),
         (["preview", TREFOIL, "-o", "/nowhere/x.png"], ["/nowhere"]),
         (["preview", TREFOIL, "-o", "x." + "x" * 300 + ".png"], ["cannot be written"]),
-        (["preview", TREFOIL, "-o", "x.png", "--size", "8x8"], ["800x600"]),
-        (["preview", TREFOIL, "-o", "x.png", "--size", "99999x99999"], ["4096"]),
+        (["preview", TREFOIL, "-o", "x.png", "--pixels", "8x8"], ["800x600"]),
+        (["preview", TREFOIL, "-o", "x.png", "--pixels", "99999x99999"], ["4096"]),
         (["preview", TREFOIL, "-o", "x.png", "--view-angle", "1"], ["-34,24"]),
         (["preview", TREFOIL, "-o", "x.png", "--view-angle", "nan,0"], ["-34,24"]),
         (["preview", TREFOIL, "-o", "x.png", "--view-angle", "0,91"], ["-90 to 90"]),
-        (["preview", TREFOIL, "-o", "x.gif", "--size", "4096x4096"], ["--fps"]),
+        (["preview", TREFOIL, "-o", "x.gif", "--pixels", "4096x4096"], ["--fps"]),
         (["preview", TREFOIL, "-o", "x.png", "--format", "rgb"], ["rgb565"]),
         (["push", TREFOIL, "--port", "sim:", "--preview", "x.txt"], [".png"]),
         (["test-pattern", "--port", "sim:", "--pattern", "cross"], ["axes"]),

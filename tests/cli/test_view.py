@@ -15,7 +15,7 @@ import pytest
 from websockets.sync.client import connect
 
 import voxdisplay as vd
-from voxdisplay.cli.view import _Watched
+from voxdisplay.cli.view import _ReadbackDisplay
 
 ROOT = Path(__file__).parents[2]
 DEADLINE_S = 60
@@ -58,7 +58,7 @@ def test_a_display_that_cannot_be_read_cannot_be_watched(run):
 def test_colours_that_cannot_be_known_are_told_of_once(capsys):
     port = "sim:?size=3x5x7&format=index8"
     with vd.open(port) as display:
-        watched = _Watched(display)
+        watched = _ReadbackDisplay(display)
         frame = display.frame()
         frame.draw([(1, 2, 3)], color="#010204")
         for _ in range(2):
@@ -72,7 +72,7 @@ def test_colours_of_the_default_palette_are_known(capsys):
         frame = display.frame()
         frame.draw([(1, 2, 3)], color="#ff0000")
         display.present(frame)
-        _Watched(display).read()
+        _ReadbackDisplay(display).read()
     assert capsys.readouterr().err == ""
 
 

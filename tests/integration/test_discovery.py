@@ -11,8 +11,7 @@ import pytest
 from pluggable_pty import Plug
 
 from voxdisplay.cli import main
-from voxdisplay.cli import ports as command
-from voxdisplay.display import baud
+from voxdisplay.display import baud, scan
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.display.scan import probe_ports
 from voxdisplay.transport import discovery
@@ -99,7 +98,7 @@ def there(monkeypatch, tmp_path):
     with Plug(tmp_path / "display") as plug:
         plug.plug(serial="A1", name="cube", firmware="7.2")
         names = ["sim:?size=3x5x7", str(plug.path), os.ttyname(slave), "/dev/ttyNOWHERE"]
-        monkeypatch.setattr(command, "all_ports", lambda: [FoundPort(n, "a port") for n in names])
+        monkeypatch.setattr(discovery, "all_ports", lambda: [FoundPort(n, "a port") for n in names])
         yield names
     os.close(master)
     os.close(slave)
@@ -137,7 +136,7 @@ def test_probe_at_any_rate(capsys, monkeypatch):
 
 @pytest.mark.usefixtures("there")
 def test_without_probe_nothing_is_opened(capsys, monkeypatch):
-    monkeypatch.setattr(command, "probe_ports", None)
+    monkeypatch.setattr(scan, "probe_ports", None)
     assert main(["ports", "--json"]) == 0
     ports = json.loads(capsys.readouterr().out)["ports"]
     assert "answers" not in ports[0]

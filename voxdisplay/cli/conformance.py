@@ -1,42 +1,41 @@
-"""``voxdisplay conformance``: tell whether a device keeps to protocol.md."""
+"""``voxdisplay conformance``: checks of a device against protocol.md."""
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 import click
 
 from voxdisplay.cli.options import (
-    DEFAULT_PORT,
-    SecondsType,
     baud_option,
+    default_port,
     json_option,
     port_option,
+    quiet_option,
     timeout_option,
 )
-from voxdisplay.cli.output import (
-    note,
-    print_json,
-    progress_bar,
-)
-from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at_rate
+from voxdisplay.cli.output import note, print_json, print_stdout, progress_bar
+from voxdisplay.cli.param_types import seconds_type
 
-if TYPE_CHECKING:  # the kit is imported when it is used: the other commands start without it
+if TYPE_CHECKING:
     from voxdisplay.conformance.announced_device import AnnouncedDevice
     from voxdisplay.conformance.catalogue import Check
     from voxdisplay.conformance.run import Result
+    from voxdisplay.display.baud import Baud
 
 _EXIT_BROKEN = 1
 
 
 @click.command(
     epilog="""\b
-    voxdisplay conformance --port /dev/ttyUSB0
-    voxdisplay conformance --port tcp://192.168.1.9:5000 --only 7.3 --only 9/status
-    voxdisplay conformance --only digest --list
+    Examples:
+      voxdisplay conformance --port /dev/ttyUSB0
+      voxdisplay conformance --port tcp://10.0.0.9:5000 --only 7.3 --only 9/ack-*
+      voxdisplay conformance --only digest --list
 
-    Exit codes: 0 all that concerns the device holds; 1 something does not, or could not be looked
-    at; 2 usage; 3 the port cannot be opened."""
+    Exit codes: 0 all that concerns the device holds; 1 something does not, or could not be
+    examined; 2 usage; 3 the port cannot be opened."""
 )
 @port_option
 @baud_option()
@@ -44,21 +43,28 @@ _EXIT_BROKEN = 1
 @click.option(
     "--opening",
     "opening_s",
-    type=SecondsType(0.1),
+    type=seconds_type(0.1),
     default=5.0,
     metavar="SECONDS",
-    show_default=True,
-    help="How long the first answer may take: a board may start anew when its port is opened.",
+    help="Longest wait for the first answer: a board may restart when its port is opened.  "
+    "[default: 5]",
 )
 @click.option(
     "--only",
     multiple=True,
     metavar="SECTION/NAME",
-    help="Make only these checks: 7, 7.3, 7.3/line-ties, line-*. May be given several times.",
+    help="Run only these checks: 7, 7.3, 7.3/line-ties, line-*. May be given several times.",
 )
-@click.option("--list", "as_list", is_flag=True, help="List the checks, and what each demands.")
-@click.option("--seed", default=0, show_default=True, help="Where all that is random begins.")
+@click.option("--list", "as_list", is_flag=True, help="List the checks, and what each requires.")
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    metavar="N",
+    help="Seed of all that is random.  [default: 0]",
+)
 @click.option("--verbose", "-v", is_flag=True, help="Show all packets of every check.")
+@quiet_option
 @json_option
 def conformance(
     *,
@@ -74,10 +80,10 @@ def conformance(
 ) -> None:
     """Check that a device keeps to protocol.md, sentence by sentence.
 
-    It takes any device behind any kind of port. It draws on the display; afterwards the display is
-    as it was, if it can be read back, otherwise dark.
+    Takes any device behind any kind of port. Draws on the display; afterwards the display is as it
+    was, if it can be read back, otherwise dark.
 
-    An answer may take --timeout, and besides a refresh period and its time on a serial line.
+    An answer may take --timeout, plus a refresh period and its time on a serial line.
     """
     from voxdisplay.conformance import report, run  # noqa: PLC0415 - only what is needed
 
@@ -88,9 +94,9 @@ def conformance(
     if as_list:
         _list(selected, as_json=as_json)
         return
-    if port is None:
-        note("no --port: using the built-in emulator, sim:")
-        port = DEFAULT_PORT
+    from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate  # noqa: PLC0415
+
+    port = default_port(port)
     pipe = open_at_rate(port, baud, opening_s, note)
     done = 0
     try:
@@ -103,8 +109,8 @@ def conformance(
                     progress(min(done, len(selected)), len(selected))
                 if verbose and not as_json:
                     text = f"{result.check.id}: {result.verdict.value} {result.reason}".rstrip()
-                    click.echo(report.clean(text))
-                    click.echo("\n".join(report.transcript_lines(result.log)))
+                    print_stdout(report.clean(text))
+                    print_stdout("\n".join(report.transcript_lines(result.log)))
 
             outcome = run.run_checks(
                 pipe,
@@ -122,7 +128,8 @@ def conformance(
         print_json(report.as_json(port, outcome))
     else:
         for line in report.report_lines(outcome, transcripts=not verbose):
-            click.secho(line, fg="red" if line.startswith("BROKEN") else None)
+            red = line.startswith("BROKEN") and sys.stdout.isatty()
+            print_stdout(click.style(line, fg="red") if red else line)
     if not outcome.holds:
         raise click.exceptions.Exit(_EXIT_BROKEN)
 
@@ -145,4 +152,4 @@ def _list(checks: list[Check], *, as_json: bool) -> None:
         return
     width = max(len(check.id) for check in checks)
     for check in sorted(checks, key=lambda check: check.order):
-        click.echo(f"{check.id:<{width}}  {check.requirement}")
+        print_stdout(f"{check.id:<{width}}  {check.requirement}")

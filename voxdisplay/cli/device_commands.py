@@ -1,57 +1,66 @@
-"""``voxdisplay info``, ``clear`` and ``read``: the display itself."""
+"""``voxdisplay info``, ``clear`` and ``read``: one exchange with a display."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from voxdisplay.cli.options import (
-    json_option,
-    open_display,
-    port_options,
+from voxdisplay.cli.image_output import cannot_write
+from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
+from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout
+
+if TYPE_CHECKING:
+    from voxdisplay.display.baud import Baud
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay info
+      voxdisplay info --port /dev/ttyUSB0 --baud auto
+      voxdisplay info --port usb: --json
+    """
 )
-from voxdisplay.cli.output import (
-    device_json,
-    note,
-    plural,
-    print_json,
-)
-from voxdisplay.display.baud import Baud
-
-
-@click.command()
 @port_options
+@quiet_option
 @json_option
 def info(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
-    """Say what a display says of itself."""
+    """Print size, format and features of a display, as it announces them."""
     with open_display(port, baud, timeout_s) as display:
-        said = display.info
+        device = display.info
         facts = {
             "port": display.port,
-            "name": said.name,
-            **device_json(said),
-            "serial": said.serial,
-            "refresh_hz": said.refresh_hz,
-            "max_payload_bytes": said.max_payload_bytes,
-            "rx_buffer_bytes": said.rx_buffer_bytes,
-            "features": list(said.features),
-            "boot": said.boot,
+            "name": device.name,
+            **device_json(device),
+            "serial": device.serial,
+            "refresh_hz": device.refresh_hz,
+            "max_payload_bytes": device.max_payload_bytes,
+            "rx_buffer_bytes": device.rx_buffer_bytes,
+            "features": list(device.features),
+            "boot": device.boot,
         }
     if as_json:
         print_json(facts)
         return
-    facts |= {"size": str(said.grid), "features": ", ".join(said.features)}
+    facts |= {"size": str(device.grid), "features": ", ".join(device.features)}
     width = max(map(len, facts))
-    click.echo("\n".join(f"{key:<{width}}  {value}" for key, value in facts.items()))
+    print_stdout("\n".join(f"{key:<{width}}  {value}" for key, value in facts.items()))
 
 
-@click.command()
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay clear --port /dev/ttyUSB0
+      voxdisplay clear --port tcp://127.0.0.1:5000 --json
+    """
+)
 @port_options
+@quiet_option
 @json_option
 def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
-    """Make a display dark."""
+    """Make a display dark, and wait until it is."""
     with open_display(port, baud, timeout_s) as display:
         receipt = display.clear()
         if as_json:
@@ -65,10 +74,16 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
                 }
             )
         else:
-            click.echo(f"{display.port}  dark")
+            print_stdout(f"{display.port}  dark")
 
 
-@click.command()
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay read --port /dev/ttyUSB0 -o page.npy
+      voxdisplay read --port usb: -o page.npy --json
+    """
+)
 @port_options
 @click.option(
     "-o",
@@ -76,11 +91,14 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE.npy",
-    help="Where to: a numpy array, indexed [z, y, x].",
+    help="File to write: a numpy array, indexed [z, y, x].",
 )
+@quiet_option
 @json_option
 def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_json: bool) -> None:
-    """Read back what a display shows."""
+    """Save what a display shows, read back from its memory."""
+    import numpy as np  # noqa: PLC0415 - help starts without it
+
     if output.suffix != ".npy":
         raise click.BadParameter(f"{output} should end in .npy", param_hint="--output")
     with open_display(port, baud, timeout_s) as display:
@@ -88,8 +106,8 @@ def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_jso
         device, name = device_json(display.info), display.port
     try:
         np.save(output, array)
-    except OSError as error:
-        raise click.ClickException(f"{output} cannot be written: {error.strerror}") from error
+    except OSError as failure:
+        raise cannot_write(output, failure) from failure
     lit = int(np.count_nonzero(array.any(axis=-1) if array.ndim == 4 else array))
     if as_json:
         print_json({"port": name, "device": device, "output": str(output), "voxels": lit})

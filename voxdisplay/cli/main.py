@@ -1,32 +1,20 @@
-"""The command ``voxdisplay``, and what its exit codes mean."""
+"""The command ``voxdisplay``: dispatch, errors and exit codes."""
 
 from __future__ import annotations
 
+import io
 import sys
-import traceback
 from typing import Final
 
 import click
 
-from voxdisplay import __version__
-from voxdisplay.cli.conformance import conformance
-from voxdisplay.cli.device_commands import clear, info, read
-from voxdisplay.cli.output import (
-    note,
-    open_missing_streams,
-)
-from voxdisplay.cli.plan import plan_command
-from voxdisplay.cli.ports import ports
-from voxdisplay.cli.preview import preview
-from voxdisplay.cli.push import push
+from voxdisplay.cli.command_table import LazyGroup
+from voxdisplay.cli.output import open_streams, print_stderr, print_stdout
 from voxdisplay.cli.signals import (
     TerminationSignal,
     raise_termination_signals,
     report_termination,
 )
-from voxdisplay.cli.test_pattern import test_pattern
-from voxdisplay.cli.view import view
-from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.errors import (
     CurveError,
     MissingExtra,
@@ -52,7 +40,18 @@ _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
 )
 
 
+def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value and not context.resilient_parsing:
+        from voxdisplay import __version__  # noqa: PLC0415 - reads the package's metadata
+
+        print_stdout(f"voxdisplay, version {__version__}")
+        context.exit()
+
+
 @click.group(
+    cls=LazyGroup,
+    invoke_without_command=True,
+    subcommand_metavar="COMMAND [ARGS]...",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""Exit codes: 0 done; 1 the device refused, or shows something else; 2 usage or scene;
     3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted;
@@ -61,66 +60,77 @@ _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
     Shell completion: eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)", likewise zsh_source
     and fish_source.""",
 )
-@click.version_option(__version__, prog_name="voxdisplay")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Show the version and exit.",
+)
 @click.option("--debug", is_flag=True, help="Show a traceback with an error.")
-def cli(*, debug: bool) -> None:
+@click.pass_context
+def cli(context: click.Context, *, debug: bool) -> None:
     """Draw on a volumetric display.
 
     \b
-    voxdisplay push examples/paper-curve.json                      the built-in emulator
-    voxdisplay push examples/paper-curve.json --port /dev/ttyUSB0  a display
+    Examples:
+      voxdisplay push curve.json                      on the built-in emulator
+      voxdisplay push curve.json --port /dev/ttyUSB0  on a display
+      voxdisplay push --help                          options and examples of push
     """  # noqa: D301 - \b keeps click from filling the lines
     del debug  # read where errors are caught
-
-
-_SHOW = (push, preview, view, test_pattern, clear)
-_ASK = (voxelize, plan_command, info, ports, read, conformance)
-for command in (*_SHOW, *_ASK):
-    cli.add_command(command)
+    if context.invoked_subcommand is None:
+        print_stderr(context.get_help())
+        context.exit(EXIT_USAGE)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command line; give its exit code."""
+    """Run a command line and return its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    debug = "--debug" in arguments
-    open_missing_streams()
+    open_streams()
     try:
         with raise_termination_signals():
-            # A command that ends by click's Exit gives its code; all others give nothing.
+            # A command that ends by click's Exit returns its code; all others return None.
             ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
+    except click.ClickException as usage_error:
+        text = io.StringIO()
+        usage_error.show(text)
+        print_stderr(text.getvalue().removesuffix("\n"))
         return EXIT_USAGE
-    except (click.Abort, KeyboardInterrupt, TerminationSignal) as why:
-        return report_termination(why)
-    except SystemExit as left:  # click's answer to a reader that has left, and to completion
-        return EXIT_USAGE if left.code else 0
-    except VoxDisplayError as error:
-        if debug:
+    except (click.Abort, KeyboardInterrupt, TerminationSignal) as cause:
+        return report_termination(cause)
+    except SystemExit as ended_by_click:  # a reader that has left, or completion
+        return EXIT_USAGE if ended_by_click.code else 0
+    except Exception as failure:  # noqa: BLE001 - no error ends in a traceback
+        if "--debug" in arguments:
+            import traceback  # noqa: PLC0415 - takes time to load
+
             traceback.print_exc()
-        note(f"voxdisplay: {error}")
-        if error.hint:
-            note(f"  {error.hint}")
-        return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
-    except OSError as error:  # a pipe's are TransportErrors: what is left is our own output
-        note(f"voxdisplay: the output cannot be written: {error.strerror}")
-        return EXIT_USAGE
-    except Exception as error:  # noqa: BLE001 - a fault of ours, and no excuse for a traceback
-        if debug:
-            traceback.print_exc()
-        return _unforeseen(error)
+        return _report_error(failure)
     return ended if isinstance(ended, int) else 0
 
 
-def _unforeseen(error: Exception) -> int:
-    """Say what nobody has foreseen; give the exit code."""
-    if isinstance(error, MemoryError):
-        note(f"voxdisplay: there is not enough memory: {error}")
-        note("  take a smaller size, or draw less")
-        return EXIT_USAGE
-    note(f"voxdisplay: a fault of this program: {type(error).__name__}: {error}")
-    note("  please report it with what voxdisplay --debug ... prints")
-    return EXIT_INTERNAL
+def _report_error(failure: Exception) -> int:
+    """Print an error with its hint and return the exit code."""
+    match failure:
+        case VoxDisplayError():
+            text, hint = str(failure), failure.hint
+            code = next(code for kind, code in _EXIT_CODES if isinstance(failure, kind))
+        case OSError():  # a pipe's are TransportErrors: what is left is our own output
+            text, hint = f"the output cannot be written: {failure.strerror}", None
+            code = EXIT_USAGE
+        case MemoryError():
+            text = f"there is not enough memory: {failure}"
+            hint, code = "take a smaller size, or draw less", EXIT_USAGE
+        case _:
+            text = f"a fault of this program: {type(failure).__name__}: {failure}"
+            hint = "please report it with what voxdisplay --debug ... prints"
+            code = EXIT_INTERNAL
+    print_stderr(f"voxdisplay: {text}")
+    if hint:
+        print_stderr(f"  {hint}")
+    return code
 
 
 if __name__ == "__main__":

@@ -1,76 +1,40 @@
-"""What several commands share: options, and how things are printed."""
+"""Options that several commands share.
+
+Defaults and limits stand in the help texts as they are written here: what is printed does not
+depend on the release of click. Nothing of the driver is imported until a value is used.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TextIO, TypeVar
 
 import click
 
-import voxdisplay as vd
-from voxdisplay.cli.output import note
-from voxdisplay.display.baud import DEFAULT_BAUD, RATES, Baud
-from voxdisplay.transport.discovery import all_ports
+from voxdisplay.cli.output import note, set_quiet
+from voxdisplay.cli.param_types import BaudType, ImageFileType, SizeType, seconds_type
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
+    from voxdisplay.display.baud import Baud
+    from voxdisplay.display.display import Display
 
 _C = TypeVar("_C", bound=Callable[..., Any])
-DEFAULT_PORT = "sim:"
-_LONGEST_S = 1e6
-
-
-class SecondsType(click.FloatRange):
-    """A time that the system can wait for."""
-
-    name = "seconds"
-
-    def __init__(self, least: float) -> None:
-        super().__init__(min=least, max=_LONGEST_S)
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Read it, or fail with a message."""
-        seconds: float = super().convert(value, param, ctx)
-        if math.isnan(seconds):
-            self.fail(f"{value!r} is no time: write one like 5", param, ctx)
-        return seconds
-
-
-class BaudType(click.ParamType[Baud]):
-    """A rate in bits per second, or ``auto``."""
-
-    name = "rate"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Baud:
-        """Read it, or fail with a message."""
-        if str(value).lower() == "auto":
-            return "auto"
-        try:
-            baud = int(value)
-        except ValueError:
-            self.fail(f"{value!r} is no rate: write one like 115200, or auto", param, ctx)
-        if not 50 <= baud < 1 << 32:
-            self.fail(f"{baud} is no rate of a serial line: write one like 115200", param, ctx)
-        return baud
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Offer what is common."""
-        from click.shell_completion import CompletionItem  # noqa: PLC0415 - only for this
-
-        del ctx, param
-        rates = ["auto", *map(str, RATES)]
-        return [CompletionItem(rate) for rate in rates if rate.startswith(incomplete)]
+DEFAULT_PORT: Final = "sim:"
+DEFAULT_BAUD_TEXT: Final = "115200"
+DEFAULT_SIZE_TEXT: Final = "128x128x128"
 
 
 def complete_port(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
-    """Offer what can be opened."""
+    """Return the ports that can be opened and begin as typed."""
+    from voxdisplay.transport.discovery import all_ports  # noqa: PLC0415 - only for completion
+
     del context, parameter
     return [found.port for found in all_ports() if found.port.startswith(typed)]
+
+
+def scene_argument(*, required: bool = True) -> Callable[[_C], _C]:
+    """Return the argument SCENE."""
+    return click.argument("scene", type=click.Path(), required=required)
 
 
 port_option = click.option(
@@ -80,36 +44,33 @@ port_option = click.option(
     metavar="PORT",
     shell_complete=complete_port,
     help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
-    "a pyserial URL. Default: $VOXDISPLAY_PORT, else sim:, the built-in emulator.",
+    "a pyserial URL.  [default: $VOXDISPLAY_PORT, else sim:, the built-in emulator]",
 )
 
 
-_RATE = BaudType()
-
-
-def baud_option(default: Baud | None = DEFAULT_BAUD, otherwise: str = "") -> Callable[[_C], _C]:
-    """Give ``--baud``, with its default, or what is done without it."""
+def baud_option(
+    default: str | None = DEFAULT_BAUD_TEXT, default_text: str = DEFAULT_BAUD_TEXT
+) -> Callable[[_C], _C]:
+    """Return ``--baud`` with a default, which the help may describe otherwise."""
     return click.option(
         "--baud",
-        type=_RATE,
-        default=None if default is None else str(default),
+        type=BaudType(),
+        default=default,
         metavar="RATE",
-        show_default=otherwise or True,
-        help="Bits per second of a serial line; auto: the fastest at which the display answers, "
-        "which takes some seconds to find.",
+        help="Bits per second of a serial line. auto: the fastest at which the display answers, "
+        f"which takes some seconds to find.  [default: {default_text}]",
     )
 
 
 def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
-    """Give ``--timeout``, with the default of a command that waits for many devices or answers."""
+    """Return ``--timeout`` with a default in seconds."""
     return click.option(
         "--timeout",
         "timeout_s",
-        type=SecondsType(0.1),
+        type=seconds_type(0.1),
         default=default_s,
         metavar="SECONDS",
-        show_default=True,
-        help="How long the device may be silent.",
+        help=f"Longest silence of the device, 0.1 or more.  [default: {default_s:g}]",
     )
 
 
@@ -123,32 +84,86 @@ def port_options(function: _C) -> _C:
 reconnect_option = click.option(
     "--reconnect",
     "reconnect_s",
-    type=SecondsType(0),
+    type=seconds_type(0),
     default=0.0,
     metavar="SECONDS",
-    help="How long a display that is pulled out is waited for. When it is back, it gets its "
-    "picture again.  [default: not at all]",
+    help="How long to wait for a display that is pulled out. When it is back, its picture is sent "
+    "again.  [default: do not wait]",
+)
+
+on_exit_option = click.option(
+    "--on-exit",
+    type=click.Choice(["keep", "blank"]),
+    default="keep",
+    help="What the display shows when the command is ended by Ctrl-C, SIGTERM or a closed "
+    "terminal: its last whole picture, or nothing.  [default: keep]",
 )
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
+def _quiet_callback(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value:
+        set_quiet(context)
+
+
+quiet_option = click.option(
+    "--quiet",
+    "-q",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_quiet_callback,
+    help="Print nothing to stderr but errors.",
+)
+
 fit_option = click.option(
     "--fit",
     type=click.Choice(["contain", "none"]),
     default="contain",
-    show_default=True,
-    help="Scale a scene that was composed for another size and centre it, or keep its numbers "
-    "and clip.",
+    help="contain: scale a scene that was composed for another size, and centre it. none: keep its "
+    "numbers and clip.  [default: contain]",
 )
-
 
 capture_option = click.option(
     "--capture",
     type=click.File("w", encoding="utf-8", lazy=False),
     metavar="FILE",
-    help="Write all bytes to and from the device to FILE, with times: see tools/annotate.py.",
+    help="Write all bytes to and from the device to FILE, with times. voxdisplay annotate FILE "
+    "explains them.",
 )
+
+
+class _RenamedOption(click.Option):
+    """An option whose older names still work, and are not shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the help of the first name alone."""
+        names, self.opts = self.opts, self.opts[:1]
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.opts = names
+
+
+def display_size_option(help_text: str, *, for_two: str = "") -> Callable[[_C], _C]:
+    """Return ``--size``, the size of a display in voxels, which was once ``--display-size``."""
+    return click.option(
+        "--size",
+        "--display-size",
+        "size",
+        cls=_RenamedOption,
+        type=SizeType(for_two),
+        metavar="NXxNYxNZ",
+        help=help_text,
+    )
+
+
+def image_file_option(*names: str, help_text: str, required: bool = False) -> Callable[[_C], _C]:
+    """Return an option that names an image file to write."""
+    return click.option(
+        *names, type=ImageFileType(), metavar="FILE", required=required, help=help_text
+    )
 
 
 def open_display(
@@ -158,26 +173,23 @@ def open_display(
     *,
     reconnect_s: float = 0.0,
     capture: TextIO | None = None,
-) -> vd.Display:
-    """Open what ``--port`` names, or the emulator, and say so."""
-    if port is None:  # and not an empty one, which a script has by mistake
-        note("no --port: using the built-in emulator, sim:")
-        port = DEFAULT_PORT
+) -> Display:
+    """Open what ``--port`` names, or the emulator, which is noted on stderr."""
+    import voxdisplay as vd  # noqa: PLC0415 - see above
+
     return vd.open(
-        port, baud=baud, timeout_s=timeout_s, reconnect_s=reconnect_s, note=note, capture=capture
+        default_port(port),
+        baud=baud,
+        timeout_s=timeout_s,
+        reconnect_s=reconnect_s,
+        note=note,
+        capture=capture,
     )
 
 
-class SizeType(click.ParamType[vd.Grid]):
-    """A size such as 128x128x128 or 128,128,128."""
-
-    name = "size"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> vd.Grid:
-        """Read it, or fail with a message."""
-        try:
-            return vd.Grid.parse(str(value).replace(",", "x"))
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
+def default_port(port: str | None) -> str:
+    """Return the port that was named, or that of the emulator with a note."""
+    if port is not None:  # an empty one is a mistake of a script, and no default
+        return port
+    note("no --port: using the built-in emulator, sim:")
+    return DEFAULT_PORT

@@ -1,71 +1,32 @@
-"""``voxdisplay plan``: what a scene will cost on the wire, before there is a display."""
+"""``voxdisplay plan``: bytes and frames per second that a scene takes on the wire."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 
 import voxdisplay as vd
 from voxdisplay.cli.options import (
-    SizeType,
+    DEFAULT_SIZE_TEXT,
     baud_option,
     complete_port,
+    display_size_option,
     fit_option,
     json_option,
+    quiet_option,
+    scene_argument,
 )
-from voxdisplay.cli.output import (
-    note,
-    plural,
-    print_json,
-)
-from voxdisplay.cli.scene_drawing import draw
-from voxdisplay.display.baud import DEFAULT_BAUD, Baud, open_at_rate
-from voxdisplay.display.plan import COMMON_LINES, EVERY_FEATURE, Line, Plan, Receiver, plan
+from voxdisplay.cli.output import note, plural, print_json, print_stdout
+from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
+    from voxdisplay.display.baud import Baud
+    from voxdisplay.display.plan import Plan
 
-_DEFAULT_GRID = vd.Grid(128, 128, 128)
-_TIMEOUT_S = 5.0
-_MANY = 10_000  # frames a second, from which on the line is not what limits them
-
-
-class FeaturesType(click.ParamType[tuple[str, ...]]):
-    """Names of features, such as line,box; all; or none."""
-
-    name = "features"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        """Read them, or fail with a message."""
-        text = str(value).lower().strip()
-        if text in ("all", "none"):
-            return EVERY_FEATURE if text == "all" else ()
-        names = [name.strip() for name in text.split(",")]
-        for name in names:
-            if name not in EVERY_FEATURE:
-                known = ", ".join(EVERY_FEATURE)
-                self.fail(f"{name!r} is no feature: there are {known}; all; none", param, ctx)
-        return tuple(name for name in EVERY_FEATURE if name in names)
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Offer another one."""
-        from click.shell_completion import CompletionItem  # noqa: PLC0415 - only for this
-
-        del ctx, param
-        before, comma, begun = incomplete.rpartition(",")
-        names = EVERY_FEATURE if comma else ("all", "none", *EVERY_FEATURE)
-        had = before.split(",")
-        return [
-            CompletionItem(before + comma + name)
-            for name in names
-            if name.startswith(begun) and name not in had
-        ]
+_TIMEOUT_S: Final = 5.0
+_MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what limits them
 
 
 @click.command(
@@ -78,7 +39,7 @@ class FeaturesType(click.ParamType[tuple[str, ...]]):
       voxdisplay plan curve.json --port /dev/ttyUSB0 --json
     """,
 )
-@click.argument("scene", type=click.Path())
+@scene_argument()
 @click.option(
     "--port",
     "-p",
@@ -87,26 +48,25 @@ class FeaturesType(click.ParamType[tuple[str, ...]]):
     help="Ask this display for its size, format, features, longest packet and refresh rate.",
 )
 @baud_option(None, "all common rates, and USB")
-@click.option(
-    "--size",
-    type=SizeType(),
-    metavar="NX,NY,NZ",
-    help="Size of the display.  [default: the port's, else the scene's, else 128,128,128]",
+@display_size_option(
+    "Size of the display in voxels.  "
+    f"[default: the port's, else the scene's, else {DEFAULT_SIZE_TEXT}]"
 )
 @click.option(
     "--format",
     "format_",
-    type=click.Choice([format_.value for format_ in vd.PixelFormat]),
+    type=click.Choice(PIXEL_FORMATS),
     help="Pixel format of the display.  [default: the port's, else rgb888]",
 )
 @click.option(
     "--features",
     type=FeaturesType(),
     metavar="NAMES",
-    help="What the display takes besides the ops that all take: names from protocol.md, section "
-    "5, such as line,box; all; none.  [default: the port's, else all]",
+    help="Features of the display, named as in protocol.md, section 5, such as line,box; all; "
+    "none.  [default: the port's, else all]",
 )
 @fit_option
+@quiet_option
 @json_option
 def plan_command(
     *,
@@ -119,36 +79,38 @@ def plan_command(
     fit: Literal["contain", "none"],
     as_json: bool,
 ) -> None:
-    """Say how many packets and bytes SCENE takes, and how many a second a line carries.
+    """Print how many packets and bytes SCENE takes, and how many frames per second a line carries.
 
-    SCENE is a JSON file, or - for stdin. Nothing is shown. What is counted is what `push` sends to
-    a display that shows something else, once the line is known.
+    SCENE is a JSON file, or - for stdin. Nothing is shown. Counted is what `push` sends to a
+    display that shows something else, once the rate of the line is known.
     """
+    from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415 - as in push
+    from voxdisplay.display.plan import COMMON_LINES, Line, Receiver, plan  # noqa: PLC0415
+
     loaded = vd.load_scene(scene)
-    grid, kind, receiver = loaded.size or _DEFAULT_GRID, "rgb888", Receiver()
+    grid, kind, receiver = loaded.size or vd.Grid(128, 128, 128), "rgb888", Receiver()
     if port:
-        said, baud = _ask(port, baud)
-        grid, kind, receiver = said.grid, said.format.value, Receiver.of(said)
+        info, baud = _ask(port, baud)
+        grid, kind, receiver = info.grid, info.format.value, Receiver.of(info)
     elif baud == "auto":
-        raise click.UsageError("--baud auto finds the rate of a display: which --port is it at?")
+        raise click.UsageError("--baud auto finds the rate of a display: name its --port")
     if features is not None:
         receiver = replace(receiver, features=features)
     own = "palette" in receiver.features
     frame = vd.Frame(size or grid, format_ or kind, own_palette=own)
-    fitted, remark = loaded.fitted(frame.grid, fit)
-    if remark:
-        note(remark)
-    draw(fitted, frame)
+    draw_scene(fit_scene(loaded, frame.grid, fit), frame)
     lines = (Line.serial(baud),) if baud else COMMON_LINES
     plans = [plan(frame, line, receiver) for line in lines]
     if as_json:
         print_json(_facts(frame, plans))
     else:
-        click.echo(_table(frame, plans))
+        print_stdout(_table(frame, plans))
 
 
 def _ask(port: str, baud: Baud | None) -> tuple[vd.DeviceInfo, int | None]:
-    """Ask a display what it is; give the rate of its line, too, if that was given or found."""
+    """Return what a display announces, and the rate of its line if that was given or found."""
+    from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate  # noqa: PLC0415
+
     transport = open_at_rate(port, baud or DEFAULT_BAUD, _TIMEOUT_S, note)
     found = getattr(transport, "baud", None) if baud == "auto" else baud
     with vd.open(transport) as display:
@@ -189,16 +151,16 @@ def _table(frame: vd.Frame, plans: list[Plan]) -> str:
     first = plans[0]
     both = f"{plural(first.wire_bytes, 'byte')} to it, {plural(first.answer_bytes, 'byte')} back"
     display = f"{frame.grid} {frame.format.value}, {_features(first.receiver.features)}"
-    said = [
+    rows = [
         f"{plural(first.voxels, 'voxel')} on a display of {display}",
         f"over {first.line.name}: {plural(first.packets, 'packet')}, {both}",
         "",
         f"{'op':<8}{'count':>9}{'bytes':>10}",
     ]
     for name, op in first.ops.items():
-        said.append(f"{name:<8}{op.count:>9}{op.bytes:>10}{op.bytes / first.op_bytes:>7.0%}")
+        rows.append(f"{name:<8}{op.count:>9}{op.bytes:>10}{op.bytes / first.op_bytes:>7.0%}")
     rest = first.wire_bytes - first.op_bytes
-    said += [
+    rows += [
         f"{'packing':<8}{'':>9}{rest:>10}   headers, check values, delimiting",
         "",
         f"{'line':<16}{'packets':>9}{'bytes':>10}{'one frame':>12}{'frames/s':>12}",
@@ -206,22 +168,24 @@ def _table(frame: vd.Frame, plans: list[Plan]) -> str:
     for cost in plans:
         rate = cost.frames_per_s
         mark = "  as fast as it is refreshed" if rate == cost.receiver.refresh_hz else ""
-        said.append(
+        rows.append(
             f"{cost.line.name:<16}{cost.packets:>9}{cost.wire_bytes:>10}"
             f"{_time(cost.seconds):>12}{_rate(rate):>12}{mark}"
         )
-    return "\n".join(said)
+    return "\n".join(rows)
 
 
 def _features(names: tuple[str, ...]) -> str:
-    """Say what is assumed of a display, or was announced."""
+    """Return the features that are assumed or were announced, as text."""
+    from voxdisplay.display.plan import EVERY_FEATURE  # noqa: PLC0415
+
     if names == EVERY_FEATURE:
         return "with all features"
     return f"features: {', '.join(names) or 'none'}"
 
 
 def _time(seconds: float) -> str:
-    """Write a time in three figures."""
+    """Return a time as text of three figures."""
     unit, size = next(
         ((unit, size) for unit, size in (("s", 1.0), ("ms", 1e-3)) if seconds >= size), ("us", 1e-6)
     )
@@ -230,6 +194,6 @@ def _time(seconds: float) -> str:
 
 
 def _rate(frames_per_s: float) -> str:
-    if frames_per_s >= _MANY:
-        return f"> {_MANY}"
+    if frames_per_s >= _MAX_RATE:
+        return f"> {_MAX_RATE}"
     return f"{frames_per_s:.0f}" if frames_per_s >= 100 else f"{frames_per_s:.3g}"

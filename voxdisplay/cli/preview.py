@@ -3,97 +3,94 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.image_output import (
-    PictureFileType,
-    PictureSizeType,
-    save_picture,
-    view_angle_option,
-)
 from voxdisplay.cli.options import (
-    SizeType,
+    DEFAULT_SIZE_TEXT,
+    display_size_option,
     fit_option,
+    image_file_option,
+    quiet_option,
+    scene_argument,
 )
-from voxdisplay.cli.output import (
-    note,
-    plural,
-    progress_bar,
-)
-from voxdisplay.cli.scene_drawing import draw
+from voxdisplay.cli.output import note, plural, progress_bar
+from voxdisplay.cli.param_types import PIXEL_FORMATS, AngleType, PixelSizeType, RangeType
 
-_DEFAULT_GRID = vd.Grid(128, 128, 128)
+if TYPE_CHECKING:
+    from voxdisplay.raster.grid import Grid
+
 # Pixels of all pictures of a film: what a GIF takes in memory, in bytes.
-_MOST_PIXELS = 1 << 29
+_MAX_PIXELS: Final = 1 << 29
 
 
 @click.command(
     epilog="""\b
     Examples:
       voxdisplay preview curve.json -o curve.png
-      voxdisplay preview curve.json -o curve.gif --size 480x360 --seconds 4
-      voxdisplay preview curve.json -o small.png --display-size 16,16,32 --format mono1
+      voxdisplay preview curve.json -o curve.gif --pixels 480x360 --seconds 4
+      voxdisplay preview curve.json -o small.png --size 16x16x32 --format mono1
     """
 )
-@click.argument("scene", type=click.Path())
-@click.option(
+@scene_argument()
+@image_file_option(
     "-o",
     "--output",
+    help_text="File to write: .png, or .gif and .mp4 that turn once, or .html to turn by hand.",
     required=True,
-    type=PictureFileType(),
-    metavar="FILE",
-    help="Where to: .png, or .gif and .mp4 that turn once, or .html to turn by hand.",
 )
 @click.option(
-    "--size",
+    "--pixels",
     "size_px",
-    type=PictureSizeType(),
+    type=PixelSizeType(),
     default="800x600",
-    show_default=True,
     metavar="WxH",
-    help="The picture's size in pixels.",
+    help="Size of the picture in pixels.  [default: 800x600]",
 )
-@view_angle_option
+@click.option(
+    "--view-angle",
+    type=AngleType(),
+    metavar="YAW,PITCH",
+    help="View direction in degrees: 0,0 is from the front, x to the right and z up; a greater "
+    "pitch looks from above.  [default: -34,24]",
+)
 @click.option(
     "--zoom",
-    type=click.FloatRange(0.3, 2.5),
+    type=RangeType("times", 0.3, 2.5, "1.5"),
     default=1.0,
-    show_default=True,
-    help="Come nearer, above 1, or go away.",
+    metavar="FACTOR",
+    help="0.3 to 2.5; above 1 is nearer.  [default: 1]",
 )
-@click.option(
-    "--display-size",
-    type=SizeType(),
-    metavar="NX,NY,NZ",
-    help="The size of the display, in voxels.  [default: the scene's, else 128,128,128]",
+@display_size_option(
+    f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]",
+    for_two="; --pixels is the size of the picture",
 )
 @click.option(
     "--format",
     "format_",
-    type=click.Choice([format_.value for format_ in vd.PixelFormat]),
+    type=click.Choice(PIXEL_FORMATS),
     default="rgb888",
-    show_default=True,
-    help="The display's pixel format.",
+    help="Pixel format of the display.  [default: rgb888]",
 )
 @fit_option
 @click.option(
     "--seconds",
-    type=click.FloatRange(0.1, 60),
+    type=RangeType("seconds", 0.1, 60, "4"),
     default=3.0,
-    show_default=True,
-    help="How long a film takes to turn once.",
+    metavar="SECONDS",
+    help="Time in which a film turns once, 0.1 to 60.  [default: 3]",
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(1, 60),
+    type=RangeType("frames per second", 1, 60, "25"),
     default=20.0,
-    show_default=True,
-    help="A film's pictures a second.",
+    metavar="FPS",
+    help="Pictures per second of a film, 1 to 60.  [default: 20]",
 )
-@click.option("--plain", is_flag=True, help="Without box, axes and halo.")
+@click.option("--plain", is_flag=True, help="Draw no box, axes and halo.")
+@quiet_option
 def preview(
     *,
     scene: str,
@@ -101,7 +98,7 @@ def preview(
     size_px: tuple[int, int],
     view_angle: tuple[float, float] | None,
     zoom: float,
-    display_size: vd.Grid | None,
+    size: Grid | None,
     format_: str,
     fit: Literal["contain", "none"],
     seconds: float,
@@ -112,29 +109,25 @@ def preview(
 
     Needs the extra `view`: pip install 'voxdisplay[view]'.
     """
+    from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
+    from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
     from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
     from voxdisplay.view.save import FILM_SUFFIXES, ExportJob  # noqa: PLC0415
 
     film = output.suffix.lower() in FILM_SUFFIXES
-    if film and size_px[0] * size_px[1] * seconds * fps > _MOST_PIXELS:
+    if film and size_px[0] * size_px[1] * seconds * fps > _MAX_PIXELS:
         raise click.BadParameter(
             f"{seconds * fps:.0f} pictures of {size_px[0]}x{size_px[1]} are too many: make them "
             "smaller, or fewer by --fps or --seconds",
-            param_hint="--size",
+            param_hint="--pixels",
         )
-    loaded = vd.load_scene(scene)
-    grid = display_size or loaded.size or _DEFAULT_GRID
-    fitted, remark = loaded.fitted(grid, fit)
-    if remark:
-        note(remark)
+    fitted, grid = load_fitted_scene(scene, size, fit)
     frame = vd.Frame(grid, format_)
-    draw(fitted, frame)
-    look = RenderOptions(size=size_px, glow=not plain, axes=not plain).with_view(view_angle, zoom)
-    shot = ExportJob(frame.array(), grid, frame.format, look, _title(scene), seconds, fps)
+    draw_scene(fitted, frame)
+    options = RenderOptions(size=size_px, glow=not plain, axes=not plain)
+    options = options.with_view(view_angle, zoom)
+    title = "voxdisplay" if scene == "-" else Path(scene).stem
+    job = ExportJob(frame.array(), grid, frame.format, options, title, seconds, fps)
     with progress_bar("drawing") as progress:
-        save_picture(output, shot, progress)
+        save_image(output, job, progress)
     note(f"{output}: {plural(len(frame.lit()[0]), 'voxel')} on {grid} {format_}")
-
-
-def _title(scene: str) -> str:
-    return "voxdisplay" if scene == "-" else Path(scene).stem

@@ -1,37 +1,37 @@
-"""``voxdisplay push``: a scene becomes a proved picture."""
+"""``voxdisplay push``: show a scene and prove by digest or readback that it is shown."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, TextIO
+from typing import TYPE_CHECKING, Literal, TextIO
 
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.image_output import PictureFileType, save_page
 from voxdisplay.cli.options import (
     capture_option,
     fit_option,
+    image_file_option,
     json_option,
+    on_exit_option,
     open_display,
     port_options,
+    quiet_option,
     reconnect_option,
+    scene_argument,
 )
 from voxdisplay.cli.output import (
     device_json,
     note,
     plural,
     print_json,
+    print_stdout,
     progress_bar,
 )
-from voxdisplay.cli.scene_drawing import draw
-from voxdisplay.cli.signals import (
-    OnExit,
-    close_on_exit,
-    on_exit_option,
-)
-from voxdisplay.cli.thumbnail import print_thumbnail
-from voxdisplay.display.baud import Baud
+
+if TYPE_CHECKING:
+    from voxdisplay.cli.signals import OnExit
+    from voxdisplay.display.baud import Baud
 
 
 @click.command(
@@ -43,17 +43,15 @@ from voxdisplay.display.baud import Baud
       cat curve.json | voxdisplay push - --port tcp://127.0.0.1:5000 --json
     """
 )
-@click.argument("scene", type=click.Path())
+@scene_argument()
 @port_options
 @fit_option
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
-@click.option(
+@image_file_option(
     "--preview",
-    type=PictureFileType(),
-    metavar="FILE",
-    help="Read the page back, and draw what the display says it shows: .png, .gif, .mp4 or .html.",
+    help_text="Read the page back and draw it: .png, .gif, .mp4 or .html.",
 )
-@click.option("--quiet", "-q", is_flag=True, help="No progress, and no picture on the terminal.")
+@quiet_option
 @reconnect_option
 @on_exit_option
 @capture_option
@@ -67,7 +65,6 @@ def push(
     fit: Literal["contain", "none"],
     verify: bool,
     preview: Path | None,
-    quiet: bool,
     reconnect_s: float,
     on_exit: OnExit,
     capture: TextIO | None,
@@ -77,25 +74,28 @@ def push(
 
     Waits until the device has shown it and its digest agrees.
     """
+    from voxdisplay.cli.image_output import save_page_image  # noqa: PLC0415 - help starts fast
+    from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415
+    from voxdisplay.cli.signals import close_on_exit  # noqa: PLC0415
+    from voxdisplay.cli.thumbnail import print_thumbnail  # noqa: PLC0415
+
     if preview:
         import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
     loaded = vd.load_scene(scene)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
     with close_on_exit(display, on_exit):
-        fitted, remark = loaded.fitted(display.info.grid, fit)
-        if remark:
-            note(remark)
+        fitted = fit_scene(loaded, display.info.grid, fit)
         frame = display.frame()
-        draw(fitted, frame)
-        with progress_bar("sending", hidden=quiet) as progress:
+        draw_scene(fitted, frame)
+        with progress_bar("sending") as progress:
             receipt = display.present(frame, progress=progress)
         assert receipt is not None  # noqa: S101 - it waited
         if receipt.repaired:
-            note(f"the display showed something else at first, and was sent the frame again: "
+            note(f"the display showed something else at first; the frame was sent again: "
                  f"{receipt.repaired}")  # fmt: skip
         page = None
         if verify or preview:
-            with progress_bar("reading back", hidden=quiet) as progress:
+            with progress_bar("reading back") as progress:
                 page = (
                     display.verify(frame, progress=progress)
                     if verify
@@ -118,22 +118,23 @@ def push(
                 }
             )
         else:
-            click.echo(_summary(display, receipt, verify=verify))
-        if preview and page is not None:  # what was shown has been said, if this fails
-            save_page(preview, page, display.info, frame.palette)
-        if not quiet and not as_json:
+            print_stdout(_summary(display, receipt, verify=verify))
+        # After the summary: the picture is shown, whether or not its image can be written.
+        if preview and page is not None:
+            save_page_image(preview, page, display.info, frame.palette)
+        if not as_json:
             print_thumbnail(display, frame, page, baud)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
     info = display.info
-    again = f", {receipt.retransmitted} sent again" if receipt.retransmitted else ""
+    again = f", {receipt.retransmitted} retransmitted" if receipt.retransmitted else ""
     device = f"{info.name or 'a display'} {info.firmware}".strip()
     cost = f"{plural(receipt.packets, 'packet')}, {plural(receipt.wire_bytes, 'byte')}"
-    took = f"{receipt.elapsed_s * 1000:.1f} ms"
+    elapsed = f"{receipt.elapsed_s * 1000:.1f} ms"
     lines = [
         f"{display.port}  {device}, {info.grid} {info.format.value}, protocol {info.protocol}",
-        f"{plural(receipt.voxels, 'voxel')} shown: {cost}, {took}{again}",
+        f"{plural(receipt.voxels, 'voxel')} shown: {cost}, {elapsed}{again}",
     ]
     if receipt.digest is not None:
         lines.append(f"proved: the display's digest {receipt.digest:08x} is the frame's")

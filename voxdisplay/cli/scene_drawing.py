@@ -1,44 +1,98 @@
-"""From a scene to its sequences, for the commands that draw and those that only list."""
+"""Scenes drawn into frames, with notes of what is clipped, fitted, recoloured or split."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import voxdisplay as vd
-from voxdisplay.cli.output import (
-    note,
-)
+from voxdisplay.cli.output import note
+
+if TYPE_CHECKING:
+    from voxdisplay.scene.model import SceneItem
+
+_MAX_JUMPS_NAMED: Final = 3
 
 
-def voxelize_scene(scene: vd.Scene, **how: Any) -> list[vd.Sequence]:
-    """Find the voxels of all objects of a scene together.
+def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
+    """Return the sequences of a scene's objects, and note where curves jump.
 
     Parameters
     ----------
     scene : Scene
-    **how
-        Options of `voxdisplay.voxelize`.
+    **options
+        Of `voxdisplay.voxelize`.
 
     Raises
     ------
     SceneError
-        Naming the object whose curve cannot be drawn.
+        If a curve cannot be drawn; it names the object.
 
     """
     try:
-        return vd.voxelize_many((item.curve for item in scene.items), **how)
+        sequences = vd.voxelize_many((item.curve for item in scene.items), **options)
     except vd.CurveError:
-        # Found together, they fail together: find out which one is to blame.
+        # Voxelised together, they fail together: one by one, to name the object.
         for item in scene.items:
-            try:
-                vd.voxelize(item.curve, **how)
-            except vd.CurveError as error:
-                raise vd.SceneError(str(error), path=item.path, hint=error.hint) from error
+            with_object(item, vd.voxelize, item.curve, **options)
         raise
+    for item, sequence in zip(scene.items, sequences, strict=True):
+        for remark in _remarks(sequence):
+            note(f"{item.path} ({item.type}): {remark}")
+    return sequences
 
 
-def draw(scene: vd.Scene, frame: vd.Frame) -> None:
-    """Draw a scene, and say on stderr what a display of the frame's kind cannot show."""
+def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -> Any:
+    """Call a function and raise its `CurveError` as a `SceneError` that names the object."""
+    try:
+        return function(*arguments, **named)
+    except vd.CurveError as error:
+        raise vd.SceneError(str(error), path=item.path, hint=error.hint) from error
+
+
+def _remarks(sequence: vd.Sequence) -> Iterator[str]:
+    """Yield what is to be reported of a curve besides its voxels."""
+    jumps = [float(sequence.t[start]) for start in sequence.starts[1:]]
+    if jumps:
+        named = ", ".join(f"{t:.6g}" for t in jumps[:_MAX_JUMPS_NAMED])
+        more = ", ..." if len(jumps) > _MAX_JUMPS_NAMED else ""
+        yield f"the curve jumps near t = {named}{more}: nothing is drawn across"
+
+
+def load_fitted_scene(
+    path: str, grid: vd.Grid | None, fit: Literal["contain", "none"] = "contain"
+) -> tuple[vd.Scene, vd.Grid]:
+    """Read a scene and fit it to a grid.
+
+    Parameters
+    ----------
+    path : str
+        A file, or ``-`` for stdin.
+    grid : Grid or None
+        None: the size for which the scene was composed, else 128x128x128.
+    fit : {"contain", "none"}
+
+    Returns
+    -------
+    scene : Scene
+    grid : Grid
+
+    """
+    scene = vd.load_scene(path)
+    grid = grid or scene.size or vd.Grid(128, 128, 128)
+    return fit_scene(scene, grid, fit), grid
+
+
+def fit_scene(scene: vd.Scene, grid: vd.Grid, fit: Literal["contain", "none"]) -> vd.Scene:
+    """Fit a scene to a grid, and note the change."""
+    fitted, remark = scene.fitted(grid, fit)
+    if remark:
+        note(remark)
+    return fitted
+
+
+def draw_scene(scene: vd.Scene, frame: vd.Frame) -> None:
+    """Draw a scene, and note what a display of the frame's kind cannot show."""
     drawings = [
         frame.draw(sequence, item.color)
         for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
@@ -48,6 +102,6 @@ def draw(scene: vd.Scene, frame: vd.Frame) -> None:
     if total and clipped == total:
         note(f"warning: all {total} voxels are outside the display: the picture is empty")
     elif clipped:
-        note(f"{clipped} of {total} voxels are outside the display, and not shown")
+        note(f"{clipped} of {total} voxels are outside the display and not shown")
     if not all(drawing.exact_color for drawing in drawings):
         note(f"this is a {frame.format.value} display: colours are the nearest it has")

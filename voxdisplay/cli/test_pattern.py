@@ -1,36 +1,35 @@
-"""``voxdisplay test-pattern``: whether a display's axes are where they should be."""
+"""``voxdisplay test-pattern``: patterns that tell axes apart, and a check of axes in memory."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
-import numpy as np
 
 import voxdisplay as vd
-from voxdisplay.cli.options import (
-    json_option,
-    open_display,
-    port_options,
-)
-from voxdisplay.cli.output import (
-    device_json,
-    note,
-    print_json,
-    progress_bar,
-)
-from voxdisplay.cli.thumbnail import print_thumbnail
-from voxdisplay.display import test_patterns
-from voxdisplay.display.baud import Baud
-from voxdisplay.raster.pixel_format import Pixels
+from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
+from voxdisplay.cli.output import device_json, note, print_json, print_stdout, progress_bar
+from voxdisplay.cli.param_types import RangeType
 
-_GROWS = {"x": "right", "y": "away", "z": "up"}
-_LEGEND = {
+if TYPE_CHECKING:
+    from voxdisplay.display.baud import Baud
+    from voxdisplay.display.test_patterns import AxisFinding, PatternFrame
+    from voxdisplay.raster.pixel_format import Pixels
+
+PATTERNS: Final = ("axes", "corners", "plane", "all")
+_DIRECTIONS: Final = {"x": "right", "y": "away", "z": "up"}
+_LEGENDS: Final = {
     "axes": "x is red with one tick at its far end, y green with two, z blue with three; "
     "they meet in white at voxel (0, 0, 0)",
     "corners": "a corner is as red as x is far, as green as y, as blue as z; (0, 0, 0) is grey",
     "plane": "a red plane marches along x, a green one along y, a blue one along z",
     "all": "every voxel is lit",
+}
+_ONE_COLOR_LEGENDS: Final = {
+    "axes": "x has one tick at its far end, y two, z three; they meet at voxel (0, 0, 0)",
+    "corners": "all eight corners are lit. On a display of one colour they look alike: they show "
+    "that no corner is missing; which axis is which, --pattern axes shows",
+    "plane": "a plane marches along x first, then along y, then along z, each time from voxel 0 on",
 }
 
 
@@ -47,24 +46,24 @@ _LEGEND = {
 @click.option(
     "--pattern",
     "name",
-    type=click.Choice(test_patterns.NAMES),
+    type=click.Choice(PATTERNS),
     default="axes",
-    show_default=True,
-    help="Axes and corners, labelled by colour; a plane that marches along each axis; all voxels.",
+    help="Axes or corners, labelled by colour; a plane that marches along each axis; all voxels.  "
+    "[default: axes]",
 )
 @click.option(
     "--brightness",
-    type=click.FloatRange(0, 100),
+    type=RangeType("percent", 0, 100, "20"),
     metavar="PERCENT",
-    help="How bright.  [default: 100; plane 50, all 5]",
+    help="Brightness, 0 to 100.  [default: 100; plane 50, all 5]",
 )
 @click.option(
     "--check",
     is_flag=True,
-    help="Read the page back and say of each axis whether it is right, mirrored or swapped in the "
-    "display's memory. Exit code 1 if one is not right.",
+    help="Read the page back and print of each axis whether it is right, mirrored or swapped in "
+    "the display's memory. Exit code 1 if one is not right.",
 )
-@click.option("--quiet", "-q", is_flag=True, help="No progress, and no picture on the terminal.")
+@quiet_option
 @json_option
 def test_pattern(
     *,
@@ -74,18 +73,20 @@ def test_pattern(
     name: str,
     brightness: float | None,
     check: bool,
-    quiet: bool,
     as_json: bool,
 ) -> None:
     """Show a pattern that tells the axes of a display apart.
 
     The check is of the display's memory. Whether its optics show that memory the right way round,
-    only eyes can tell: the pattern is made for them.
+    only eyes can see: the pattern is made for them.
     """
-    share = test_patterns.BRIGHTNESS[name] if brightness is None else brightness / 100
+    from voxdisplay.cli.thumbnail import print_thumbnail  # noqa: PLC0415 - help starts fast
+    from voxdisplay.display.test_patterns import BRIGHTNESS  # noqa: PLC0415
+
+    share = BRIGHTNESS[name] if brightness is None else brightness / 100
     with open_display(port, baud, timeout_s) as display:
-        judged = _Judged()
-        page = _show(display, name, share, judged if check else None, quiet=quiet)
+        check_result = _CheckResult()
+        page = _show(display, name, share, check_result if check else None)
         if as_json:
             print_json(
                 {
@@ -93,44 +94,64 @@ def test_pattern(
                     "device": device_json(display.info),
                     "pattern": name,
                     "brightness_percent": round(share * 100, 3),
-                    "check": judged.json() if check else None,
+                    "check": check_result.json() if check else None,
                 }
             )
         else:
-            click.echo(f"{display.port}  {display.info.grid} {display.info.format.value}: {name}")
-            click.echo(_LEGEND[name])
+            info = display.info
+            print_stdout(f"{display.port}  {info.grid} {info.format.value}: {name}")
+            print_stdout(legend(name, info.grid, one_color=info.format is vd.PixelFormat.MONO1))
             if check:
-                click.echo(judged.text())
-            if not quiet and page is not None:
+                print_stdout(check_result.text())
+            if page is not None:
                 print_thumbnail(display, page[0], page[1], baud)
-    if check and not judged.right:
+    if check and not check_result.right:
         raise click.exceptions.Exit(1)
 
 
-class _Judged:
-    """What the pages that were read back say, all together."""
+def legend(name: str, grid: vd.Grid, *, one_color: bool) -> str:
+    """Return what a pattern shows, on a display of a size, for a person who looks at it."""
+    if not one_color:
+        return _LEGENDS[name]
+    text = _ONE_COLOR_LEGENDS.get(name, _LEGENDS[name])
+    if name == "axes":
+        from voxdisplay.display.test_patterns import axes_with_ticks  # noqa: PLC0415
+
+        missing = [axis for axis in "xyz" if axis not in axes_with_ticks(grid)]
+        if missing:
+            text += (
+                f". This display is too small for the ticks of {', '.join(missing)}: only lengths "
+                "tell those axes apart, or --pattern plane"
+            )
+    return text
+
+
+class _CheckResult:
+    """Findings of all pages that were read back."""
 
     def __init__(self) -> None:
         self.differing_voxels = 0
-        self._axes: dict[str, test_patterns.AxisFinding] = {}
+        self._axes: dict[str, AxisFinding] = {}
 
-    def add(self, step: test_patterns.PatternFrame, page: Pixels) -> None:
-        """Judge one page more. A wrong one is not made good by a right one."""
+    def add(self, step: PatternFrame, page: Pixels) -> None:
+        """Compare one more page. A wrong finding is not replaced by a right one."""
+        from voxdisplay.display.test_patterns import compare_axes  # noqa: PLC0415
+
         meant = step.frame.array()
         differs = meant != page
         self.differing_voxels += int((differs.any(axis=-1) if differs.ndim == 4 else differs).sum())
-        for finding in test_patterns.compare_axes(meant, page, step.axes):
+        for finding in compare_axes(meant, page, step.axes):
             before = self._axes.get(finding.axis)
             if before is None or before.right is None or finding.right is False:
                 self._axes[finding.axis] = finding
 
     @property
     def right(self) -> bool:
-        """Whether everything read back is as it was meant."""
+        """True if everything read back is as it was meant."""
         return self.differing_voxels == 0
 
     def json(self) -> dict[str, Any]:
-        """Give it for a script."""
+        """Return the keys of ``--json``."""
         return {
             "right": self.right,
             "differing_voxels": self.differing_voxels,
@@ -141,10 +162,10 @@ class _Judged:
         }
 
     def text(self) -> str:
-        """Give it for a person."""
+        """Return lines for a person."""
         lines = []
         for axis, finding in self._axes.items():
-            lines.append(f"{axis} grows {_GROWS[axis]}: {_verdict(finding)}")
+            lines.append(f"{axis} grows {_DIRECTIONS[axis]}: {_verdict(finding)}")
         differing = self.differing_voxels
         lines.append(
             f"read back: {differing} voxels differ" if differing else "read back: all as meant"
@@ -152,9 +173,9 @@ class _Judged:
         return "\n".join(lines)
 
 
-def _verdict(finding: test_patterns.AxisFinding) -> str:
+def _verdict(finding: AxisFinding) -> str:
     if finding.right is None:
-        return "cannot be told: on this display the pattern looks the same either way"
+        return "unknown: on this display the pattern looks the same either way"
     if finding.right:
         return "yes"
     if finding.shown is None:
@@ -167,26 +188,26 @@ def _verdict(finding: test_patterns.AxisFinding) -> str:
 
 
 def _show(
-    display: vd.Display, name: str, share: float, judged: _Judged | None, *, quiet: bool
+    display: vd.Display, name: str, share: float, check_result: _CheckResult | None
 ) -> tuple[vd.Frame, Pixels | None] | None:
-    """Show all steps; give the last frame, and its page if it was read back."""
+    """Show all frames; return the last, and its page if it was read back."""
+    from voxdisplay.display.test_patterns import pattern_frames  # noqa: PLC0415
+
     info = display.info
     total = sum(info.grid) if name == "plane" else 1
     last = None
-    with progress_bar("showing", hidden=quiet) as progress:
-        for number, step in enumerate(
-            test_patterns.pattern_frames(name, info.grid, info.format, share)
-        ):
+    with progress_bar("showing") as progress:
+        for number, step in enumerate(pattern_frames(name, info.grid, info.format, share)):
             page = None
             try:
                 display.present(step.frame)
-            except vd.DesyncError as error:
-                if judged is None or "read" not in info.features:
+            except vd.DesyncError as failure:
+                if check_result is None or "read" not in info.features:
                     raise
-                note(str(error))
-            if judged is not None and step.verify:
+                note(str(failure))
+            if check_result is not None and step.verify:
                 page = display.read()
-                judged.add(step, np.asarray(page))
+                check_result.add(step, page)
             last = step.frame, page
             if progress:
                 progress(number + 1, total)

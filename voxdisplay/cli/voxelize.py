@@ -1,34 +1,31 @@
-"""``voxdisplay voxelize``: the sequences alone, without a display."""
+"""``voxdisplay voxelize``: the sequences of a scene as CSV, numpy array or JSON."""
 
 from __future__ import annotations
 
 import csv
 import json
-import os
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
 import voxdisplay as vd
-from voxdisplay.cli.options import (
-    SizeType,
-    json_option,
-)
-from voxdisplay.cli.output import (
-    note,
-    plural,
-    print_json,
-)
-from voxdisplay.cli.scene_drawing import voxelize_scene
-from voxdisplay.voxelization import tangent_march
+from voxdisplay.cli.image_output import cannot_write
+from voxdisplay.cli.options import json_option, quiet_option, scene_argument
+from voxdisplay.cli.output import note, plural, print_json, redirect_to_null
+from voxdisplay.cli.param_types import RangeType, SizeType
 
-_COLUMNS = ("object", "x", "y", "z")
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from voxdisplay.scene.model import SceneItem
+
+_COLUMNS: Final = ("object", "x", "y", "z")
+_STEP: Final = RangeType("step", 0, 1e6, "0.25")
 
 
 @click.command(
@@ -36,12 +33,12 @@ _COLUMNS = ("object", "x", "y", "z")
     epilog="""\b
     Examples:
       voxdisplay voxelize curve.json > voxels.csv
-      voxdisplay voxelize curve.json -o voxels.npy --clip 128,128,128
+      voxdisplay voxelize curve.json -o voxels.npy --clip 128x128x128
       voxdisplay voxelize curve.json --certified --json
       voxdisplay voxelize curve.json --method march --variant 2 --pitch 0.1 --json
     """,
 )
-@click.argument("scene", type=click.Path())
+@scene_argument()
 @click.option(
     "-o",
     "--output",
@@ -53,52 +50,53 @@ _COLUMNS = ("object", "x", "y", "z")
     "--method",
     type=click.Choice(["grid-plane", "march"]),
     default="grid-plane",
-    show_default=True,
-    help="Grid-plane intersection, which guarantees connectivity and error, or the paper's march.",
+    help="Grid-plane intersection, which guarantees connectivity and error, or the paper's march "
+    "along the tangent.  [default: grid-plane]",
 )
 @click.option(
     "--variant",
-    type=click.IntRange(1, 3),
-    default=3,
-    show_default=True,
-    help="How the march finds distances: by a search, a finer one, or a parabola.",
+    type=click.Choice(["1", "2", "3"]),
+    default="3",
+    help="How the march finds distances: 1 by a search, 2 by a finer one, 3 by a parabola.  "
+    "[default: 3]",
 )
 @click.option(
     "--tangent",
     type=click.Choice(["analytic", "difference"]),
-    help="Where the march takes tangents from.  [default: analytic, if there is a derivative]",
+    help="Source of the tangents of the march.  [default: analytic, if there is a derivative]",
 )
 @click.option(
     "--pitch",
-    type=float,
+    type=_STEP,
     metavar="STEP",
     help="Step of the march's search for the nearest point: in degrees where t is an angle around "
     "z, as in the paper, else in voxels.  [default: 0.5 for variant 1, else 0.25]",
 )
 @click.option(
     "--reach",
-    type=float,
+    type=_STEP,
     metavar="SPAN",
-    help="How far the march searches to either side, in the same unit.  [default: 2]",
+    help="Width of the march's search to either side, in the same unit.  [default: 2]",
 )
 @click.option(
     "--certified",
     is_flag=True,
-    help="Prove that no feature is missed, however narrow, and say where there is no proof.",
+    help="Prove that no feature is missed, however narrow, and report where there is no proof.",
 )
 @click.option(
     "--clip",
     type=SizeType(),
-    metavar="NX,NY,NZ",
-    help="Leave out voxels outside this size.",
+    metavar="NXxNYxNZ",
+    help="Leave out voxels outside a display of this size.",
 )
+@quiet_option
 @json_option
 def voxelize(
     *,
     scene: str,
     output: Path | None,
     method: str,
-    variant: int,
+    variant: str,
     tangent: str | None,
     pitch: float | None,
     reach: float | None,
@@ -110,15 +108,17 @@ def voxelize(
 
     SCENE is a JSON file, or - for stdin. Without -o and --json the voxels are printed as CSV.
     """
+    from voxdisplay.cli.scene_drawing import voxelize_scene  # noqa: PLC0415 - help starts fast
+
     if output and output.suffix not in _WRITERS:
         raise click.BadParameter(
             f"{output} should end in {', '.join(_WRITERS)}", param_hint="--output"
         )
-    how = _how(method, variant, tangent, pitch, reach, certified)
+    options = _voxelize_options(method, int(variant), tangent, pitch, reach, certified)
     loaded = vd.load_scene(scene)
     items = loaded.items
     began_s = time.perf_counter()
-    sequences = voxelize_scene(loaded, **how)
+    sequences = voxelize_scene(loaded, **options)
     seconds = time.perf_counter() - began_s
     for number, (item, sequence) in enumerate(zip(items, sequences, strict=True)):
         if isinstance(sequence.proof, str):
@@ -128,8 +128,8 @@ def voxelize(
     if output:
         try:
             _WRITERS[output.suffix](output, rows)
-        except OSError as error:
-            raise click.ClickException(f"{output} cannot be written: {error.strerror}") from error
+        except OSError as failure:
+            raise cannot_write(output, failure) from failure
     if as_json:
         objects = [
             _report(number, item, sequence, len(sequence) - len(voxels))
@@ -144,11 +144,11 @@ def voxelize(
         try:
             _write_csv(sys.stdout, rows)
             sys.stdout.flush()
-        except BrokenPipeError:  # whoever reads has enough; so has the flush at exit
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        except BrokenPipeError:  # the reader has enough
+            redirect_to_null(sys.stdout)
 
 
-def _how(
+def _voxelize_options(
     method: str,
     variant: int,
     tangent: str | None,
@@ -156,10 +156,14 @@ def _how(
     reach: float | None,
     certified: bool,
 ) -> dict[str, Any]:
-    """Give the options of `voxdisplay.voxelize`, if they go together."""
+    """Return the options of `voxdisplay.voxelize`, or raise if they exclude each other."""
     if method == "march":
         if certified:
-            raise click.BadParameter("nothing is proven of the march", param_hint="--certified")
+            raise click.BadParameter(
+                "there is no proof for the march: use --method grid-plane", param_hint="--certified"
+            )
+        from voxdisplay.voxelization import tangent_march  # noqa: PLC0415
+
         try:
             pitch, reach = tangent_march.search_steps(variant, pitch, reach)
         except ValueError as error:
@@ -184,14 +188,18 @@ def _kept(sequence: vd.Sequence, clip: vd.Grid | None) -> NDArray[np.int32]:
 
 
 def _rows(kept: list[NDArray[np.int32]]) -> NDArray[np.int32]:
-    """Columns object, x, y, z: (N, 4)."""
+    """Return columns object, x, y, z: (N, 4)."""
+    import numpy as np  # noqa: PLC0415
+
     counts = [len(voxels) for voxels in kept]
     numbers = np.repeat(np.arange(len(kept), dtype=np.int32), counts)
     return np.column_stack((numbers, np.concatenate([np.empty((0, 3), np.int32), *kept])))
 
 
-def _report(number: int, item: Any, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:
-    report = sequence.report
+def _report(number: int, item: SceneItem, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:
+    from voxdisplay.cli.scene_drawing import with_object  # noqa: PLC0415
+
+    report = with_object(item, lambda: sequence.report)
     return {
         "object": number,
         "type": item.type,
@@ -220,6 +228,8 @@ def _save_csv(path: Path, rows: NDArray[np.int32]) -> None:
 
 
 def _save_npy(path: Path, rows: NDArray[np.int32]) -> None:
+    import numpy as np  # noqa: PLC0415
+
     np.save(path, rows)
 
 

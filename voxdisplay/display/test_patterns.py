@@ -80,6 +80,15 @@ def pattern_frames(
             yield PatternFrame(paint.all(), "")
 
 
+def axes_with_ticks(grid: Grid) -> str:
+    """Return the axes, letters of ``"xyz"``, that have room for ticks in the pattern ``"axes"``."""
+    return "".join(
+        name
+        for name, side, across in zip("xyz", grid, (grid.nz, grid.nz, grid.nx), strict=True)
+        if side >= _MIN_SIDE_FOR_TICKS and across >= 3
+    )
+
+
 class _Painter:
     """Makes frames of patterns."""
 
@@ -108,10 +117,10 @@ class _Painter:
 
     def _ticks(self, axis: int) -> Iterator[Voxels]:
         """Give one tick at the far end of x, two of y, three of z, across the axis."""
+        if "xyz"[axis] not in axes_with_ticks(self._grid):
+            return
         across = 0 if axis == 2 else 2
         room = self._grid[across]
-        if self._grid[axis] < _MIN_SIDE_FOR_TICKS or room < 3:
-            return
         for number in range(axis + 1):
             tick = np.zeros((max(1, room // 10), 3), dtype=np.int64)
             tick[:, axis] = self._grid[axis] - 1 - 2 * number

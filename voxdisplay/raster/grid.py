@@ -28,17 +28,18 @@ class Grid(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Grid:
-        """Read ``"17x64x40"``.
+        """Parse ``"17x64x40"`` or ``"17,64,40"``.
 
         Raises
         ------
         ValueError
-            If the text is not three positive whole numbers joined by ``x``.
+            If the text is not three positive whole numbers joined by ``x`` or by commas.
 
         """
-        match = re.fullmatch(r"(\d{1,5})x(\d{1,5})x(\d{1,5})", text.strip().lower())
+        sides = r"([0-9]{1,5})\s*[x,]\s*([0-9]{1,5})\s*[x,]\s*([0-9]{1,5})"
+        match = re.fullmatch(sides, text.strip().lower())
         if not match or "0" in (parts := [part.lstrip("0") or "0" for part in match.groups()]):
-            raise ValueError(f"{text!r} is not a size: write it like 128x128x128")
+            raise ValueError(f"{text!r} is not a size of a display: write it like 128x128x128")
         return cls(*map(int, parts))
 
     def __str__(self) -> str:

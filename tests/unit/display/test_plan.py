@@ -7,7 +7,7 @@ import pytest
 
 import voxdisplay as vd
 from voxdisplay.cli import main
-from voxdisplay.cli.plan import FeaturesType
+from voxdisplay.cli.param_types import FeaturesType
 from voxdisplay.display.plan import COMMON_LINES, EVERY_FEATURE, USB_LINES, Line, Receiver, plan
 from voxdisplay.wire import spec
 from voxdisplay.wire.op_encoding import EncoderConfig
@@ -188,7 +188,7 @@ def test_the_command_takes_features(capsys):
     assert main([*scene, " none ", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["features"] == []
     assert main([*scene, "line,bix"]) == 2
-    assert "'bix' is no feature: there are line, box" in capsys.readouterr().err
+    assert "'bix' is not a feature: take of line, box" in capsys.readouterr().err
     offered = [item.value for item in FeaturesType().shell_complete(None, None, "line,o")]
     assert offered == ["line,oct"]
     offered = [item.value for item in FeaturesType().shell_complete(None, None, "")]
@@ -197,4 +197,4 @@ def test_the_command_takes_features(capsys):
 
 def test_a_rate_is_found_only_at_a_port(capsys):
     assert main(["plan", "examples/paper-curve.json", "--baud", "auto"]) == 2
-    assert "which --port" in capsys.readouterr().err
+    assert "name its --port" in capsys.readouterr().err

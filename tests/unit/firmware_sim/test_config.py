@@ -76,6 +76,7 @@ def test_the_smallest_and_the_largest_device() -> None:
 
 def test_values_are_read() -> None:
     assert parse_size("3x5X70") == (3, 5, 70)
+    assert parse_size("3,5,70") == (3, 5, 70)
     assert parse_refresh("29.97") == 29_970
     assert parse_refresh("0") == 0
     assert parse_number("0x10") == 16

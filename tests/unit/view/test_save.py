@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from voxdisplay.cli.image_output import SUFFIXES
+from voxdisplay.cli.param_types import IMAGE_SUFFIXES
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.view.atomic_write import atomic_write
@@ -22,7 +22,7 @@ SHOT = ExportJob(
 
 
 def test_the_command_line_knows_what_can_be_written():
-    assert tuple(WRITERS) == SUFFIXES
+    assert tuple(WRITERS) == IMAGE_SUFFIXES
     assert set(FILM_SUFFIXES) < set(WRITERS)
 
 
