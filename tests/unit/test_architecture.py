@@ -1,14 +1,21 @@
-"""The arrows of the house run one way; nothing heavy is imported where it is not needed."""
+"""Import rules: arrows run one way, without circles, and nothing heavy is imported in vain."""
 
 import ast
+import graphlib
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "voxdisplay"
+
+def folder_of(package):
+    """Folder of an installed package, be it a checkout or a wheel."""
+    return Path(importlib.util.find_spec(package).origin).parent
+
+
+PACKAGE, EMULATOR = map(folder_of, ("voxdisplay", "firmware_sim"))
 
 # What each part of the driver may import of the driver.
 MAY_IMPORT = {
@@ -31,16 +38,23 @@ MAY_IMPORT = {
 
 
 def imports_of(path):
-    """Modules of the driver that a file imports, function-level imports included."""
+    """Modules that a file imports, function-level imports included."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             for alias in node.names:
-                inner = Path(ROOT, *base.split("."), alias.name)
+                inner = PACKAGE.parent.joinpath(*base.split("."), alias.name)
                 is_module = inner.with_suffix(".py").exists() or inner.is_dir()
                 yield f"{base}.{alias.name}" if is_module else base
+
+
+def modules(package):
+    """Dotted names and paths of the modules below the folder of a package."""
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
 
 
 @pytest.mark.parametrize("part", MAY_IMPORT)
@@ -53,7 +67,7 @@ def test_arrows_run_one_way(part):
                 allowed = any(
                     inner == may or inner.startswith(f"{may}.") for may in MAY_IMPORT[part]
                 )
-                assert allowed, f"{path.relative_to(ROOT)} imports {name}"
+                assert allowed, f"{path.relative_to(PACKAGE)} imports {name}"
 
 
 def test_every_part_is_listed():
@@ -65,15 +79,24 @@ def test_every_part_is_listed():
     assert parts - {"__init__", "__main__", "cli"} == set(MAY_IMPORT)
 
 
+@pytest.mark.parametrize("package", [PACKAGE, EMULATOR], ids=lambda package: package.name)
+def test_no_modules_import_each_other(package):
+    paths = dict(modules(package))
+    graph = {
+        name: {other for other in imports_of(path) if other in paths and other != name}
+        for name, path in paths.items()
+    }
+    graphlib.TopologicalSorter(graph).prepare()
+
+
 # A backend of pyusb raises pyusb's exceptions. Who calls it has loaded them; so may it, then.
 MAY_BE_LOADED = {("usb/backend.py", "usb.core")}
 
 
 def test_the_emulator_needs_only_the_standard_library():
-    emulator = ROOT / "firmware_sim"
-    for path in emulator.rglob("*.py"):
+    for path in EMULATOR.rglob("*.py"):
         for name in imports_of(path):
-            if (path.relative_to(emulator).as_posix(), name) in MAY_BE_LOADED:
+            if (path.relative_to(EMULATOR).as_posix(), name) in MAY_BE_LOADED:
                 continue
             top = name.split(".")[0]
             assert top in sys.stdlib_module_names or top == "firmware_sim", f"{path}: {name}"
