@@ -132,14 +132,36 @@ class SceneError(VoxDisplayError, ValueError):
     message : str
         What is wrong.
     path : str
-        Where, as a JSON path such as ``$.objects[0].x``; ``$`` is the whole file, and nothing a
-        file that could not be read.
+        Where, as a JSON path such as ``$.objects[0].x``; ``$`` is the whole scene. Empty for a
+        file that could not be read or is not JSON.
+    file : str, optional
+        The scene file's name.
+    line, column : int, optional
+        Where in its text, counted from 1.
 
     """
 
-    def __init__(self, message: str, *, path: str = "$", hint: str | None = None) -> None:
-        super().__init__(f"{path}: {message}" if path else message, hint=hint)
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str = "$",
+        hint: str | None = None,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        super().__init__(message, hint=hint)
         self.path = path
+        self.file = file
+        self.line = line
+        self.column = column
+
+    def __str__(self) -> str:
+        # Composed here, so that a place may be added later and a copy is made of the message alone.
+        position = f"line {self.line}, column {self.column}" if self.line else ""
+        place = ", ".join(part for part in (self.file, position) if part)
+        return ": ".join(part for part in (place, self.path, str(self.args[0])) if part)
 
 
 class CurveError(VoxDisplayError, ValueError):

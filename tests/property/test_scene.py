@@ -1,18 +1,21 @@
-"""Whatever a scene file holds, it is a scene or a SceneError."""
+"""Arbitrary scene files: each is a scene or a SceneError that fits its place."""
 
 from __future__ import annotations
 
 import json
+import random
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from voxdisplay.errors import SceneError
 from voxdisplay.scene import read_scene
-from voxdisplay.scene.objects import TYPES
+from voxdisplay.scene.mismatch import find_mismatch
+from voxdisplay.scene.objects import TYPES, Object, SceneFile
 
 FOLDER = Path(__file__).parents[2] / "examples"
 EXAMPLES = [json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))]
@@ -57,6 +60,42 @@ def test_any_bytes(data: bytes | str) -> None:
 def test_any_keys_and_values(kind: str, content: dict[str, Any]) -> None:
     read(json.dumps(content | {"type": kind}))
     read(json.dumps({"objects": [content | {"type": kind}]}))
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(sorted(TYPES)) | st.none() | st.text(max_size=3),
+    st.dictionaries(st.sampled_from([*KEYS, "size", "params", "objects"]), values),
+)
+def test_mismatches_are_those_that_msgspec_refuses(kind: str | None, keys: dict[str, Any]) -> None:
+    for value, annotation in (
+        (keys | {"type": kind}, Object),
+        ({"objects": [keys | {"type": kind}]}, SceneFile),
+        (keys | {"objects": []}, SceneFile),
+    ):
+        try:
+            msgspec.convert(value, annotation)
+        except msgspec.ValidationError:
+            assert find_mismatch(value, annotation)
+        else:
+            assert find_mismatch(value, annotation) is None
+
+
+@settings(deadline=None)
+@given(st.binary(max_size=30), st.integers(0, 10**6))
+def test_damaged_examples(noise: bytes, seed: int) -> None:
+    rng = random.Random(seed)
+    data = bytearray(json.dumps(rng.choice(EXAMPLES), indent=1).encode())
+    at = rng.randrange(len(data))
+    data[at : at + rng.randrange(4)] = noise[: rng.randrange(1, 5)]
+    lines = bytes(data).decode("utf-8", "replace").split("\n")
+    found = None
+    try:
+        read_scene(bytes(data), folder=FOLDER)
+    except SceneError as error:
+        found = error
+    if found is not None and found.line is not None and found.column is not None:
+        assert 1 <= found.column <= len(lines[found.line - 1]) + 1
 
 
 @settings(deadline=None)

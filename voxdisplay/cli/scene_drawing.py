@@ -47,7 +47,7 @@ def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -
     try:
         return function(*arguments, **named)
     except vd.CurveError as error:
-        raise vd.SceneError(str(error), path=item.path, hint=error.hint) from error
+        raise item.scene_error(error) from error
 
 
 def _remarks(sequence: vd.Sequence) -> Iterator[str]:

@@ -1,22 +1,25 @@
-"""A scene in memory: coloured curves, and the grid they were composed for.
+"""Scene model: coloured curves in drawing order, and the grid they were composed for.
 
-Knows nothing of the file they came from, but the place that errors name.
+It must not read files; of the one it came from it holds the text, for the places in errors.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from voxdisplay.curves import Transformed
+from voxdisplay.errors import SceneError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from voxdisplay.curves import Curve
+    from voxdisplay.errors import CurveError
     from voxdisplay.raster.grid import Grid
+    from voxdisplay.scene.json_text import JsonText
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,12 +29,14 @@ class SceneItem:
     Attributes
     ----------
     type : str
-        What the file calls it: ``"parametric"``, ``"circle"``, ...
+        Its type in the file: ``"parametric"``, ``"circle"``, ...
     curve : Curve
     color : (k, 3) uint8 array
         Red, green, blue: one colour, or several that are spread along the curve.
     path : str
-        Where it stands in the file, a JSON path such as ``$.objects[0]``.
+        Its JSON path in the file, such as ``$.objects[0]``.
+    source : JsonText, optional
+        The file's text.
 
     """
 
@@ -39,11 +44,17 @@ class SceneItem:
     curve: Curve
     color: NDArray[np.uint8]
     path: str
+    source: JsonText | None = field(default=None, repr=False)
+
+    def scene_error(self, error: CurveError) -> SceneError:
+        """Return an error of the item's curve as one that names the object's place in the file."""
+        found = SceneError(str(error), path=self.path, hint=error.hint)
+        return self.source.located(found) if self.source else found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a scene file means.
+    """Contents of a scene file.
 
     Attributes
     ----------

@@ -17,20 +17,39 @@ from voxdisplay.scene.evaluation_context import EvaluationContext
 
 MAX_SIDE = 65535
 
+# "expected" is what an error says of a value of another kind.
 Number = Annotated[
     float | Annotated[str, Meta(max_length=MAX_LENGTH)],
-    Meta(description="A number, or an expression in numbers, constants and the scene's params."),
+    Meta(
+        description="A number, or an expression in numbers, constants and the scene's params.",
+        extra={"expected": "a number or an expression"},
+    ),
 ]
 Formula = Annotated[
     float | Annotated[str, Meta(max_length=MAX_LENGTH)],
-    Meta(description="An expression in t, numbers, constants and the scene's params."),
-]
-Vector = tuple[Number, Number, Number]
-Side = Annotated[int, Meta(ge=1, le=MAX_SIDE)]
-Color = Annotated[
-    str | Annotated[list[str], Meta(min_length=1)],
     Meta(
-        description="#rgb, #rrggbb or a CSS colour name; or a list of them, spread along the curve."
+        description="An expression in t, numbers, constants and the scene's params.",
+        extra={"expected": "a number or an expression of t"},
+    ),
+]
+Vector = Annotated[
+    tuple[Number, Number, Number], Meta(extra={"expected": "three numbers [x, y, z]"})
+]
+Range = Annotated[tuple[Number, Number], Meta(extra={"expected": "two numbers [from, to]"})]
+Side = Annotated[
+    Annotated[float, Meta(ge=1, le=MAX_SIDE, multiple_of=1)]
+    | Annotated[str, Meta(max_length=MAX_LENGTH)],
+    Meta(extra={"expected": "a whole number or an expression"}),
+]
+Size = Annotated[
+    tuple[Side, Side, Side], Meta(extra={"expected": "three whole numbers [nx, ny, nz]"})
+]
+ColorName = Annotated[str, Meta(extra={"expected": "a colour"})]
+Color = Annotated[
+    ColorName | Annotated[list[ColorName], Meta(min_length=1)],
+    Meta(
+        description="#rgb, #rrggbb, a CSS colour name; or a list of them, spread along the curve.",
+        extra={"expected": "a colour or a list of colours"},
     ),
 ]
 
@@ -52,7 +71,7 @@ class Parametric(SceneObject, tag="parametric", frozen=True):
     x: Formula
     y: Formula
     z: Formula
-    t: tuple[Number, Number]
+    t: Range
     dx: Formula | None = None
     dy: Formula | None = None
     dz: Formula | None = None
@@ -299,6 +318,6 @@ class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """
 
     objects: list[Object]
-    size: tuple[Side, Side, Side] | None = None
+    size: Size | None = None
     params: Annotated[dict[str, Number], Meta(max_length=MAX_PARAMS)] = {}
     schema: str = field(name="$schema", default="")

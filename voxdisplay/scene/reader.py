@@ -1,33 +1,34 @@
-"""Scene files: bytes -> Scene, or a SceneError that says where and what.
+"""Scene reader: bytes -> Scene, or a SceneError that names file, line, column and remedy.
 
-The file is not trusted. Knows JSON and how to say what is wrong with it; what the keys mean is
-known to `objects`.
+The file is not trusted. What the keys mean is known to `objects`.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import re
 import sys
-from collections import Counter
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import msgspec
 
 from voxdisplay.errors import SceneError, did_you_mean
 from voxdisplay.expressions.params import param_order
-from voxdisplay.expressions.parse import MAX_LENGTH, constant, excerpt
+from voxdisplay.expressions.parse import constant, excerpt
 from voxdisplay.raster.color import parse_color, parse_colors
 from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
+from voxdisplay.scene.foreign_files import recognise, unicode_encoding
+from voxdisplay.scene.json_text import JsonText
+from voxdisplay.scene.mismatch import described, find_mismatch
 from voxdisplay.scene.model import Scene, SceneItem
-from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
+from voxdisplay.scene.objects import MAX_SIDE, TYPES, Object, SceneFile, SceneObject
 
 MAX_BYTES = 16 << 20
 """Largest scene file. Long lists of points fit better in a file of their own."""
 MAX_VOXELS = 1 << 31
+
+_MANY_OBJECTS = 'several objects are written as {"objects": [{...}, {...}]}'
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -45,7 +46,7 @@ def load_scene(path: str | Path) -> Scene:
 
     """
     if str(path) == "-":
-        return read_scene(sys.stdin.buffer.read(MAX_BYTES + 1), folder=Path())
+        return _read(sys.stdin.buffer.read(MAX_BYTES + 1), Path(), "standard input")
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -56,7 +57,13 @@ def load_scene(path: str | Path) -> Scene:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         what = error.strerror if isinstance(error, OSError) else error
         raise SceneError(f"cannot read {excerpt(str(path))}: {what}", path="") from error
-    return read_scene(data, folder=path.parent)
+    return _read(data, path.parent, _shown(path))
+
+
+def _shown(path: Path) -> str:
+    """Return a file's name as errors show it."""
+    name = str(path)
+    return name if name.isprintable() and len(name) < 200 else excerpt(name)
 
 
 def _similar(path: Path) -> str | None:
@@ -74,33 +81,79 @@ def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
     Parameters
     ----------
     data : bytes or str
-        JSON; bytes are UTF-8. Either a scene, or one object, which is a scene of that object.
+        JSON, perhaps with ``//`` comments; bytes are UTF-8. Either a scene, or one object, which
+        is a scene of that object.
     folder : Path, optional
         Where the files are that the scene names. Without it, it may name none.
 
     Raises
     ------
     SceneError
-        If anything is wrong with it; ``.path`` says where.
+        If anything is wrong with it: ``.path``, ``.line`` and ``.column`` are where.
 
     """
-    raw = _parse(data)
-    alone = isinstance(raw, dict) and "type" in raw and "objects" not in raw
-    if alone:
-        scene_object: SceneObject = _convert(raw, Object)
-        return Scene(None, (_item(scene_object, EvaluationContext("$", {}, folder)),))
-    file: SceneFile = _convert(raw, SceneFile)
-    size = Grid(*file.size) if file.size else None
-    if size and size.voxels > MAX_VOXELS:
-        raise SceneError(f"{size} is more than {MAX_VOXELS} voxels", path="$.size")
+    return _read(data, folder, None)
+
+
+def _read(data: bytes | str, folder: Path | None, file: str | None) -> Scene:
+    if len(data) > MAX_BYTES:
+        raise SceneError(
+            f"the file is larger than {MAX_BYTES >> 20} MiB",
+            path="",
+            file=file,
+            hint="put long lists of points into a .npy file beside it",
+        )
+    source = JsonText(data if isinstance(data, str) else _decoded(data, file), file)
+    try:
+        raw = source.parse()
+    except SceneError as error:
+        start = data[:4096].encode(errors="replace") if isinstance(data, str) else data
+        if foreign := recognise(start):
+            problem = f"this is {foreign.kind}, not a scene"
+            raise SceneError(problem, path="", hint=foreign.hint, file=file) from error
+        raise
+    try:
+        return _scene(raw, folder, source)
+    except SceneError as error:
+        raise source.located(error) from error.__cause__
+
+
+def _decoded(data: bytes, file: str | None) -> str:
+    encoding = unicode_encoding(data)
+    try:
+        if not encoding:
+            return data.decode("utf-8")
+        problem, hint = f"the file is {encoding} text, and must be UTF-8", "save it as UTF-8"
+    except UnicodeDecodeError as error:
+        problem, hint = f"the file is not UTF-8 text: byte {error.start}", "save it as UTF-8"
+        if foreign := recognise(data):
+            problem, hint = f"this is {foreign.kind}, not a scene", foreign.hint
+    raise SceneError(problem, path="", hint=hint, file=file)
+
+
+def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
+    if not isinstance(raw, dict):
+        hint = _MANY_OBJECTS if isinstance(raw, list) else None
+        raise SceneError(f"a scene is an object {{...}}, not {described(raw)}", hint=hint)
+    if "objects" not in raw and ("type" in raw or _means("type", raw)):
+        if not isinstance(raw.pop("$schema", ""), str):
+            raise SceneError("expected text in double quotes", path="$.$schema")
+        scene_object: SceneObject = _convert(raw, Object, source)
+        context = EvaluationContext("$", {}, folder)
+        return Scene(None, (_item(scene_object, context, source),))
+    file: SceneFile = _convert(raw, SceneFile, source)
     names = _params(file.params)
-    return Scene(
-        size,
-        tuple(
-            _item(scene_object, EvaluationContext(f"$.objects[{i}]", names, folder))
-            for i, scene_object in enumerate(file.objects)
-        ),
-    )
+    size = _size(file.size, names) if file.size else None
+    items = [
+        _item(scene_object, EvaluationContext(f"$.objects[{i}]", names, folder), source)
+        for i, scene_object in enumerate(file.objects)
+    ]
+    return Scene(size, tuple(items))
+
+
+def _means(key: str, raw: dict[str, Any]) -> bool:
+    """Return whether a scene without the keys that it needs has one that resembles a key."""
+    return any(did_you_mean(key, [written]) for written in raw)
 
 
 def _params(params: dict[str, str | float]) -> dict[str, float]:
@@ -113,7 +166,19 @@ def _params(params: dict[str, str | float]) -> dict[str, float]:
     return values
 
 
-def _item(scene_object: SceneObject, context: EvaluationContext) -> SceneItem:
+def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
+    numbers = EvaluationContext("$", names, None).numbers("size", sides).tolist()
+    for i, number in enumerate(numbers):
+        if not (number.is_integer() and 1 <= number <= MAX_SIDE):
+            problem = f"must be a whole number from 1 to {MAX_SIDE}, not {number:g}"
+            raise SceneError(problem, path=f"$.size[{i}]")
+    grid = Grid(*map(int, numbers))
+    if grid.voxels > MAX_VOXELS:
+        raise SceneError(f"{grid} is more than {MAX_VOXELS} voxels", path="$.size")
+    return grid
+
+
+def _item(scene_object: SceneObject, context: EvaluationContext, source: JsonText) -> SceneItem:
     with as_scene_error(context.path):
         curve = scene_object.curve(context)
     names = [scene_object.color] if isinstance(scene_object.color, str) else scene_object.color
@@ -123,108 +188,32 @@ def _item(scene_object: SceneObject, context: EvaluationContext) -> SceneItem:
         except ValueError as error:
             index = "" if isinstance(scene_object.color, str) else f"[{i}]"
             raise SceneError(str(error), path=f"{context.path}.color{index}") from None
-    return SceneItem(
-        str(scene_object.__struct_config__.tag),
-        curve,
-        parse_colors(scene_object.color),
-        context.path,
-    )
+    kind = str(scene_object.__struct_config__.tag)
+    return SceneItem(kind, curve, parse_colors(scene_object.color), context.path, source)
 
 
-def _parse(data: bytes | str) -> Any:
-    """Parse JSON, more strictly than json does: no NaN, no key twice, no numbers without end."""
-    if len(data) > MAX_BYTES:
-        raise SceneError(
-            f"the file is larger than {MAX_BYTES >> 20} MiB",
-            hint="put long lists of points into a .npy file beside it",
-        )
-    try:
-        text = data if isinstance(data, str) else data.decode("utf-8-sig")
-        if not text.strip():
-            raise SceneError("the file is empty")
-        return json.loads(
-            text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_integer
-        )
-    except UnicodeDecodeError as error:
-        raise SceneError(f"the file is not UTF-8 text: byte {error.start}") from error
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise SceneError(f"the file is not JSON: {error.msg}: {where}") from error
-    except RecursionError:
-        raise SceneError("the file is nested too deeply") from None
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    for key, _ in pairs:
-        # No key that means anything; and one that could not be quoted, or would be taken for a
-        # part of the message that quotes it.
-        if len(key) > 64 or "`" in key or not key.isprintable():
-            raise SceneError(f"unknown key {excerpt(key)}")
-    content = dict(pairs)
-    if len(content) != len(pairs):
-        twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
-        raise SceneError(f"the key {excerpt(twice)} is twice in one object")
-    return content
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise SceneError(f"{name} is not a number that JSON has")
-
-
-def _integer(digits: str) -> int | float:
-    return int(digits) if len(digits) < 20 else float(digits)
-
-
-def _convert(raw: Any, kind: Any) -> Any:
+def _convert(raw: Any, kind: Any, source: JsonText) -> Any:
     """Make Structs of plain JSON values."""
     try:
         return msgspec.convert(raw, kind)
-    except msgspec.ValidationError as error:
-        raise _explained(str(error), raw) from None
-    except UnicodeEncodeError:
-        raise SceneError("the file has half of a surrogate pair") from None
+    except msgspec.ValidationError:
+        found = find_mismatch(raw, kind)
+        # The message of msgspec would depend on its version.
+        if found is None:
+            raise SceneError("a value is of the wrong kind") from None
+    hint = _hint(raw, found.path) or found.hint
+    raise source.located(SceneError(found.message, path=found.path, hint=hint), found.key)
 
 
-_UNKNOWN_KEY = re.compile(r"Object contains unknown field `(.*)`", re.DOTALL)
-_MISSING_KEY = re.compile(r"Object missing required field `(.*)`", re.DOTALL)
-_UNKNOWN_TYPE = re.compile(r"Invalid value '(.*)'", re.DOTALL)
-
-
-def _explained(message: str, raw: Any) -> SceneError:
-    """Say a message of msgspec in the words of scene files, with the nearest known word."""
-    what, at, path = message.rpartition(" - at `")
-    what, path = (what, path.removesuffix("`")) if at else (message, "$")
-    if found := _UNKNOWN_KEY.fullmatch(what):
-        known = _keys_at(path, raw)
-        hint = did_you_mean(found[1], known) or f"known: {', '.join(known)}"
-        if found[1] in {"size", "params"}:
-            hint = "size and params stand in a scene, beside objects"
-        return SceneError(f"unknown key {excerpt(found[1])}", path=path, hint=hint)
-    if found := _MISSING_KEY.fullmatch(what):
-        return SceneError(f"the key {found[1]!r} is missing", path=path)
-    if found := _UNKNOWN_TYPE.fullmatch(what):
-        hint = did_you_mean(found[1], TYPES) or f"known: {', '.join(TYPES)}"
-        return SceneError(f"unknown type {excerpt(found[1])}", path=path, hint=hint)
-    if path == "$.params[...]":
-        path = _path_of_wrong_param(raw["params"])
-    what = what[:1].lower() + what[1:]
-    return SceneError(what.replace("`float | str`", "a number or an expression"), path=path)
-
-
-def _keys_at(path: str, raw: Any) -> list[str]:
-    """Give the keys that the object at a path can have."""
-    kind: type[msgspec.Struct] = SceneFile
-    if index := re.fullmatch(r"\$\.objects\[([0-9]+)\]", path):
-        kind = TYPES[raw["objects"][int(index[1])]["type"]]
-    elif "objects" not in raw and "type" in raw:
-        kind = TYPES[raw["type"]]
-    return [field.encode_name for field in msgspec.structs.fields(kind)]
-
-
-def _path_of_wrong_param(params: dict[str, Any]) -> str:
-    return next(
-        f"$.params.{name}"
-        for name, value in params.items()
-        if type(value) not in {str, int, float}
-        or (isinstance(value, str) and len(value) > MAX_LENGTH)
-    )
+def _hint(raw: dict[str, Any], path: str) -> str | None:
+    """Return a hint that needs the meaning of a key."""
+    if path == "$.size":
+        side = raw["size"] if type(raw["size"]) is int else 64
+        return f'write "size": [{side}, {side}, {side}]'
+    single = "objects" not in raw
+    meant = "type" in raw or _means("type", raw) or _means("objects", raw)
+    if path == "$" and single and not meant:
+        return 'a scene has the key "objects", a file of one object the key "type"'
+    if path == "$" and single and raw.get("type") in TYPES and raw.keys() & {"size", "params"}:
+        return "size and params belong to a scene, beside objects"
+    return None

@@ -31,6 +31,7 @@ _SCALARS = {
 _LIMITS = {
     "ge": {"*": "minimum"},
     "le": {"*": "maximum"},
+    "multiple_of": {"*": "multipleOf"},
     "min_length": {"string": "minLength", "array": "minItems", "object": "minProperties"},
     "max_length": {"string": "maxLength", "array": "maxItems", "object": "maxProperties"},
 }

@@ -162,7 +162,7 @@ def test_only_regular_files(folder: Path) -> None:
 def test_missing_and_unreadable_files(folder: Path) -> None:
     (folder / "data.csv").write_text("1,2,3\n")
     assert "'dat.csv' beside the scene (did you mean 'data.csv'?)" in refused(folder, "dat.csv")
-    for name in ("", ".csv", "a\0.csv", "\ud800.csv", "x" * 5000 + ".csv", "data.txt"):
+    for name in ("", ".csv", "a\0.csv", "x" * 5000 + ".csv", "data.txt"):
         refused(folder, name)
 
 
