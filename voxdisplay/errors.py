@@ -26,6 +26,8 @@ from __future__ import annotations
 import difflib
 from typing import TYPE_CHECKING
 
+from voxdisplay.printable_text import printable_lines
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -40,11 +42,13 @@ class VoxDisplayError(Exception):
     hint : str, optional
         What to do about it. Shown after the message.
 
+    Both are made printable: ports, devices and libraries are quoted in them.
+
     """
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
+        super().__init__(printable_lines(message))
+        self.hint = hint and printable_lines(hint)
 
 
 class TransportError(VoxDisplayError):

@@ -33,7 +33,16 @@ MAY_IMPORT = {
     "transport": {"errors", "printable_text", "transport", "wire.spec"},
     "conformance": {"conformance", "errors", "printable_text", "transport", "wire.spec"},
     "view": {"errors", "printable_text", "raster", "view"},
-    "display": {"display", "errors", "frame", "link", "raster", "transport", "wire"},
+    "display": {
+        "display",
+        "errors",
+        "frame",
+        "link",
+        "printable_text",
+        "raster",
+        "transport",
+        "wire",
+    },
 }
 
 

@@ -17,6 +17,7 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import note, print_json, print_stdout, progress_bar
 from voxdisplay.cli.param_types import seconds_type
+from voxdisplay.printable_text import printable
 
 if TYPE_CHECKING:
     from voxdisplay.conformance.announced_device import AnnouncedDevice
@@ -109,7 +110,7 @@ def conformance(
                     progress(min(done, len(selected)), len(selected))
                 if verbose and not as_json:
                     text = f"{result.check.id}: {result.verdict.value} {result.reason}".rstrip()
-                    print_stdout(report.clean(text))
+                    print_stdout(printable(text))
                     print_stdout("\n".join(report.transcript_lines(result.log)))
 
             outcome = run.run_checks(
@@ -135,9 +136,7 @@ def conformance(
 
 
 def _announce(port: str, said: AnnouncedDevice, *, kept: bool) -> None:
-    from voxdisplay.conformance.report import clean  # noqa: PLC0415 - only what is needed
-
-    note(f"{port}  {clean(str(said))}")
+    note(f"{port}  {said}")
     afterwards = "as it was" if kept else "dark: what it shows cannot be read back"
     note(f"this draws on the display; afterwards it will be {afterwards}")
 

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
+from voxdisplay.printable_text import printable_lines
+
 if TYPE_CHECKING:
     from voxdisplay.display.device_info import DeviceInfo
 
@@ -63,9 +65,9 @@ def note(text: str) -> None:
 
 
 def print_stderr(text: str) -> None:
-    """Print a line to stderr, if stderr can still be written."""
+    """Print lines to stderr, if stderr can still be written; what they quote is printable."""
     try:
-        _write(sys.stderr, text)
+        _write(sys.stderr, printable_lines(text))
     except OSError as failure:
         # What Python flushes at its end then goes to the null device, without a complaint: of a
         # closed terminal all, of a full disk only what was to be printed here.

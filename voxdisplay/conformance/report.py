@@ -11,6 +11,7 @@ from voxdisplay.conformance.announced_device import FEATURES, FORMATS
 from voxdisplay.conformance.catalogue import SECTIONS
 from voxdisplay.conformance.dialogue import LogEntry
 from voxdisplay.conformance.run import Report, Result, Verdict
+from voxdisplay.printable_text import printable
 
 _LAST_LINES = 8  # of a transcript, unless all is shown
 
@@ -33,7 +34,9 @@ def report_lines(report: Report, *, transcripts: bool) -> Iterator[str]:
         yield f"{section:>4}  {SECTIONS.get(section, ''):<20}  {counts}"
     skipped = (result for result in ordered if result.verdict is Verdict.NOT_APPLICABLE)
     for reason, group in groupby(sorted(skipped, key=attrgetter("reason")), attrgetter("reason")):
-        yield clean(f"not applicable, {reason}: {', '.join(result.check.id for result in group)}")
+        yield printable(
+            f"not applicable, {reason}: {', '.join(result.check.id for result in group)}"
+        )
     yield _conclusion(report)
     yield f"on display now: {report.display_state}"
 
@@ -63,11 +66,11 @@ def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
     yield f"BROKEN {check.id}"
     yield f"  section {check.section}: {check.requirement}"
     if result.last_sent:
-        yield clean(f"  sent:    {str(result.last_sent).removeprefix('-> ')}")
-    yield clean(f"  must be: {result.expected}")
-    yield clean(f"  was:     {result.actual}")
+        yield printable(f"  sent:    {str(result.last_sent).removeprefix('-> ')}")
+    yield printable(f"  must be: {result.expected}")
+    yield printable(f"  was:     {result.actual}")
     if result.likely_cause:
-        yield clean(f"  likely:  {result.likely_cause}")
+        yield printable(f"  likely:  {result.likely_cause}")
     if transcript:
         if len(result.log) > _LAST_LINES:
             yield f"    ... {len(result.log) - _LAST_LINES} before; -v shows all"
@@ -78,12 +81,7 @@ def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
 def transcript_lines(log: tuple[LogEntry, ...]) -> Iterator[str]:
     """Show what went (->) and came (<-): packets without COBS and check value, as section 17.5."""
     for line in log:
-        yield clean(f"    {line}")
-
-
-def clean(text: str) -> str:
-    """Keep a device's text from steering a terminal."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+        yield printable(f"    {line}")
 
 
 def as_json(port: str, report: Report) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.errors import DeviceError, IncompatibleDevice
+from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
@@ -74,9 +75,9 @@ def device_info(info: Info) -> DeviceInfo:
         grid=Grid(info.nx, info.ny, info.nz),
         format=format_,
         protocol=f"{info.major}.{info.minor}",
-        name=_printable(info.name),
-        firmware=_printable(info.firmware),
-        serial=_printable(info.serial),
+        name=printable(info.name),
+        firmware=printable(info.firmware),
+        serial=printable(info.serial),
         refresh_hz=info.refresh / 1000,
         max_payload_bytes=info.max_payload,
         rx_buffer_bytes=info.rx_buffer,
@@ -112,14 +113,9 @@ def check_compatible(before: DeviceInfo, now: DeviceInfo) -> None:
 def device_error(error: Error) -> DeviceError:
     """Give what is raised for an ERROR."""
     name = _CODES.get(error.code, "an unknown code")
-    text = f": {_printable(error.text)}" if error.text else ""
+    text = f": {printable(error.text)}" if error.text else ""
     return DeviceError(
         f"the device refused a packet: {name} ({error.code}) at byte {error.offset}{text}",
         code=error.code,
         hint="protocol.md, section 11, says what it means; driver or device has a fault",
     )
-
-
-def _printable(text: str) -> str:
-    """Make a device's text safe to show: it may not steer a terminal."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -18,6 +18,7 @@ from typing import Any, overload
 import numpy as np
 
 from voxdisplay.errors import MissingExtra
+from voxdisplay.printable_text import printable_lines
 from voxdisplay.raster.grid import Grid
 from voxdisplay.view.glow import accumulate_light
 from voxdisplay.view.lit_voxels import LitVoxels
@@ -189,6 +190,6 @@ def _encode_by_ffmpeg(
             encoder.stdin.close()
         except BrokenPipeError:
             pass  # it says why below
-        said = encoder.stderr.read().decode(errors="replace").strip()
+        said = printable_lines(encoder.stderr.read().decode(errors="replace").strip())
     if encoder.returncode:
         raise OSError(0, f"ffmpeg failed: {said.splitlines()[-1][:200] if said else ''}", str(path))

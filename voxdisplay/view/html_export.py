@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
@@ -83,6 +84,6 @@ def save_html(
         (_PLACE, data),  # base64 and numbers: nothing in it ends the script
     ):
         text = text.replace(mark, mark + more, 1)
-    text = text.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
+    text = text.replace(_TITLE, f"<title>{html.escape(printable(title))}</title>", 1)
     with atomic_write(Path(path)) as unfinished:
         unfinished.write_text(text, encoding="utf-8")

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
+from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.half_blocks import CAMERA, half_blocks, has_true_color
@@ -105,7 +106,7 @@ class TerminalView:
         picture = half_blocks(
             self._lit, self.grid, columns, max(1, rows - 1), camera=self.camera, full=full
         )
-        words = f" {self.title}  {len(self._lit.positions)} voxels  {_HELP}"
+        words = f" {printable(self.title)}  {len(self._lit.positions)} voxels  {_HELP}"
         return [*picture, words[: columns - 1]] if rows > 1 else picture
 
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Colors, Palette
 from voxdisplay.raster.pixel_format import PixelFormat
@@ -81,7 +82,7 @@ def encode(snapshot: Snapshot) -> bytes:
     head = json.dumps(
         {
             "number": snapshot.number,
-            "title": snapshot.title,
+            "title": printable(snapshot.title),
             "size": list(grid),
             "format": snapshot.format.value,
             "voxels": len(voxels),
