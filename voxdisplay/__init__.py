@@ -6,6 +6,61 @@
 ...     frame = display.frame()
 ...     drawing = frame.draw(curve, color="orange")
 ...     receipt = display.present(frame)
+
+Displays and frames: ``help(voxdisplay.Display)`` and so on says more of each.
+
+    open                Open a display by the name of its port.
+    Display             An open display: frames in, proof of what is shown out.
+    DeviceInfo          What a device announced: grid, format, features.
+    Receipt             Figures of a frame that was shown.
+    Frame               One picture: draw on it, set it, save it, present it.
+    Drawing             Voxel counts of one drawn object.
+    Grid                Size of a display in voxels.
+    PixelFormat         Pixel formats of displays: mono1, index8, rgb565, rgb888.
+
+What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0 to 1.
+
+    Parametric          Curve by formulas or by a callable.
+    Segment             Straight line between two points.
+    Polyline            Straight lines through points.
+    Points              Ordered list of points, joined by straight lines.
+    Circle              Circle in a plane.
+    Arc                 Part of a circle.
+    Ellipse             Ellipse in a plane.
+    Helix               Helix around an axis.
+    Lissajous           Sine oscillation of each axis.
+    TorusKnot           (p, q) knot on a torus.
+    Bezier              Bezier curve of any degree.
+    BSpline             B-spline; with weights, a NURBS curve.
+    CatmullRom          Smooth curve through points.
+    Curve               Base class, for curves of one's own.
+    Scene               Coloured curves, as read from a scene file.
+    load_scene          Read a scene from a file.
+    read_scene          Read a scene from the text of a scene file.
+
+From curves to voxels.
+
+    voxelize            Return the voxels along a curve.
+    voxelize_many       Return the voxels along many curves, faster than one by one.
+    Sequence            Ordered, 26-connected voxels along a curve.
+    Report              Distances, gaps and contacts of a sequence.
+
+Errors.
+
+    VoxDisplayError     Base of all of them; ``hint`` says what to do.
+    TransportError      The byte pipe failed.
+    OpenError           A port cannot be opened.
+    TransportClosed     The pipe was closed or unplugged in use.
+    TransportTimeout    Nothing came, or could be sent, in time.
+    ProtocolError       Base of the two below.
+    LocalProtocolError  The call is not allowed in this state; nothing was sent.
+    RemoteProtocolError The device broke protocol.md.
+    DeviceError         The device refused a packet.
+    IncompatibleDevice  The device cannot be served by this driver, or for this frame.
+    SceneError          A scene file is wrong: where, and what.
+    CurveError          A curve cannot be evaluated or drawn.
+    DesyncError         The display shows something else, after recovery was tried.
+    MissingExtra        An optional library is not installed.
 """
 
 # The public names are imported when they are first used (PEP 562): a command that prints its help
@@ -55,6 +110,52 @@ if TYPE_CHECKING:
     from voxdisplay.voxelization import Report, Sequence, voxelize, voxelize_many
 
     __version__: str
+
+    __all__ = [
+        "Arc",
+        "BSpline",
+        "Bezier",
+        "CatmullRom",
+        "Circle",
+        "Curve",
+        "CurveError",
+        "DesyncError",
+        "DeviceError",
+        "DeviceInfo",
+        "Display",
+        "Drawing",
+        "Ellipse",
+        "Frame",
+        "Grid",
+        "Helix",
+        "IncompatibleDevice",
+        "Lissajous",
+        "LocalProtocolError",
+        "MissingExtra",
+        "OpenError",
+        "Parametric",
+        "PixelFormat",
+        "Points",
+        "Polyline",
+        "ProtocolError",
+        "Receipt",
+        "RemoteProtocolError",
+        "Report",
+        "Scene",
+        "SceneError",
+        "Segment",
+        "Sequence",
+        "TorusKnot",
+        "TransportClosed",
+        "TransportError",
+        "TransportTimeout",
+        "VoxDisplayError",
+        "load_scene",
+        "open",
+        "read_scene",
+        "voxelize",
+        "voxelize_many",
+    ]
 
 # The module of each public name.
 _MODULES = {
@@ -126,59 +227,21 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 # Modules that are attributes of the package without an import of their own.
 _SUBMODULES = ("curves", "display", "errors", "frame", "raster", "scene", "voxelization")
 
-__all__ = [
-    "Arc",
-    "BSpline",
-    "Bezier",
-    "CatmullRom",
-    "Circle",
-    "Curve",
-    "CurveError",
-    "DesyncError",
-    "DeviceError",
-    "DeviceInfo",
-    "Display",
-    "Drawing",
-    "Ellipse",
-    "Frame",
-    "Grid",
-    "Helix",
-    "IncompatibleDevice",
-    "Lissajous",
-    "LocalProtocolError",
-    "MissingExtra",
-    "OpenError",
-    "Parametric",
-    "PixelFormat",
-    "Points",
-    "Polyline",
-    "ProtocolError",
-    "Receipt",
-    "RemoteProtocolError",
-    "Report",
-    "Scene",
-    "SceneError",
-    "Segment",
-    "Sequence",
-    "TorusKnot",
-    "TransportClosed",
-    "TransportError",
-    "TransportTimeout",
-    "VoxDisplayError",
-    "load_scene",
-    "open",
-    "read_scene",
-    "voxelize",
-    "voxelize_many",
-]
-
+_PUBLIC = sorted(_MODULE_OF)
+_FUNCTIONS = [name for name in _PUBLIC if name.islower()]
 
 if not TYPE_CHECKING:  # a type checker would take any name of a module that has __getattr__
 
     def __getattr__(name: str) -> object:
         """Import a public name when it is first used."""
         from importlib import import_module  # noqa: PLC0415 - nothing is imported before its use
+        from sys import _getframe  # noqa: PLC0415
 
+        if name == "__all__":
+            # pydoc documents all of `__all__` with all inherited members, 4000 lines for this
+            # package. In help(voxdisplay) classes have a line each, in the docstring.
+            is_help = _getframe(1).f_globals.get("__name__") == "pydoc"
+            return list(_FUNCTIONS if is_help else _PUBLIC)
         if name == "__version__":
             value = import_module("importlib.metadata").version("voxdisplay")
         elif name in _MODULE_OF:
@@ -191,5 +254,5 @@ if not TYPE_CHECKING:  # a type checker would take any name of a module that has
         return value
 
     def __dir__() -> list[str]:
-        """List the public names, imported or not."""
-        return sorted({*globals(), *__all__, "__version__"})
+        """Return the names of the package, imported or not."""
+        return sorted({*globals(), *_PUBLIC, "__version__"})

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import pydoc
+import re
 import subprocess
 import sys
 import types
@@ -15,8 +16,8 @@ import voxdisplay as vd
 SOURCE = Path(vd.__file__)
 
 
-def imports_for_type_checkers():
-    """Public names by module, as imported under ``if TYPE_CHECKING``."""
+def seen_by_type_checkers():
+    """Public names by module, and ``__all__``, as they stand under ``if TYPE_CHECKING``."""
     (block,) = (
         node
         for node in ast.parse(SOURCE.read_text(encoding="utf-8")).body
@@ -24,11 +25,17 @@ def imports_for_type_checkers():
         and isinstance(node.test, ast.Name)
         and node.test.id == "TYPE_CHECKING"
     )
-    return {
+    imports = {
         node.module: [alias.name for alias in node.names]
         for node in block.body
         if isinstance(node, ast.ImportFrom)
     }
+    (names,) = (
+        ast.literal_eval(node.value)
+        for node in block.body
+        if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"
+    )
+    return imports, names
 
 
 def run(script, *options):
@@ -38,9 +45,10 @@ def run(script, *options):
 
 
 def test_table_imports_and_all_agree():
-    assert imports_for_type_checkers() == vd._MODULES
-    assert sorted(vd._MODULE_OF) == sorted(vd.__all__)
-    assert len(set(vd.__all__)) == len(vd.__all__)
+    imports, names = seen_by_type_checkers()
+    assert imports == vd._MODULES
+    assert names == vd.__all__ == sorted(vd._MODULE_OF)
+    assert sum(map(len, vd._MODULES.values())) == len(names), "each name once"
 
 
 @pytest.mark.parametrize("name", vd.__all__)
@@ -105,8 +113,27 @@ def test_voxelize_has_its_own_signature_and_documentation():
     assert "voxelize(curve: 'Curve', *," in pydoc.plain(pydoc.render_doc(vd.voxelize))
 
 
-def test_help_lists_every_name():
+def test_help_is_an_overview_of_every_name():
     text = pydoc.plain(pydoc.render_doc(vd))
+    assert len(text.splitlines()) < 600
     for name in vd.__all__:
-        kind = "class " if inspect.isclass(getattr(vd, name)) else ""
-        assert f"    {kind}{name}(" in text, name
+        assert re.search(rf"^ +{name} +[A-Z(].*\.$", text, re.MULTILINE), name
+    for name in vd.__all__:
+        if name.islower():
+            signature = inspect.signature(getattr(vd, name))
+            assert f"\n    {name}{signature}\n" in text, f"{name} is documented in full"
+
+
+@pytest.mark.parametrize("name", vd.__all__)
+def test_help_of_one_name_is_readable(name):
+    text = pydoc.plain(pydoc.render_doc(getattr(vd, name)))
+    assert len(text.splitlines()) < 300
+    assert "ndarray(shape" not in text
+
+
+def test_help_does_not_change_what_others_see():
+    pydoc.render_doc(vd)
+    assert "Circle" in vd.__all__
+    assert run("import pydoc, voxdisplay as vd; pydoc.render_doc(vd); print(len(vd.__all__))") == (
+        f"{len(vd.__all__)}\n"
+    )
