@@ -1,12 +1,10 @@
-"""Measures, as medians and ratios of one run; prints one table.
+"""Benchmarks of the project: medians and ratios of one run, printed as one table.
 
-``push`` shows what a frame costs, stage by stage, over a pty to an emulator in its own process;
-``cold`` what the command costs from a cold start; ``curves`` how good and how fast voxelising is
-beside other ways to do it (`bench_curves`); ``link`` what frames cost on the wire beside other
-codings, and how fast they are coded (`bench_link`); ``view`` what pictures cost (`bench_view`) and
-how fast the live view is (`bench_live`); ``ports`` how fast each kind of port is beside the bare
-pipe below it (`bench_ports`); ``stream`` how full streaming keeps a line (`bench_stream`);
-``goodput`` what bit errors leave of one (`bench_goodput`).
+``push`` times a frame stage by stage, over a pty to an emulator in its own process; ``cold`` the
+command from a cold start; ``curves`` voxelisation beside other methods; ``link`` the encoders
+beside other codings; ``view`` pictures and the live view; ``ports`` each kind of port beside the
+bare pipe below it; ``stream`` how busy streaming keeps a line; ``goodput`` what bit errors leave
+of one. Each of these is a module in `benchmarks`.
 """
 
 from __future__ import annotations
@@ -25,13 +23,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from bench_curves import bench_curves
-from bench_goodput import bench_goodput
-from bench_link import bench_link
-from bench_live import bench_live
-from bench_ports import bench_ports
-from bench_stream import bench_stream
-from bench_view import bench_view
+from benchmarks.curves import bench_curves
+from benchmarks.goodput import bench_goodput
+from benchmarks.link import bench_link
+from benchmarks.live import bench_live
+from benchmarks.ports import bench_ports
+from benchmarks.stream import bench_stream
+from benchmarks.view import bench_view
 
 import voxdisplay as vd
 
@@ -40,7 +38,7 @@ SEED = 20
 
 
 def paper_scene(radius: int, w: int) -> dict[str, Any]:
-    """Give the paper's curve: radius and amplitude, and oscillations a turn."""
+    """Return the paper's curve: radius and amplitude, and oscillations a turn."""
     params = {"R": radius, "A": radius, "w": w, "o": 50 * radius // 40}
     curve = {
         "type": "parametric",
@@ -54,7 +52,7 @@ def paper_scene(radius: int, w: int) -> dict[str, Any]:
 
 
 def random_scene(count: int) -> dict[str, Any]:
-    """Give random parametric curves that fill a volume of 128^3: sums of two harmonics."""
+    """Return random parametric curves that fill a volume of 128^3: sums of two harmonics."""
     chance = random.Random(SEED)
 
     def formula() -> str:
@@ -93,7 +91,7 @@ SCENES = {
 
 @contextlib.contextmanager
 def emulator(*arguments: str) -> Iterator[str]:
-    """Run an emulator in its own process; give its port."""
+    """Run an emulator in its own process; yield its port."""
     command = [sys.executable, "-m", "firmware_sim", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None  # noqa: S101 - it is a pipe
@@ -104,13 +102,13 @@ def emulator(*arguments: str) -> Iterator[str]:
 
 
 class Stopwatch:
-    """Times calls and keeps the sum."""
+    """Stopwatch that sums the times of calls."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
 
     def wrap(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Give the function, timed."""
+        """Return the function with its time added to the sum."""
 
         def timed(*arguments: Any, **named: Any) -> Any:
             began_s = time.perf_counter()
@@ -123,7 +121,7 @@ class Stopwatch:
 
 
 def push_once(data: bytes, display: vd.Display, link: Stopwatch) -> dict[str, float]:
-    """Push a scene once; give seconds by stage, and sizes."""
+    """Push a scene once; return seconds by stage, and sizes."""
     marks = [time.perf_counter()]
     items = vd.read_scene(data).items
     marks.append(time.perf_counter())
@@ -155,7 +153,7 @@ def push_once(data: bytes, display: vd.Display, link: Stopwatch) -> dict[str, fl
 
 
 def raw_pipe(size: int) -> float:
-    """Give the seconds that as many bytes need through a pty with nobody thinking about them."""
+    """Return the time of a bare transfer of ``size`` bytes through a pty, in seconds."""
     ours, theirs = os.openpty()
     tty.setraw(theirs)
     if os.fork() == 0:
@@ -180,7 +178,7 @@ STAGES = ("parse", "voxelise", "draw", "encode", "digest", "link", "pipe")
 
 
 def bench_push(repeats: int) -> None:
-    """Print what a frame costs, stage by stage."""
+    """Print the cost of a frame, stage by stage."""
     head = [f"{name + ' ms':>12}" for name in (*STAGES, "raw pipe")]
     print(f"{'scene':<16}{'voxels':>8}{'packets':>8}{'op bytes':>9}{'bit/vox':>8}", *head, sep="")
     for size, scenes in SCENES.items():
@@ -211,7 +209,7 @@ def bench_scenes(size: str, scenes: dict[str, dict[str, Any]], repeats: int) -> 
 
 
 def bench_cold(repeats: int) -> None:
-    """Print what the command costs from a cold start."""
+    """Print the cost of the command from a cold start."""
     command = [sys.executable, "-m", "voxdisplay", "push", "examples/paper-curve.json"]
     bare = [sys.executable, "-c", "import numpy"]
     for name, arguments in (("push --port sim:", [*command, "--port", "sim:"]), ("numpy", bare)):
@@ -224,7 +222,7 @@ def bench_cold(repeats: int) -> None:
 
 
 def bench_views(repeats: int, *, quick: bool) -> None:
-    """Print what pictures cost, and how fast the live view is."""
+    """Print the cost of pictures and the speed of the live view."""
     bench_view(repeats, quick=quick)
     bench_live(repeats, quick=quick)
 
@@ -240,7 +238,7 @@ TABLES = {
 
 
 def main() -> None:
-    """Run what is asked for."""
+    """Run the benchmark that is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=[*TABLES, "push", "cold"])
     parser.add_argument("--repeats", type=int, default=5)

@@ -62,7 +62,7 @@ echo "{mark} $?"
 
 
 def main() -> int:
-    """Set up what is missing, run the tests; give pytest's exit code."""
+    """Set up what is missing and run the tests; return pytest's exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--setup", action="store_true", help="only fetch and build")
     options, pytest_arguments = parser.parse_known_args()
@@ -90,7 +90,7 @@ def _which(name: str) -> str | None:
 
 
 def _kernel() -> Path:
-    """Give the kernel's image, unpacked; fetch Debian's if there is none."""
+    """Return the path of the unpacked kernel image; fetch Debian's if there is none."""
     BUILD.mkdir(parents=True, exist_ok=True)
     image = BUILD / "vmlinux"
     if image.exists():
@@ -130,7 +130,7 @@ def _unpacked(image: bytes) -> bytes:
 
 
 def _initrd(command: str) -> Path:
-    """Make the first file system: busybox, modules and a script."""
+    """Build the initial RAM file system: busybox, modules and a script."""
     work = BUILD / "initrd"
     shutil.rmtree(work, ignore_errors=True)
     for folder in ("bin", "modules"):
@@ -159,7 +159,7 @@ def _initrd(command: str) -> Path:
 
 
 def _module_files(module: str) -> list[Path]:
-    """Give a module's file and those that it needs before."""
+    """Return the file of a kernel module, after those of its dependencies."""
     told = _output(
         *(_which("modprobe") or "", "-d", str(BUILD / "root")),
         *("-S", _version(), "--show-depends", module),
@@ -172,7 +172,7 @@ def _output(*command: str) -> str:
 
 
 def _run(kernel: Path, initrd: Path) -> int:
-    """Start the machine, show what it prints; give the exit code of what ran in it."""
+    """Boot the machine and print its console; return the exit code of what ran in it."""
     append = "console=ttyS0 quiet panic=-1 tsc=reliable no_timer_check"
     share = "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap"
     command = [

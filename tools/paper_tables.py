@@ -19,7 +19,7 @@ TOLERANCE = 0.0015
 
 @dataclass(frozen=True)
 class Cell:
-    """One column of a table: what was done, and what is printed."""
+    """Column of a table: the method's variant, and the printed figures."""
 
     table: str
     radius: int
@@ -54,7 +54,7 @@ CELLS = (
 
 
 def paper_curve(radius: int, w: int) -> vd.Parametric:
-    """Give the paper's curve (equation 9), shifted by +1/2."""
+    """Return the paper's curve (equation 9), shifted by +1/2."""
     params = {"R": radius, "w": w, "o": 50 * radius / 40 + 0.5}
     return vd.Parametric(
         "o + R*cos(t)",
@@ -66,7 +66,7 @@ def paper_curve(radius: int, w: int) -> vd.Parametric:
 
 
 def off(value: float, printed: float) -> str:
-    """Give a mark where a value is not the printed one."""
+    """Return a mark where a value differs from the printed one."""
     return " " if abs(value - printed) < TOLERANCE else "!"
 
 

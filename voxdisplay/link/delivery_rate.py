@@ -13,7 +13,7 @@ import math
 MIN_BYTES = 4096  # always allowed in flight
 MIN_PACKETS = 2  # likewise: one that is being sent, and one behind it
 # The rest of the window is room for new packets while a retransmission is in flight. Of 10, 13, 16
-# and 20 this has the highest goodput at a bit error rate of 1e-4 (tools/bench_goodput.py).
+# and 20 this has the highest goodput at a bit error rate of 1e-4 (tools/bench.py goodput).
 MAX_PACKETS = 13
 SCHEDULING_DELAY_S = 0.02  # the caller may be late by so much: processes wait for their turn
 ENCODING_DELAY_S = 0.06  # until the encoder yields the first bytes of a frame

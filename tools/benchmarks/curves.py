@@ -1,9 +1,9 @@
-"""Measures this engine, with proofs, with its extra `fast`, and others; prints one table.
+"""Benchmark of curve voxelisation: this package beside other ways, with their guarantees judged.
 
-The others give lists of voxels too, with nothing promised about them: points close together on
-the curve, rounded down, without repeats, in numpy; the same through trimesh; lines between points
-of the curve by scikit-image's line_nd. Points are taken evenly in t, twenty to a voxel of length
-(lines: one to four voxels), and the time to find out how many that is is not counted. All take the
+The other methods return voxel lists without any guarantee: points sampled densely along the curve,
+rounded down, without repeats, in numpy; the same through trimesh; line segments between points of
+the curve by scikit-image's line_nd. Points are spaced evenly in t, twenty to a voxel of length
+(segments: one to four voxels); the time to find the length is not counted. All methods take the
 positions of many curves at once from the same code. Those not installed are left out.
 """
 
@@ -45,7 +45,7 @@ ENOUGH_S = 0.2
 
 @dataclass(frozen=True)
 class Job:
-    """Curves to voxelise, and those among them, or a part of them, whose voxels are judged."""
+    """Curves to voxelise, and the curves, or part of them, whose voxels are judged."""
 
     name: str
     curves: Sequence[Curve]
@@ -53,7 +53,7 @@ class Job:
 
 
 def beziers(count: int, spread: float) -> list[Curve]:
-    """Give cubic Bezier curves at random, control points ``spread`` apart at most on each axis."""
+    """Return random cubic Bezier curves, control points at most ``spread`` apart on each axis."""
     rng = np.random.default_rng(SEED)
     start = rng.uniform(40, 216, (count, 1, 3))
     steps = rng.uniform(-spread, spread, (count, 4, 3))
@@ -61,7 +61,7 @@ def beziers(count: int, spread: float) -> list[Curve]:
 
 
 def jobs(*, quick: bool) -> Iterator[Job]:
-    """List the curves; ``quick`` only a few."""
+    """Return the benchmark curves; only a few if ``quick``."""
     sizes = [(40, 2)] if quick else [(40, 2), (80, 2), (40, 4), (80, 4)]
     for radius, w in sizes:
         curve = paper_curve(radius, w)
@@ -91,13 +91,13 @@ def grid_plane(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
 
 
 def fast(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
-    """Voxelise with this engine, compiled: the extra `fast`."""
+    """Voxelise with this engine, compiled (extra ``fast``)."""
     kernel_backend.set_enabled(True)
     return [sequence.voxels for sequence in vd.voxelize_many(curves)]
 
 
 def certified(curves: Sequence[Curve], _: list[int]) -> list[Voxels]:
-    """Voxelise with this engine, in numpy, and prove it."""
+    """Voxelise with this engine, in numpy, certified."""
     kernel_backend.set_enabled(False)
     return [sequence.voxels for sequence in vd.voxelize_many(curves, certified=True)]
 
@@ -172,7 +172,7 @@ def from_points(
 
 
 def without_repeats(voxels: Voxels) -> Voxels:
-    """Leave out voxels, (3, n), that are equal to the one before them."""
+    """Return voxels, (3, n), without those equal to their predecessor."""
     return voxels[:, np.append(True, np.diff(voxels, axis=1).any(axis=0))]
 
 
@@ -181,7 +181,7 @@ def without_repeats(voxels: Voxels) -> Voxels:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is said of the voxels of some curves: sums, but for the distances."""
+    """Quality of the voxels of some curves: sums, and maxima of distances."""
 
     voxels: int
     e_max: float
@@ -191,7 +191,7 @@ class Verdict:
 
 
 def judge(curves: Sequence[Curve], voxels: Sequence[Voxels], closed: Sequence[bool]) -> Verdict:
-    """Judge voxels by their curves."""
+    """Return the quality of voxels against their curves."""
     rings = [opened(*each) for each in zip(voxels, closed, strict=True)]
     apart = [measure.distances(ring, curve) for ring, curve in zip(rings, curves, strict=True)]
     apart_all = np.concatenate(apart)
@@ -210,13 +210,13 @@ def judge(curves: Sequence[Curve], voxels: Sequence[Voxels], closed: Sequence[bo
 
 
 def opened(voxels: Voxels, closed: bool) -> Voxels:
-    """Leave out the last voxel of a loop if it is the first once more."""
+    """Return voxels without the last one if it repeats the first of a loop."""
     repeats = closed and len(voxels) > 1 and (voxels[0] == voxels[-1]).all()
     return voxels[:-1] if repeats else voxels
 
 
 def timed(function: Callable[[], object], repeats: int) -> tuple[float, int]:
-    """Give the median of some runs after a first one, in seconds, and how many there were."""
+    """Return the median time of some runs after a warm-up, in seconds, and their number."""
     seconds: list[float] = []
     first_s = stopwatch(function)
     while (len(seconds) < repeats or sum(seconds) < ENOUGH_S) and (
@@ -227,7 +227,7 @@ def timed(function: Callable[[], object], repeats: int) -> tuple[float, int]:
 
 
 def stopwatch(function: Callable[[], object]) -> float:
-    """Give the seconds that a call takes."""
+    """Return the time of a call in seconds."""
     began_s = time.perf_counter()
     function()
     return time.perf_counter() - began_s

@@ -1,8 +1,8 @@
-"""What is left of a bad line: the real link and an emulated device, on virtual time.
+"""Benchmark of goodput under bit errors: the real link and an emulated device, on virtual time.
 
 Time is counted, not measured, so that the figures are the same on every machine. Beside each stands
-what selective repeat can give at best: payload / (payload + 9) of the line, times the chance that
-no bit of the packet is hit.
+the limit of selective repeat: payload / (payload + 9) of the line, times the probability that no
+bit of the packet is hit.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SEED = 4
 
 
 class Line:
-    """One direction: bytes leave at the line's rate, arrive later, and some bits are wrong."""
+    """One direction of a line with a rate, a delay and bit errors."""
 
     def __init__(self, baud: float, delay_s: float, error_rate: float, seed: int) -> None:
         self._byte_s = BITS_PER_BYTE / baud
@@ -43,7 +43,7 @@ class Line:
         self._queue: deque[tuple[float, bytes]] = deque()
 
     def put(self, data: bytes, now: float) -> None:
-        """Send bytes; they are taken as soon as those before are through."""
+        """Queue bytes behind those that are still being sent."""
         for segment in data.split(b"\0")[:-1]:
             ended = np.frombuffer(segment + b"\0", dtype=np.uint8).copy()
             hit = self._chance.random(len(ended)) < self._byte_rate
@@ -53,11 +53,11 @@ class Line:
 
     @property
     def due_s(self) -> float:
-        """When the next packet is through."""
+        """Arrival time of the next packet."""
         return self._queue[0][0] if self._queue else math.inf
 
     def get(self, now: float) -> bytes:
-        """Give what has arrived."""
+        """Return the bytes that have arrived."""
         out = b""
         while self.due_s <= now:
             out += self._queue.popleft()[1]
@@ -66,7 +66,7 @@ class Line:
 
 @dataclass
 class Goodput:
-    """What became of one line.
+    """Result of one line.
 
     Attributes
     ----------
@@ -128,13 +128,13 @@ def goodput(baud: int, round_trip_s: float, error_rate: float) -> Goodput:
 
 
 def at_best(payload: int, error_rate: float) -> float:
-    """Give the share of the line that selective repeat leaves for payloads of this size."""
+    """Return the share of the line that selective repeat leaves for payloads of this size."""
     size = payload + OVERHEAD_BYTES + payload // 254
     return payload / size * (1 - error_rate) ** (BITS_PER_BYTE * size)
 
 
 def rows(*, quick: bool) -> Iterator[tuple[int, float, float, Goodput, float]]:
-    """Give (baud, round trip, bit error rate, goodput, at best) of every line, or of one."""
+    """Return (baud, round trip, bit error rate, goodput, at best) of every line, or of one."""
     for baud, round_trip_s in LINES[:1] if quick else LINES:
         for error_rate in BIT_ERROR_RATES[-1:] if quick else BIT_ERROR_RATES:
             found = goodput(baud, round_trip_s, error_rate)

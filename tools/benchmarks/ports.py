@@ -1,8 +1,8 @@
-"""How fast each kind of port is beside the bare pipe below it, in one run.
+"""Benchmark of the transports beside the bare pipe below each, in one run.
 
-At the other end of each is the same small peer in a process of its own, which counts, gives and
-echoes bytes; so the difference to the bare pipe is what the driver's transport costs. Another kind
-of port is another entry of `PORTS`.
+At the other end of each is the same small peer in a process of its own, which counts, sends and
+echoes bytes; so the difference to the bare pipe is the cost of the driver's transport. To measure
+another kind of port, add an entry to `PORTS`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from bench_usb import on_usb, on_usbip
 from serial import rfc2217
 
+from benchmarks.usb import on_usb, on_usbip
 from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import TransportError
 from voxdisplay.transport import Transport, open_transport
@@ -36,7 +36,7 @@ _DEADLINE_S = 60.0
 
 
 class Peer:
-    """What sits at the other end: bytes in, bytes out."""
+    """Peer at the other end: bytes in, bytes out."""
 
     def __init__(self) -> None:
         self._head = b""
@@ -44,7 +44,7 @@ class Peer:
         self._left = 0
 
     def feed(self, data: bytes) -> bytes:
-        """Take bytes, give the answer."""
+        """Return the answer to some bytes."""
         out = bytearray()
         while data:
             if not self._left:
@@ -68,7 +68,7 @@ class Peer:
 
 
 def in_another_process(serve: Callable[[], None]) -> int:
-    """Run something in a process of its own; give its number."""
+    """Run a function in a process of its own; return its id."""
     if child := os.fork():
         return child
     try:
@@ -101,7 +101,7 @@ def serve_rfc2217(connection: socket.socket) -> None:
 
 
 class Bare:
-    """A descriptor as a transport, with nothing around it: what all others are compared with."""
+    """File descriptor as a transport, with nothing around it: the reference of the comparison."""
 
     port = "bare"
 
@@ -127,7 +127,7 @@ class Bare:
 
 @contextlib.contextmanager
 def on_pty(*, bare: bool) -> Iterator[Transport]:
-    """Give a pty with the peer at its other end."""
+    """Yield a pty with the peer at its other end."""
     master, slave = os.openpty()
     tty.setraw(slave)
 
@@ -148,7 +148,7 @@ def on_pty(*, bare: bool) -> Iterator[Transport]:
 
 @contextlib.contextmanager
 def on_socket(scheme: str | None) -> Iterator[Transport]:
-    """Give a connection with the peer at its other end; None: a bare one."""
+    """Yield a connection with the peer at its other end; a bare one if ``scheme`` is None."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         host, number = listener.getsockname()
 
@@ -176,7 +176,7 @@ def on_socket(scheme: str | None) -> Iterator[Transport]:
 
 @dataclass(frozen=True)
 class Port:
-    """A kind of port: how to open it, what lies below it, and how many bytes it can take."""
+    """Kind of port: how to open it, the pipe below it, and the size of the transfers."""
 
     name: str
     opened: Callable[[], AbstractContextManager[Transport]]
@@ -197,7 +197,7 @@ PORTS = [
 
 
 def fetch(transport: Transport, count: int) -> None:
-    """Read so many bytes."""
+    """Read ``count`` bytes."""
     end_s = time.monotonic() + _DEADLINE_S
     while count > 0:
         count -= len(transport.read(1.0))
@@ -206,14 +206,14 @@ def fetch(transport: Transport, count: int) -> None:
 
 
 def seconds(function: Callable[..., Any], *arguments: Any) -> float:
-    """Give how long a call takes."""
+    """Return the time of a call in seconds."""
     began_s = time.perf_counter()
     function(*arguments)
     return time.perf_counter() - began_s
 
 
 def to_device(transport: Transport, count: int) -> None:
-    """Send bytes until the peer says that it has them all."""
+    """Send bytes; return when the peer reports that it has all of them."""
     transport.write(_HEAD.pack(_SINK, count) + bytes(count), _DEADLINE_S)
     fetch(transport, 1)
 
@@ -232,7 +232,7 @@ def round_trip(transport: Transport) -> None:
 
 @dataclass(frozen=True)
 class Speed:
-    """What was measured: bytes per second each way, and seconds there and back."""
+    """Measurement: bytes per second each way, and round trip in seconds."""
 
     down: float
     up: float
@@ -240,7 +240,7 @@ class Speed:
 
 
 def measure(port: Port, repeats: int, scale: float) -> Speed:
-    """Measure a port: medians."""
+    """Return the median speeds of a port."""
     count = int(port.bytes * scale)
     with port.opened() as transport:
         down = [seconds(to_device, transport, count) for _ in range(repeats)]

@@ -1,4 +1,4 @@
-"""USB for ``tools/bench.py ports``: emulated in this process, and over USB/IP to another one."""
+"""Emulated USB ports for the transport benchmark: in this process, and over USB/IP."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Feed = Callable[[bytes], bytes]  # what the peer makes of bytes
 
 
 class PeerFunction:
-    """A USB function that gives its bytes to a peer, and sends what that answers."""
+    """USB function that forwards its bytes to a peer, and sends its answers."""
 
     def __init__(self, feed: Feed) -> None:
         packet = HIGH_SPEED_PACKET
@@ -59,7 +59,7 @@ class PeerFunction:
 
 @contextlib.contextmanager
 def on_usb(feed: Feed) -> Iterator[UsbTransport]:
-    """Give a port on a bus in this process, with a peer there."""
+    """Yield a port on a bus in this process, with a peer on it."""
     backend = Backend(Bus(UsbDevice(PeerFunction(feed))))
     with contextlib.closing(UsbTransport("usb:", backend=backend)) as transport:
         yield transport
@@ -69,7 +69,7 @@ def on_usb(feed: Feed) -> Iterator[UsbTransport]:
 def on_usbip(
     feed: Feed, in_another_process: Callable[[Callable[[], None]], int]
 ) -> Iterator[UsbTransport]:
-    """Give a port over USB/IP, with a peer in another process."""
+    """Yield a port over USB/IP, with a peer in another process."""
     with listen("127.0.0.1", 0) as listener:
         port = f"usbip://127.0.0.1:{listener.getsockname()[1]}"
         stop, stopper = os.pipe()

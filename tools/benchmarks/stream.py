@@ -1,11 +1,11 @@
-"""How full a driver that streams keeps a line: two tables of one run.
+"""Benchmark of streaming: the share of a line that frames in a row keep busy.
 
-At the other end, in a process of its own, sits a device that counts (`stream_reader`). On a line of
-12 MBd it is told how busy the line was; on one without a rate, how the bytes a second compare with
-those of a bare write of the very same bytes into the same reader. Where other programs take the
-processor, both say little; so the first is found in another way, too: "in time of its own" is how
-busy the line would be if only the driver's own processor time passed, and the reader had no need of
-any.
+At the other end, in a process of its own, is a device that counts (`stream_reader`). On a line of
+12 MBd the figure is the share of time the line was busy; on one without a rate, the bytes per
+second against those of a bare write of the same bytes into the same reader. Both depend on other
+programs that use the processor; so the first is measured in another way, too: "in time of its own"
+is how busy the line would be if only the driver's own processor time passed, and the reader needed
+none.
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-import bench_link
 import numpy as np
-import stream_reader
-from bench_ports import in_another_process
 from numpy.typing import NDArray
 
 import voxdisplay as vd
+from benchmarks import link, stream_reader
+from benchmarks.ports import in_another_process
 from voxdisplay.display.device_info import device_info
 from voxdisplay.errors import TransportClosed
 from voxdisplay.frame import Frame
@@ -44,7 +43,7 @@ _FRAMES = 2  # at least
 
 
 class Pipe:
-    """A socket as a transport, which remembers what was written if it is told to."""
+    """Socket as a transport that keeps what was written, on request."""
 
     port = "pipe"
 
@@ -74,7 +73,7 @@ class Pipe:
 
 @dataclass(frozen=True)
 class Reader:
-    """The process at the other end: its pipe, and what it says that it has heard."""
+    """Process at the other end: its pipe, and its report of what it received."""
 
     pipe: Pipe
     connection: socket.socket
@@ -99,7 +98,7 @@ class OwnTime:
         self.bytes = 0
 
     def monotonic(self) -> float:
-        """Tell the time, as ``time.monotonic`` does."""
+        """Return the time in seconds, like ``time.monotonic``."""
         return time.process_time() + self._skipped_s
 
     def _wait_until(self, moment_s: float) -> None:
@@ -132,7 +131,7 @@ class OwnTime:
 
 
 def busy_in_own_time(frames: list[Frame], bytes_per_s: float, seconds: float) -> float:
-    """Give how busy a line is while frames take turns, by the driver's own processor time."""
+    """Return the share of time a line is busy, by the driver's own processor time."""
     pipe = OwnTime(info_for(frames[0]), bytes_per_s)
     display, turns = vd.open(pipe, clock=pipe.monotonic), itertools.cycle(frames)
 
@@ -147,7 +146,7 @@ def busy_in_own_time(frames: list[Frame], bytes_per_s: float, seconds: float) ->
 
 
 def info_for(frame: Frame) -> packets.Info:
-    """Give what a device says that takes such frames."""
+    """Return the INFO of a device that takes such frames."""
     nx, ny, nz = frame.grid
     bits = sum(
         1 << getattr(spec, f"FEATURE_{name.upper()}")
@@ -230,7 +229,7 @@ def stream(
             turn = 0
 
             def until(end_s: float) -> tuple[stream_reader.Heard, float]:
-                """Stream so long, and for some frames."""
+                """Tell whether the stream goes on: not long enough yet, or too few frames."""
                 nonlocal turn
                 enough = other.heard().frames + _FRAMES
                 while time.perf_counter() < end_s or other.heard().frames < enough:
@@ -251,7 +250,7 @@ def stream(
 
 
 def bare_bytes_per_s(frame: Frame, data: bytes) -> float:
-    """Write bytes into a reader, answers unread but taken; give the bytes per second."""
+    """Return the bytes per second of bare writes into a reader, its answers discarded."""
     with reader(frame, 0.0) as other:
         connection = other.connection
         connection.setblocking(False)
@@ -270,17 +269,17 @@ def bare_bytes_per_s(frame: Frame, data: bytes) -> float:
 
 
 def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
-    """List what is streamed: for each, two frames that take turns."""
+    """Return the streams: for each, two frames that alternate."""
     count = 1000 * side // 128
     for pixels in ("mono1", "rgb888"):
         frames = []
         for turned in (False, True):
             frame = Frame((side, side, side), pixels)
-            for sequence in vd.voxelize_many(bench_link.beziers(side, count, side / 2)):
+            for sequence in vd.voxelize_many(link.beziers(side, count, side / 2)):
                 frame.draw(sequence.voxels[:, ::-1] if turned else sequence.voxels, "orange")
             frames.append(frame)
         yield f"{count} Beziers, {pixels}", frames
-    head = bench_link.phantom(side)
+    head = link.phantom(side)
     frames = [Frame((side, side, side), "index8") for _ in range(2)]
     frames[0].set(head)
     frames[1].set(head[:, :, ::-1])
@@ -291,9 +290,9 @@ def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
 
 
 def field(side: int) -> NDArray[np.uint8]:
-    """Give a volume without a dark voxel: slow waves, and a measurement's noise."""
+    """Return a volume without a dark voxel: slow waves, and a measurement's noise."""
     x, y, z = np.meshgrid(*(np.linspace(0, 7, side),) * 3)
-    noise = np.random.default_rng(bench_link.SEED).normal(0, 3, x.shape)
+    noise = np.random.default_rng(link.SEED).normal(0, 3, x.shape)
     waves = 128 + 80 * np.sin(x) * np.cos(y) * np.sin(z + 1)
     return np.asarray((waves + noise).clip(1, 255), dtype=np.uint8)
 

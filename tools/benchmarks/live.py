@@ -1,8 +1,8 @@
-"""Measures the live view: frames a second in a real browser, and what the tap costs the emulator.
+"""Benchmark of the live view: frames per second in a real browser, and what the tap costs.
 
-The frames come from a source in this process, all voxels of all frames different; they are painted
-by Chromium, without a graphics processor if there is none, and counted there. The emulator decodes
-here too, while its tap is read in another process, as fast as it lets itself be read.
+The frames come from a source in this process, all voxels of all frames different; Chromium paints
+them, in software if there is no graphics processor, and counts them. The emulator decodes here too,
+while its tap is read in another process as fast as the tap allows.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from voxdisplay.view.live.server import open_server
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 from browser import PROGRAM, Browser
 
 GRID = vd.Grid(128, 128, 128)
@@ -41,7 +41,7 @@ _SECONDS = 4.0
 
 
 def helix(phase: float) -> vd.Frame:
-    """Give the paper's curve, turned."""
+    """Return the paper's curve, turned."""
     frame = vd.Frame(GRID)
     curve = vd.Parametric(
         f"64 + 40*cos(t + {phase})",
@@ -54,7 +54,7 @@ def helix(phase: float) -> vd.Frame:
 
 
 def ripple(phase: float, count: int) -> vd.Frame:
-    """Give a thick surface that moves: ``count`` voxels, each of another colour."""
+    """Return a thick surface that moves: ``count`` voxels, each of another colour."""
     frame = vd.Frame(GRID)
     x, y, layer = np.unravel_index(np.arange(count), (128, 128, 16), order="F")
     z = 56 + 40 * np.sin(np.hypot(x - 64, y - 64) / 8 + phase) + layer
@@ -65,7 +65,7 @@ def ripple(phase: float, count: int) -> vd.Frame:
 
 
 class Film:
-    """A source whose pictures never end."""
+    """Endless source of pictures."""
 
     def __init__(self, frames: list[vd.Frame]) -> None:
         self._moments = [
@@ -91,7 +91,7 @@ class Film:
 
 @contextlib.contextmanager
 def served(source: Any) -> Iterator[str]:
-    """Serve a source in a thread; give the URL."""
+    """Serve a source in a thread; yield the URL."""
     ready, place = threading.Event(), {}
 
     async def serve() -> None:
@@ -167,7 +167,7 @@ def bench_tap(repeats: int) -> None:
 
 @contextlib.contextmanager
 def _watching(tap: Tap) -> Iterator[list[int]]:
-    """Watch a tap in another process; give how many pictures it has seen, in the end."""
+    """Read a tap in another process; return the number of pictures read."""
     command, counted = [sys.executable, "-c", _WATCHER, tap.address], [0]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watcher:
         assert watcher.stdout is not None  # noqa: S101 - it is a pipe

@@ -1,9 +1,9 @@
-"""Measures what frames cost on the wire, and how fast they are coded; prints one table.
+"""Benchmark of the encoders: bytes on the wire beside other codings, and encoding speed.
 
-Beside the driver's coding stand others of the same pictures: runs in scan order (a count byte for
-what is dark and one for what is lit, LEB128 above 127, and the pixel), the same through LZ4 and
-through zstandard at level 19, and the bare page. Those not installed are left out. Voxels count as
-often as they are drawn; for sets, and for all but the driver's coding, as often as they are lit.
+Other codings of the same pictures: runs in scan order (a count byte for dark voxels and one for lit
+ones, LEB128 above 127, and the pixel), the same through LZ4 and through zstandard at level 19, and
+the bare page. Those not installed are left out. Voxels count as often as they are drawn; for sets,
+and for all but the driver's coding, as often as they are lit.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ RATES = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A frame, how many voxels were drawn, and bits a voxel that it should stay below."""
+    """A frame, its number of drawn voxels, and its target in bits per voxel."""
 
     name: str
     frame: Frame
@@ -57,7 +57,7 @@ class Picture:
 def of_curves(
     name: str, side: int, curves: Sequence[Curve], target: float | None, pixels: str = "mono1"
 ) -> Picture:
-    """Draw curves."""
+    """Return the picture of some curves."""
     return of_voxels(name, side, [s.voxels for s in vd.voxelize_many(curves)], target, pixels)
 
 
@@ -69,7 +69,7 @@ def of_voxels(
     pixels: str = "mono1",
     colors: Sequence[str] = ("white",),
 ) -> Picture:
-    """Draw sequences of voxels, in colours that take turns."""
+    """Return the picture of voxel sequences in alternating colours."""
     frame = Frame((side, side, side), pixels)
     voxels = 0
     for number, each in enumerate(drawn):
@@ -79,7 +79,7 @@ def of_voxels(
 
 
 def of_array(name: str, array: NDArray[np.generic], pixels: str, target: float | None) -> Picture:
-    """Take an array as it is; all voxels count if there are pixels of many values."""
+    """Return the picture of an array; all voxels count if pixels have many values."""
     frame = Frame(array.shape[::-1], pixels)  # type: ignore[arg-type] - three sides
     frame.set(array)
     dense = pixels != "mono1"
@@ -87,7 +87,7 @@ def of_array(name: str, array: NDArray[np.generic], pixels: str, target: float |
 
 
 def digital_line(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give the straight line between two voxels, every coordinate rounded, halves up."""
+    """Return the straight line between two voxels, every coordinate rounded, halves up."""
     way = end - start
     length = max(1, int(np.abs(way).max()))
     k = np.arange(np.abs(way).max() + 1)[:, None]
@@ -95,13 +95,13 @@ def digital_line(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np
 
 
 def lines(side: int, count: int) -> list[NDArray[np.int64]]:
-    """Give random segments between the centres of voxels."""
+    """Return random segments between the centres of voxels."""
     ends = np.random.default_rng(SEED).integers(0, side, (count, 2, 3))
     return [digital_line(*pair) for pair in ends]
 
 
 def beziers(side: int, count: int, spread: float) -> list[Curve]:
-    """Give random cubic Beziers; control points are ``spread`` apart at most on each axis."""
+    """Return random cubic Beziers; control points are ``spread`` apart at most on each axis."""
     rng = np.random.default_rng(SEED)
     start = rng.uniform(0, side, (count, 1, 3))
     steps = rng.uniform(-spread, spread, (count, 4, 3))
@@ -110,20 +110,20 @@ def beziers(side: int, count: int, spread: float) -> list[Curve]:
 
 
 def knots(side: int) -> list[Curve]:
-    """Give three torus knots that fill a cube."""
+    """Return three torus knots that fill a cube."""
     middle = (side / 2,) * 3
     return [TorusKnot(p, q, middle, side * 0.3, side * 0.14) for p, q in ((2, 3), (3, 5), (5, 8))]
 
 
 def waves(side: int) -> list[Curve]:
-    """Give six Lissajous curves that fill a cube."""
+    """Return six Lissajous curves that fill a cube."""
     middle, reach = (side / 2,) * 3, (side * 0.45,) * 3
     ratios = [(1, 2, 3), (2, 3, 5), (3, 4, 5), (3, 5, 7), (1, 3, 4), (4, 5, 7)]
     return [Lissajous(middle, reach, ratio, (0.3, 0, 0.9)) for ratio in ratios]
 
 
 def helices(side: int) -> list[Curve]:
-    """Give six helices of different pitch."""
+    """Return six helices of different pitch."""
     return [
         Helix((side / 2, side / 2, 3), side * (0.1 + 0.06 * n), side * 0.9 / (n + 2), n + 2)
         for n in range(6)
@@ -131,14 +131,14 @@ def helices(side: int) -> list[Curve]:
 
 
 def radii(side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the distance of each voxel's centre from the cube's, and that from the z axis."""
+    """Return the distance of each voxel's centre from the cube's, and that from the z axis."""
     z, y, x = np.mgrid[:side, :side, :side] + 0.5 - side / 2
     flat = np.hypot(x, y)
     return np.hypot(flat, z), np.hypot(flat - side * 0.3, z)
 
 
 def bumpy(side: int) -> NDArray[np.bool_]:
-    """Give the voxels of a solid without symmetry that have a neighbour outside: its surface."""
+    """Return the voxels of a solid without symmetry that have a neighbour outside: its surface."""
     rng = np.random.default_rng(SEED)
     z, y, x = np.mgrid[:side, :side, :side] + 0.5 - side / 2
     radius = np.sqrt(x * x + y * y + z * z)
@@ -158,7 +158,7 @@ def bumpy(side: int) -> NDArray[np.bool_]:
 
 
 def phantom(side: int) -> NDArray[np.uint8]:
-    """Give the head phantom of Shepp and Logan in 8 bits, with the noise of a scanner in the head.
+    """Return the head phantom of Shepp and Logan in 8 bits, with scanner noise in the head.
 
     Ellipsoids after Kak and Slaney, "Principles of Computerized Tomographic Imaging", table 3.1, in
     the usual continuation to three dimensions; contrasts raised so that they can be seen.
@@ -185,7 +185,7 @@ def phantom(side: int) -> NDArray[np.uint8]:
 
 
 def pictures(*, quick: bool) -> Iterator[Picture]:
-    """List the pictures; ``quick`` only a few."""
+    """Return the benchmark pictures; only a few if ``quick``."""
     yield of_curves("paper R=40 w=4", 128, [paper_curve(40, 4)], 2.8)
     if quick:
         yield of_voxels("20 segments 64", 64, lines(64, 20), None)
@@ -227,7 +227,7 @@ def pictures(*, quick: bool) -> Iterator[Picture]:
 
 
 def raster_runs(picture: Picture) -> bytes:
-    """Code runs in scan order: a count of dark voxels, one of equal lit ones, and their pixel."""
+    """Encode runs in scan order: count of dark voxels, count of equal lit ones, their pixel."""
     frame = picture.frame
     values = frame.format.values(frame.array())
     runs = spans.page_runs(values)
@@ -252,7 +252,7 @@ def raster_runs(picture: Picture) -> bytes:
 
 
 def others(picture: Picture) -> dict[str, int | None]:
-    """Give the bytes of the other codings; None where what it takes is not installed."""
+    """Return the sizes of the other codings in bytes; None where one is not installed."""
     runs = raster_runs(picture)
     found: dict[str, int | None] = {"runs": len(runs), "+LZ4": None, "+zstd-19": None}
     if find_spec("lz4"):
@@ -273,7 +273,7 @@ def others(picture: Picture) -> dict[str, int | None]:
 
 
 def work_s(work: Callable[[], object], repeats: int) -> float:
-    """Give the median of the seconds of processor time that work takes."""
+    """Return the median processor time of some work in seconds."""
     seconds = []
     for _ in range(repeats):
         began_s = time.process_time()
@@ -283,7 +283,7 @@ def work_s(work: Callable[[], object], repeats: int) -> float:
 
 
 def on_wire(payloads: Sequence[bytes]) -> int:
-    """Give the bytes on the wire of a frame."""
+    """Return the size of a frame on the wire in bytes."""
     return sum(len(packet.encode(packet.Data(ops=ops))) for ops in payloads or [b""])
 
 
@@ -359,7 +359,7 @@ def bench_speeds(repeats: int, side: int) -> None:
 
 
 def decode_s(payloads: list[bytes], coding: EncoderConfig) -> float:
-    """Give the processor time in which the emulator takes a frame: delimiting, CRC, and drawing."""
+    """Return the processor time of the emulator for a frame: delimiting, CRC, and drawing."""
     shape, pixel = tuple(coding.grid), coding.format.value
     device = Device(Config(grid=shape, pixel_format=pixel, refresh=0))
     link = Link(1, 0.0)

@@ -1,8 +1,8 @@
-"""A device that counts what it gets and draws nothing, at the end of a line of some rate.
+"""Counting device for benchmarks: acknowledges everything, draws nothing, at a given line rate.
 
-It checks every packet, acknowledges, grants credit and says at once that a frame is on display
-(protocol.md, sections 3 to 6 and 9). It hears whatever a host may send over a pipe that loses
-nothing: HELLO, DATA in order, and STATUS. Only for measurements: knows no op, page or fault.
+It checks every packet, acknowledges, grants credit and reports at once that a frame is on display
+(protocol.md, sections 3 to 6 and 9). It understands what a host sends over a lossless pipe: HELLO,
+DATA in order, and STATUS. Knows no op, page or fault.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MODULUS = 256
 
 
 class Counting:
-    """The device: bytes in, answers out."""
+    """Device endpoint: bytes in, answers out."""
 
     def __init__(self, info: packets.Info) -> None:
         self._info = info
@@ -37,7 +37,7 @@ class Counting:
         self.frames = 0
 
     def receive(self, data: bytes) -> bytes:
-        """Take bytes; give the answers."""
+        """Return the answers to some bytes."""
         out = b""
         for packet in self._stream.feed(data):
             match packet:

@@ -1,7 +1,7 @@
-"""Measures pictures: what one costs, with and without a halo, in a terminal, and as a film.
+"""Benchmark of pictures: render times with and without halo, in a terminal, and as a film.
 
-A picture is timed from its lit voxels, and from the whole page; without encoding, which is timed
-apart. CPU times stand beside the medians, since a busy machine slows only the latter.
+A picture is timed from its lit voxels, and from the whole page; encoding is timed apart. CPU times
+stand beside the medians, since a busy machine slows only the latter.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ FILM = 30
 
 
 def example(name: str) -> tuple[NDArray[np.uint8], vd.Grid]:
-    """Give the page of one of the examples."""
-    path = Path(__file__).resolve().parents[1] / "examples" / f"{name}.json"
+    """Return the page of one of the examples."""
+    path = Path(__file__).resolve().parents[2] / "examples" / f"{name}.json"
     frame = vd.Frame((128, 128, 128))
     for item in vd.load_scene(str(path)).items:
         frame.draw(item.curve, item.color)
@@ -37,7 +37,7 @@ def example(name: str) -> tuple[NDArray[np.uint8], vd.Grid]:
 
 
 def surface(count: int, side: int) -> tuple[NDArray[np.uint8], vd.Grid]:
-    """Give a page with exactly so many voxels, on rippling surfaces one above the other."""
+    """Return a page with exactly so many voxels, on rippling surfaces one above the other."""
     grid = vd.Grid(side, side, side)
     y, x = np.mgrid[:side, :side]
     radius = np.hypot(x - side / 2, y - side / 2) / side
@@ -51,7 +51,7 @@ def surface(count: int, side: int) -> tuple[NDArray[np.uint8], vd.Grid]:
 
 
 def ball(side: int) -> tuple[NDArray[np.uint8], vd.Grid]:
-    """Give a page with a solid ball that just fits in."""
+    """Return a page with a solid ball that just fits in."""
     z, y, x = np.ogrid[:side, :side, :side]
     middle = (side - 1) / 2
     inside = (x - middle) ** 2 + (y - middle) ** 2 + (z - middle) ** 2 < (side / 2) ** 2
@@ -120,12 +120,12 @@ def saved_png(drawn: object) -> None:
 
 
 def timed(function: Callable[[], object], repeats: int) -> float:
-    """Give the median of the seconds that a call takes, after a first one."""
+    """Return the median time of a call in seconds, after a warm-up."""
     return timed_twice(function, repeats)[0]
 
 
 def timed_twice(function: Callable[[], object], repeats: int) -> tuple[float, float]:
-    """Give the medians of the seconds that a call takes, by the clock and of the processor."""
+    """Return the median times of a call in seconds, by the clock and of the processor."""
     function()
     walls, cpus = [], []
     for _ in range(repeats):

@@ -1,0 +1,1 @@
+"""Tables of ``tools/bench.py``, one module each."""
