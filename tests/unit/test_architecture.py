@@ -3,6 +3,7 @@
 import ast
 import graphlib
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -17,33 +18,23 @@ def folder_of(package):
 
 PACKAGE, EMULATOR = map(folder_of, ("voxdisplay", "firmware_sim"))
 
-# What each part of the driver may import of the driver.
-MAY_IMPORT = {
-    "printable_text": set(),
-    "errors": {"printable_text"},
-    "compute": {"compute"},
-    "expressions": {"compute", "errors", "expressions"},
-    "curves": {"compute", "errors", "expressions", "curves"},
-    "voxelization": {"compute", "errors", "curves", "raster.grid", "voxelization"},
-    "raster": {"errors", "raster", "wire.spec"},
-    "wire": {"errors", "raster", "wire"},
-    "frame": {"curves", "errors", "raster", "view", "voxelization", "wire"},
-    "scene": {"compute", "curves", "errors", "expressions", "raster", "scene"},
-    "link": {"errors", "link", "wire"},
-    "transport": {"errors", "printable_text", "transport", "wire.spec"},
-    "conformance": {"conformance", "errors", "printable_text", "transport", "wire.spec"},
-    "view": {"errors", "printable_text", "raster", "view"},
-    "display": {
-        "display",
-        "errors",
-        "frame",
-        "link",
-        "printable_text",
-        "raster",
-        "transport",
-        "wire",
-    },
-}
+PICTURE = Path(__file__).parents[2] / "docs" / "architecture.md"
+# What all may import, and who may import all.
+EVERYWHERE = {"errors", "printable_text"}
+TOP = {"__init__", "__main__", "cli"}
+
+
+def drawn_arrows():
+    """Arrows of the picture: pairs of an importing room and a room, or one module of a room."""
+    drawing = PICTURE.read_text(encoding="utf-8").split("```mermaid")[1].split("```")[0]
+    for line in drawing.splitlines():
+        if found := re.fullmatch(r"\s*(\w+) -->(?:\|(\w+)\|)? (\w+)", line):
+            start, module, end = found.groups()
+            yield start, f"{end}.{module}" if module else end
+
+
+ARROWS = set(drawn_arrows())
+ROOMS = {room for start, end in ARROWS for room in (start, end.split(".")[0])}
 
 
 def imports_of(path):
@@ -66,26 +57,44 @@ def modules(package):
         yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
 
 
-@pytest.mark.parametrize("part", MAY_IMPORT)
-def test_arrows_run_one_way(part):
-    files = [PACKAGE / f"{part}.py", *(PACKAGE / part).rglob("*.py")]
-    for path in (path for path in files if path.exists()):
-        for name in imports_of(path):
-            if name.startswith("voxdisplay."):
-                inner = name.removeprefix("voxdisplay.")
-                allowed = any(
-                    inner == may or inner.startswith(f"{may}.") for may in MAY_IMPORT[part]
-                )
-                assert allowed, f"{path.relative_to(PACKAGE)} imports {name}"
+def crossings():
+    """Imports from one room of the driver into another: the file, its room, what it imports."""
+    for name, path in modules(PACKAGE):
+        room = name.removeprefix("voxdisplay").removeprefix(".").split(".")[0] or "__init__"
+        for other in imports_of(path):
+            inner = other.removeprefix("voxdisplay.")
+            if other.startswith("voxdisplay.") and inner.split(".")[0] != room and room not in TOP:
+                yield path, room, inner
 
 
-def test_every_part_is_listed():
+def test_imports_are_those_of_the_picture():
+    used = set()
+    for path, room, inner in crossings():
+        if inner.split(".")[0] in EVERYWHERE:
+            continue
+        arrows = {
+            (start, end)
+            for start, end in ARROWS
+            if start == room and f"{inner}.".startswith(f"{end}.")
+        }
+        assert arrows, f"{path.relative_to(PACKAGE)} imports {inner}"
+        used |= arrows
+    assert used == ARROWS
+
+
+def test_what_all_may_import_imports_nothing_else():
+    for path, room, inner in crossings():
+        if room in EVERYWHERE:
+            assert inner.split(".")[0] in EVERYWHERE, f"{path.relative_to(PACKAGE)}: {inner}"
+
+
+def test_every_room_is_in_the_picture():
     parts = {
         path.stem
         for path in PACKAGE.iterdir()
         if path.suffix == ".py" or (path / "__init__.py").exists()
     }
-    assert parts - {"__init__", "__main__", "cli"} == set(MAY_IMPORT)
+    assert parts - TOP - EVERYWHERE == ROOMS - TOP
 
 
 @pytest.mark.parametrize("package", [PACKAGE, EMULATOR], ids=lambda package: package.name)
