@@ -1,4 +1,4 @@
-"""Everything that can go wrong, by whose fault it is.
+"""Exception tree, by the party at fault.
 
 ::
 
@@ -7,24 +7,25 @@
     |  |- OpenError               no such port, busy, forbidden, no backend; .port, .hint
     |  |- TransportClosed         unplugged, or the peer closed, in mid-use
     |  `- TransportTimeout        also a TimeoutError
-    |- ProtocolError            (abstract) somebody broke protocol.md
-    |  |- LocalProtocolError      you asked for something illegal in this state; nothing was sent
+    |- ProtocolError            (abstract) protocol.md was broken
+    |  |- LocalProtocolError      the call is illegal in this state; nothing was sent
     |  `- RemoteProtocolError     the device broke it; .section, .offset, .raw
     |- DeviceError              a well-formed refusal; .code
     |  `- IncompatibleDevice      a version or a grid that cannot be served
     |- SceneError               the scene is wrong: .path and what; also a ValueError
     |- CurveError               a curve cannot be evaluated or drawn; also a ValueError
-    |- DesyncError              the device's digest differs from ours after recovery was tried
+    |- DesyncError              the device's digest still differs from ours after recovery
     `- MissingExtra             an optional library is not installed; also an ImportError
 
 A damaged packet is a counter and a recovery, not an exception. Wrong arguments to a Python
-function are ordinary ``ValueError`` and ``TypeError``. This module knows nothing of the rest.
+function are ordinary ``ValueError`` and ``TypeError``. All errors survive pickling and copying.
+This module must not know what raises them.
 """
 
 from __future__ import annotations
 
 import difflib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from voxdisplay.printable_text import printable_lines
 
@@ -47,12 +48,24 @@ class VoxDisplayError(Exception):
     """
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
-        super().__init__(printable_lines(message))
-        self.hint = hint and printable_lines(hint)
+        super().__init__(printable_lines(str(message)))
+        self.hint = hint and printable_lines(str(hint))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The default calls the class with the finished message: it lacks what else its __init__
+        # requires, such as a port, and what that adds to the message would be added twice.
+        return _restore, (type(self), self.args), self.__dict__ or None
+
+
+def _restore(cls: type[VoxDisplayError], args: tuple[Any, ...]) -> VoxDisplayError:
+    """Return an error of a class as its base classes outside of this package make it."""
+    error = cls.__new__(cls)
+    super(VoxDisplayError, error).__init__(*args)
+    return error
 
 
 class TransportError(VoxDisplayError):
-    """The byte pipe failed. The hardware or its driver is to blame, not the protocol."""
+    """The byte pipe failed: hardware, driver or network, not the protocol."""
 
 
 class OpenError(TransportError):
@@ -72,16 +85,16 @@ class TransportTimeout(TransportError, TimeoutError):  # noqa: N818 - as Timeout
 
 
 class ProtocolError(VoxDisplayError):
-    """Somebody broke protocol.md. Abstract: it is always one side or the other."""
+    """protocol.md was broken. Abstract: by this side or by the device."""
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         if type(self) is ProtocolError:
-            raise TypeError("ProtocolError is abstract: say whose fault it is")
+            raise TypeError("ProtocolError is abstract: take its Local or Remote subclass")
         super().__init__(message, hint=hint)
 
 
 class LocalProtocolError(ProtocolError):
-    """The caller asked for something illegal in this state. Nothing was sent."""
+    """The call is illegal in this state. Nothing was sent."""
 
 
 class RemoteProtocolError(ProtocolError):
@@ -108,14 +121,14 @@ class RemoteProtocolError(ProtocolError):
 
 
 class DeviceError(VoxDisplayError):
-    """The device refused, in good form.
+    """The device refused a packet, by an ERROR of the protocol.
 
     Parameters
     ----------
     message : str
         What it refused.
     code : int
-        The code of its ERROR packet; 0 when the refusal came otherwise.
+        The code of its ERROR packet; 0 if there was none.
 
     """
 
@@ -125,7 +138,7 @@ class DeviceError(VoxDisplayError):
 
 
 class IncompatibleDevice(DeviceError):  # noqa: N818 - names the device, not the accident
-    """The device speaks another protocol version, or has a grid that cannot be served."""
+    """The device has another protocol version, or a grid or format that cannot be served."""
 
 
 class SceneError(VoxDisplayError, ValueError):
@@ -176,7 +189,7 @@ class CurveError(VoxDisplayError, ValueError):
     message : str
         What is wrong: the axis and the parameter value where they are known.
     axis : str, optional
-        ``"x"``, ``"y"`` or ``"z"`` when one coordinate is to blame.
+        ``"x"``, ``"y"`` or ``"z"`` if it concerns one coordinate.
 
     """
 
@@ -186,7 +199,7 @@ class CurveError(VoxDisplayError, ValueError):
 
 
 class DesyncError(VoxDisplayError):
-    """What the device shows is not what was sent, after recovery was tried."""
+    """The device still shows something else than was sent, after recovery was tried."""
 
 
 class MissingExtra(VoxDisplayError, ImportError):  # noqa: N818 - a state, and the word of pip
@@ -194,6 +207,6 @@ class MissingExtra(VoxDisplayError, ImportError):  # noqa: N818 - a state, and t
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
-    """Give the hint that names the known word nearest to a mistyped one, if one is near."""
+    """Return a hint that names the known word nearest to a mistyped one; None if none is near."""
     near = difflib.get_close_matches(word[:64], known, n=1)
     return f"did you mean {near[0]!r}?" if near else None

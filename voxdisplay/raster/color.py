@@ -1,6 +1,6 @@
-"""Colours as people write them. Knows no display and no curve.
+"""Parsing of colours: CSS names, ``#rgb``, ``#rrggbb``, triples of 0 to 255, and lists of these.
 
-A colour is ``"#rgb"``, ``"#rrggbb"`` or a CSS colour name, in capitals or not.
+Must not know displays or curves.
 """
 
 from __future__ import annotations
@@ -8,18 +8,21 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Sequence
-from typing import TypeAlias
+from numbers import Real
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import did_you_mean
 
-Color: TypeAlias = str | Sequence[str] | NDArray[np.uint8]
+Color: TypeAlias = str | Sequence[str | int | Sequence[int]] | NDArray[np.integer]
+
+_KINDS: Final = "a CSS name, '#rrggbb', (r, g, b) of 0 to 255, or a list of these"
 
 
 def parse_color(text: str) -> tuple[int, int, int]:
-    """Give the red, green and blue of a colour, each 0 to 255.
+    """Return red, green and blue, each 0 to 255, of a colour's text, in capitals or not.
 
     Raises
     ------
@@ -40,8 +43,15 @@ def parse_color(text: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def parse_colors(spec: str | Sequence[str]) -> NDArray[np.uint8]:
-    """Read a colour, or several that are spread along a curve.
+def as_colors(color: Color) -> NDArray[np.uint8]:
+    """Return one or several colours as an array: the one place that reads colours of all kinds.
+
+    Parameters
+    ----------
+    color : str, three int, sequence of these, or integer array
+        A text as `parse_color` takes it; or red, green and blue, 0 to 255, in a tuple, a list or
+        a (3,) array; or a list of such colours, or a (k, 3) array, spread along the curve. Three
+        whole numbers are always one colour.
 
     Returns
     -------
@@ -52,41 +62,66 @@ def parse_colors(spec: str | Sequence[str]) -> NDArray[np.uint8]:
     ------
     ValueError
         If one is no colour, or there is none.
+    TypeError
+        If it is of another kind.
 
     """
-    names = [spec] if isinstance(spec, str) else spec
-    if not names:
-        raise ValueError("a list of colours needs at least one")
-    return np.array([parse_color(name) for name in names], dtype=np.uint8)
-
-
-def as_colors(color: Color) -> NDArray[np.uint8]:
-    """Give colours, however they were given: (k, 3).
-
-    Raises
-    ------
-    ValueError
-        If they are none.
-
-    """
+    if isinstance(color, str):
+        return np.array([parse_color(color)], dtype=np.uint8)
     if isinstance(color, np.ndarray):
-        if (
-            color.ndim != 2
-            or color.shape[1] != 3
-            or len(color) == 0
-            or color.dtype.kind not in "iu"
-            or not 0 <= color.min() <= color.max() <= 255
-        ):
-            raise ValueError(
-                f"colours are a (k, 3) array of 0 to 255, k >= 1; this is {color.shape} of "
-                f"{color.dtype}"
-            )
-        return color.astype(np.uint8)
-    return parse_colors(color)
+        return _from_array(color)
+    if not isinstance(color, Sequence) or isinstance(color, bytes | bytearray):
+        raise TypeError(f"a colour is {_KINDS}; this is {_described(color)}")
+    if not len(color):
+        raise ValueError("a list of colours needs at least one")
+    if all(isinstance(part, Real | np.generic) for part in color):
+        return _from_array(np.array([_channels(color)]))
+    return np.array([_one_color(part) for part in color], dtype=np.uint8)
+
+
+def _one_color(color: object) -> tuple[int, int, int]:
+    if isinstance(color, str):
+        return parse_color(color)
+    if isinstance(color, Sequence | np.ndarray) and not isinstance(color, bytes | bytearray):
+        red, green, blue = _from_array(np.array([_channels(color)]))[0].tolist()
+        return red, green, blue
+    raise TypeError(
+        f"a colour in a list is a name, '#rrggbb' or (r, g, b); not {_described(color)}"
+    )
+
+
+def _channels(color: Sequence[Any] | NDArray[Any]) -> list[Any]:
+    """Return red, green and blue as a list, having checked that they are three numbers."""
+    channels = list(color)
+    if len(channels) != 3 or not all(isinstance(part, Real | np.generic) for part in channels):
+        raise ValueError(
+            f"red, green and blue are three whole numbers, 0 to 255; this is {reprlib.repr(color)}"
+        )
+    return channels
+
+
+def _from_array(colors: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return a (3,) or (k, 3) array of whole numbers as (k, 3) uint8."""
+    rows = colors[None] if colors.shape == (3,) else colors
+    if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) == 0:
+        raise ValueError(f"colours are a (3,) or (k, 3) array, k >= 1; this is {colors.shape}")
+    if rows.dtype.kind == "f":
+        raise ValueError(
+            "colours are whole numbers from 0 to 255, not fractions: multiply 0..1 by 255 and round"
+        )
+    if rows.dtype.kind not in "iu":
+        raise ValueError(f"colours are whole numbers from 0 to 255; this is {rows.dtype}")
+    if rows.min() < 0 or rows.max() > 255:
+        raise ValueError(f"colours are 0 to 255; here they are {rows.min()} to {rows.max()}")
+    return rows.astype(np.uint8)
+
+
+def _described(value: object) -> str:
+    return f"{type(value).__name__} {reprlib.repr(value)}"
 
 
 def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
-    """Spread k colours evenly along ``count`` voxels, blending between them: (count, 3)."""
+    """Return ``count`` colours that lead evenly through k colours, blending: (count, 3) uint8."""
     if len(colors) == 1:
         return np.broadcast_to(colors, (count, 3))
     place = np.linspace(0, len(colors) - 1, count)

@@ -44,11 +44,16 @@ Side = Annotated[
 Size = Annotated[
     tuple[Side, Side, Side], Meta(extra={"expected": "three whole numbers [nx, ny, nz]"})
 ]
-ColorName = Annotated[str, Meta(extra={"expected": "a colour"})]
+Channel = Annotated[int, Meta(ge=0, le=255)]
+OneColor = Annotated[
+    str | Channel | Annotated[list[Channel], Meta(min_length=3, max_length=3)],
+    Meta(extra={"expected": "a colour"}),
+]
 Color = Annotated[
-    ColorName | Annotated[list[ColorName], Meta(min_length=1)],
+    str | Annotated[list[OneColor], Meta(min_length=1)],
     Meta(
-        description="#rgb, #rrggbb, a CSS colour name; or a list of them, spread along the curve.",
+        description="#rgb, #rrggbb, a CSS colour name or [red, green, blue], 0 to 255; or a list "
+        "of colours, spread along the curve. Three whole numbers are one colour.",
         extra={"expected": "a colour or a list of colours"},
     ),
 ]

@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from voxdisplay.errors import SceneError, did_you_mean
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
-from voxdisplay.raster.color import parse_color, parse_colors
+from voxdisplay.raster.color import Color, as_colors
 from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
@@ -181,15 +183,22 @@ def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
 def _item(scene_object: SceneObject, context: EvaluationContext, source: JsonText) -> SceneItem:
     with as_scene_error(context.path):
         curve = scene_object.curve(context)
-    names = [scene_object.color] if isinstance(scene_object.color, str) else scene_object.color
-    for i, name in enumerate(names):
-        try:
-            parse_color(name)
-        except ValueError as error:
-            index = "" if isinstance(scene_object.color, str) else f"[{i}]"
-            raise SceneError(str(error), path=f"{context.path}.color{index}") from None
     kind = str(scene_object.__struct_config__.tag)
-    return SceneItem(kind, curve, parse_colors(scene_object.color), context.path, source)
+    return SceneItem(
+        kind, curve, _colors(scene_object.color, f"{context.path}.color"), context.path, source
+    )
+
+
+def _colors(color: Color, path: str) -> NDArray[np.uint8]:
+    """Return the colours of an object, (k, 3)."""
+    try:
+        return as_colors(color)
+    except (TypeError, ValueError) as error:
+        if not isinstance(color, str):
+            for i, one in enumerate(color):
+                if not isinstance(one, int):
+                    _colors(one, f"{path}[{i}]")
+        raise SceneError(str(error), path=path) from None
 
 
 def _convert(raw: Any, kind: Any, source: JsonText) -> Any:

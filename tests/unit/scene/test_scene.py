@@ -137,6 +137,16 @@ class TestMeaning:
         ]
         assert open_.color.tolist() == [[255, 0, 0], [0, 0, 255]]
 
+    def test_three_whole_numbers_are_one_color(self) -> None:
+        one, two = read_scene(
+            json.dumps(
+                {"objects": [SEGMENT | {"color": [255, 128, 0]},
+                             SEGMENT | {"color": [[255, 128, 0], "lime"]}]}
+            )
+        ).items  # fmt: skip
+        assert one.color.tolist() == [[255, 128, 0]]
+        assert two.color.tolist() == [[255, 128, 0], [0, 255, 0]]
+
     def test_bytes_with_a_byte_order_mark(self) -> None:
         assert read_scene(b"\xef\xbb\xbf" + json.dumps(SEGMENT).encode()).items
 
@@ -216,6 +226,15 @@ class TestMistakes:
             (SEGMENT | {"color": "orang"}, "$.color", "did you mean 'orange'", None),
             (SEGMENT | {"color": ["red", "x"]}, "$.color[1]", "unknown colour 'x'", None),
             (SEGMENT | {"color": []}, "$.color", "0 entries is less than 1", None),
+            (SEGMENT | {"color": [300, 0, 0]}, "$.color[0]", "more than 255", None),
+            (SEGMENT | {"color": [255, 0]}, "$.color", "three whole numbers, 0 to 255", None),
+            (SEGMENT | {"color": ["red", 3]}, "$.color", "a colour in a list", None),
+            (
+                SEGMENT | {"color": [[1, 2, 3], [1, 2]]},
+                "$.color[1]",
+                "2 entries is less than 3",
+                None,
+            ),
             (SEGMENT | {"to": [1, 2, 1e308]}, "$.to[2]", "is too large", None),
             (PARAMETRIC | {"x": "sine(t)"}, "$.x", "unknown function 'sine'", "'sin'"),
             (PARAMETRIC | {"dz": "9**9**9"}, "$.dz", "not finite", None),
