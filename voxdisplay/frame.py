@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.singular_points import SingularPoint
 from voxdisplay.errors import MissingExtra
 from voxdisplay.raster.color import Color, as_colors, interpolate_colors
 from voxdisplay.raster.grid import Grid
@@ -48,12 +49,18 @@ class Drawing:
         How many of them are outside, and not shown.
     exact_color : bool
         Whether the display can show its colours as they are.
+    undefined : tuple of SingularPoint
+        Parameters at which a curve has no value and is drawn with the limits of both sides.
+    jumps : tuple of float
+        Parameters at which a curve jumps: nothing is drawn across.
 
     """
 
     voxels: int
     clipped: int
     exact_color: bool
+    undefined: tuple[SingularPoint, ...] = ()
+    jumps: tuple[float, ...] = ()
 
 
 class Frame:
@@ -142,7 +149,8 @@ class Frame:
         if isinstance(what, Curve):
             what = voxelization.voxelize(what)
         if isinstance(what, voxelization.Sequence):
-            return self._add(what.voxels, as_colors(color), _corner_rows(what))
+            drawing = self._add(what.voxels, as_colors(color), _corner_rows(what))
+            return replace(drawing, undefined=what.undefined, jumps=what.jumps)
         return self._add(_as_voxels(what), as_colors(color), _NO_INDICES)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:

@@ -32,7 +32,7 @@ SCENES = {
     "python name": (curve(z="__import__('os')"), ["$.z"]),
     "reversed range": (curve(t=[1, 0]), ["$.t"]),
     "infinite range": (curve(t=[0, "exp(1000)"]), ["$.t", "finite"]),
-    "pole": (curve(x="1/(t - 0.5)"), ["$", "x = ", "t = 0.4999"]),
+    "pole": (curve(x="1/(t - 0.5)"), ["$", "x = ", "t = 0.5"]),
     "not finite": (curve(y="log(t)"), ["$", "y", "t = 0"]),
     "endless power": (curve(x="9**9**9"), ["$.x"]),
     "endless curve": (curve(x="1e7*t"), ["$"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from functions_in_numpy import IN_NUMPY
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -11,11 +12,15 @@ from voxdisplay.expressions.operations import FUNCTIONS
 from voxdisplay.expressions.parse import constant, parse
 from voxdisplay.expressions.program import Expression
 
-NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"} | {
-    "min": "minimum",
-    "max": "maximum",
+COMPARED = {
+    "<": np.less,
+    "<=": np.less_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+    "==": np.equal,
+    "!=": np.not_equal,
 }
-SMOOTH = ("sin", "cos", "atan", "tanh", "exp", "sinh", "cosh")
+SMOOTH = ("sin", "cos", "atan", "tanh", "exp", "sinh", "cosh", "asinh")
 T = np.linspace(-2.0, 2.0, 9)
 
 Tree = tuple[object, ...]
@@ -35,7 +40,9 @@ def trees(functions: tuple[str, ...], operators: tuple[str, ...]) -> st.SearchSt
             )
         )
         infix = st.tuples(st.just("infix"), st.sampled_from(operators), children, children)
-        return st.one_of(calls, infix, st.tuples(st.just("negative"), children))
+        negative = st.tuples(st.just("negative"), children)
+        choice = st.tuples(st.just("if"), st.sampled_from(sorted(COMPARED)), *[children] * 4)
+        return st.one_of(calls, infix, negative, *[choice] * ("floor" in functions))
 
     return st.recursive(leaves, grow, max_leaves=12)
 
@@ -51,6 +58,9 @@ def printed(tree: Tree, binding: int = 0) -> str:
             return f"{name}({', '.join(printed(x) for x in operands)})"  # type: ignore[arg-type]
         case ("negative", x):
             text, own = "-" + printed(x, 3), 3  # type: ignore[arg-type]
+        case ("if", operator, *operands):
+            left, right, a, b = (printed(x) for x in operands)  # type: ignore[arg-type]
+            return f"if({left} {operator} {right}, {a}, {b})"
         case ("infix", operator, a, b):
             own = {"+": 1, "-": 1, "*": 2, "/": 2, "**": 4}[operator]  # type: ignore[index]
             left, right = (5, 3) if operator == "**" else (own, own + 1)
@@ -69,7 +79,10 @@ def evaluated(tree: Tree) -> np.ndarray:
                 T, {"pi": np.pi, "e": np.e, "tau": 2 * np.pi, "deg": np.pi / 180}[name]
             )
         case ("call", name, *operands):
-            return getattr(np, NUMPY.get(name, name))(*map(evaluated, operands))
+            return np.asarray(IN_NUMPY[name](*map(evaluated, operands)))
+        case ("if", operator, *operands):
+            left, right, a, b = map(evaluated, operands)
+            return np.where(COMPARED[operator](left, right), a, b)
         case ("negative", x):
             return -evaluated(x)
         case ("infix", operator, a, b):
@@ -80,7 +93,7 @@ def evaluated(tree: Tree) -> np.ndarray:
 
 
 @settings(deadline=None)
-@given(trees(tuple(FUNCTIONS), ("+", "-", "*", "/", "**")))
+@given(trees(tuple(IN_NUMPY), ("+", "-", "*", "/", "**")))
 def test_printed_and_parsed_expressions_evaluate_like_numpy(tree: Tree) -> None:
     with np.errstate(all="ignore"):
         expected = evaluated(tree)
@@ -118,7 +131,7 @@ def parse_or_reject(text: str) -> Expression:
 
 
 @settings(deadline=None)
-@given(st.text() | st.text("t0123456789.e+-*/(),^ \0sincoxp[]'_", max_size=60))
+@given(st.text() | st.text("t0123456789.e+-*/(),^ \0sincoxpf<>=!if[]'_", max_size=60))
 def test_any_text_is_an_expression_or_a_curve_error(text: str) -> None:
     try:
         expression = parse(text)

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
     from voxdisplay.scene.model import SceneItem
 
 _MAX_JUMPS_NAMED: Final = 3
+_MAX_UNDEFINED_NAMED: Final = 8
 
 
 def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
-    """Return the sequences of a scene's objects, and note where curves jump.
+    """Return the sequences of a scene's objects, and note where curves jump or have no value.
 
     Parameters
     ----------
@@ -52,7 +53,11 @@ def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -
 
 def _remarks(sequence: vd.Sequence) -> Iterator[str]:
     """Yield what is to be reported of a curve besides its voxels."""
-    jumps = [float(sequence.t[start]) for start in sequence.starts[1:]]
+    undefined = sequence.undefined
+    yield from map(str, undefined[:_MAX_UNDEFINED_NAMED])
+    if len(undefined) > _MAX_UNDEFINED_NAMED:
+        yield f"and has no value at {len(undefined) - _MAX_UNDEFINED_NAMED} more parameters"
+    jumps = sequence.jumps
     if jumps:
         named = ", ".join(f"{t:.6g}" for t in jumps[:_MAX_JUMPS_NAMED])
         more = ", ..." if len(jumps) > _MAX_JUMPS_NAMED else ""

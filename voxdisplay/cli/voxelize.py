@@ -213,6 +213,10 @@ def _report(number: int, item: SceneItem, sequence: vd.Sequence, clipped: int) -
         "clipped": clipped,
         "seconds": round(report.seconds, 6),
         "certified": report.certified,
+        "undefined": [
+            {"axis": point.axis, "t": point.t, "jump": point.jump} for point in report.undefined
+        ],
+        "jumps": list(report.jumps),
     }
 
 

@@ -26,6 +26,7 @@ class _Helical(Curve):
     """P(t) = center + cos(t) a + sin(t) b + t rise: uniform rotation and translation."""
 
     family = "helical"
+    always_defined = True
     thread_safe = True
 
     def __init__(

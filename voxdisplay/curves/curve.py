@@ -75,6 +75,11 @@ class Curve(ABC):
         return None
 
     @property
+    def always_defined(self) -> bool:
+        """True if the formula has a value for every t: it divides by nothing that may be 0."""
+        return False
+
+    @property
     def thread_safe(self) -> bool:
         """Whether `position` may be called from several threads at once."""
         return False
@@ -146,4 +151,4 @@ class Curve(ABC):
         return None
 
 
-_OF_THE_FORMULA = ("degree", "thread_safe", "batch_evaluator", "enclosure")
+_OF_THE_FORMULA = ("degree", "always_defined", "thread_safe", "batch_evaluator", "enclosure")

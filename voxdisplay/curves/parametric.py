@@ -1,7 +1,6 @@
-"""Curves given by formulas: three expressions of t, or any Python callable.
+"""Parametric curves: three expressions of t, or any Python callable.
 
-Knows how a formula is evaluated, not what becomes of its points: values that are not finite pass
-through, and are the business of whoever draws the curve.
+Must not know what its points are used for: values that are not finite pass through.
 """
 
 from __future__ import annotations
@@ -32,8 +31,9 @@ _AXES = ("x", "y", "z")
 class Parametric(Curve):
     """A curve given by formulas.
 
-    ``Parametric(x, y, z, t=(a, b))`` takes three expressions of t, see `expression`, and has an
-    exact derivative and an enclosure. ``Parametric(function, t=(a, b))`` takes any callable.
+    ``Parametric(x, y, z, t=(a, b))`` takes three expressions of t, see `expressions.parse`, and
+    has an exact derivative and an enclosure. ``Parametric(function, t=(a, b))`` takes any
+    callable.
 
     Parameters
     ----------
@@ -42,7 +42,8 @@ class Parametric(Curve):
     function : callable
         Instead of x, y, z: given t, (n,) float64, it returns a (3, n) array, rows x, y, z, or
         three rows that broadcast to one. A callable that understands only a single float and
-        returns three numbers is called once for each parameter.
+        returns three numbers is called once for each parameter. It must return the same for the
+        same t; the array it gets is its own to change.
     t : (a, b)
         The range, a < b. Numbers, or expressions such as ``"-170*deg"``.
     closed : bool, optional
@@ -52,7 +53,7 @@ class Parametric(Curve):
     dx, dy, dz : str, float or Expression, optional
         Derivatives by t, instead of those found from x, y and z.
     derivative : callable, optional
-        Like function: gives dP/dt. Without it, the derivative is not known.
+        Like function: returns dP/dt. Without it, the derivative is not known.
 
     Raises
     ------
@@ -104,33 +105,51 @@ class Parametric(Curve):
     ) -> None:
         values = resolve_params(params or {})
         self._formulas: list[Expression] = []
+        self._always_defined = False
         self.t_range = _range(t, values)
         self.closed = closed
+        shown: dict[str, object]
         if callable(x):
             if any(formula is not None for formula in (y, z, dx, dy, dz)):
                 raise TypeError(
-                    "a callable gives all three coordinates: y, z, dx, dy, dz do not fit"
+                    "a callable returns all three coordinates: leave out y, z, dx, dy, dz"
                 )
-            self._position = _vectorised("the curve", x, self.t_range)
-            self._derivative = derivative and _vectorised(
+            self._function = _Vectorised("the curve", x, self.t_range)
+            self._derivative = derivative and _Vectorised(
                 "the derivative", derivative, self.t_range
             )
-            return
-        if y is None or z is None:
-            raise TypeError("Parametric needs x, y and z, or one callable")
-        if derivative is not None:
-            raise TypeError("derivative goes with a callable; with expressions use dx, dy, dz")
-        self._formulas = formulas = [
-            _formula(axis, axis, formula, values)
-            for axis, formula in zip(_AXES, (x, y, z), strict=True)
-        ]
-        self.family = tuple(formula.template for formula in formulas)
-        slopes = [
-            formula.derivative if slope is None else _formula(axis, f"d{axis}", slope, values).value
-            for axis, formula, slope in zip(_AXES, formulas, (dx, dy, dz), strict=True)
-        ]
-        self._position = program.compile_rows(formulas)
-        self._derivative = _stacked(slopes)
+            shown = {"x": x}
+        else:
+            if y is None or z is None:
+                raise TypeError("Parametric needs x, y and z, or one callable")
+            if derivative is not None:
+                raise TypeError("derivative goes with a callable; with expressions use dx, dy, dz")
+            self._formulas = formulas = [
+                _formula(axis, axis, formula, values)
+                for axis, formula in zip(_AXES, (x, y, z), strict=True)
+            ]
+            self.family = tuple(formula.template for formula in formulas)
+            self._slopes = [
+                None if slope is None else _formula(axis, f"d{axis}", slope, values)
+                for axis, slope in zip(_AXES, (dx, dy, dz), strict=True)
+            ]
+            self._evaluate = program.compile_rows(formulas)
+            self._always_defined = all(formula.always_defined for formula in formulas)
+            shown = {axis: formula.source for axis, formula in zip(_AXES, formulas, strict=True)}
+        self._arguments = shown | {"t": self.t_range, "closed": closed, "params": params or None}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_evaluate"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        if self._formulas:
+            self._evaluate = program.compile_rows(self._formulas)
+
+    @property
+    def always_defined(self) -> bool:
+        """True if it is given by expressions that divide by nothing that may be 0."""
+        return self._always_defined
 
     @property
     def thread_safe(self) -> bool:
@@ -138,26 +157,34 @@ class Parametric(Curve):
         return bool(self._formulas)
 
     def position(self, t: Floats) -> Floats:
-        """Give the points at t, (n,), as a (3, n) float64 array."""
-        return self._position(t)
+        """Return the points at t, (n,), as a (3, n) float64 array."""
+        return self._evaluate(t) if self._formulas else self._function(t)
 
     @staticmethod
     def batch_evaluator(curves: Sequence[Parametric]) -> Evaluate:
-        """Prepare to evaluate formulas that differ in numbers only, see `Curve.batch_evaluator`."""
+        """Return an evaluator of formulas that differ in numbers: see `Curve.batch_evaluator`."""
         formulas = zip(*(curve._formulas for curve in curves), strict=True)
         rows = [program.batch_evaluator(row) for row in formulas]
         return lambda which, t: np.stack([row(which, t) for row in rows])
 
     def derivative(self, t: Floats) -> Floats | None:
-        """Give dP/dt at t, (n,), as a (3, n) float64 array, or None when it is not known."""
-        return self._derivative(t) if self._derivative else None
+        """Return dP/dt at t, (n,), as a (3, n) float64 array, or None when it is not known."""
+        if not self._formulas:
+            return self._derivative(t) if self._derivative else None
+        return np.stack(
+            [
+                formula.derivative(t) if slope is None else slope.value(t)
+                for formula, slope in zip(self._formulas, self._slopes, strict=True)
+            ]
+        )
 
+    @np.errstate(all="ignore")
     def enclosure(self, t_lo: Floats, t_hi: Floats) -> tuple[Floats, Floats] | None:
-        """Give boxes that hold the curve from t_lo to t_hi, (n,): (3, n), (3, n). Not a callable.
+        """Return boxes, (3, n) and (3, n), that hold the curve from t_lo to t_hi; None: a callable.
 
-        Nothing is known where a formula may have no value for some t in between. But an interval
-        as narrow as parameters can be told apart may end where values do, as those of sqrt(1 - t)
-        at t = 1, and holds for the values there are.
+        Nothing is known where a formula may have no value for some t in between. An interval as
+        narrow as the resolution of parameters is an exception: it may end where values do, as
+        those of sqrt(1 - t) at t = 1, and its bounds hold for the values there are.
         """
         if not self._formulas:
             return None
@@ -187,53 +214,56 @@ def _formula(axis: str, name: str, formula: Formula, values: Mapping[str, float]
         raise CurveError(f"{name}: {error}", axis=axis, hint=error.hint) from None
 
 
-def _stacked(rows: Sequence[Callable[[Floats], Floats]]) -> Callable[[Floats], Floats]:
-    def evaluate(t: Floats) -> Floats:
-        return np.stack([row(t) for row in rows])
+class _Vectorised:
+    """A callable as a function of (n,) parameters to (3, n) points.
 
-    return evaluate
+    How it wants to be called is tried on two parameters: three would make (3, n) and (n, 3) the
+    same shape.
 
+    Parameters
+    ----------
+    what : str
+        What it is, for errors.
+    function : callable
+    t_range : (float, float)
 
-def _vectorised(
-    what: str, function: Function, t_range: tuple[float, float]
-) -> Callable[[Floats], Floats]:
-    """Make (n,) -> (3, n) of a callable, having tried on two parameters how it wants to be called.
-
-    Two, because three parameters would make (3, n) and (n, 3) the same shape.
     """
-    a, b = t_range
-    trial = np.array([a, a + (b - a) / 2])
 
-    def at_once(t: Floats) -> Floats:
-        with np.errstate(all="ignore"):
-            return _rows(what, function(t), t.size)
-
-    def one_by_one(t: Floats) -> Floats:
-        out = np.empty((3, t.size))
-        for i, one in enumerate(t.tolist()):
-            out[:, i] = _point(what, function, one)
-        return out
-
-    try:
-        at_once(trial)
-    except CurveError:
-        raise
-    except (TypeError, ValueError) as error:  # as of math.cos and "if t < 0", given an array
+    def __init__(self, what: str, function: Function, t_range: tuple[float, float]) -> None:
+        self._what = what
+        self._function = function
+        self._one_by_one = False
+        a, b = t_range
+        trial = np.array([a, a + (b - a) / 2])
         try:
-            one_by_one(trial)
+            self(trial)
         except CurveError:
             raise
-        except (TypeError, ValueError):
-            raise CurveError(
-                f"{what} cannot be called: {type(error).__name__}: {error}",
-                hint="it must take an (n,) array and return a (3, n) array",
-            ) from error
-        return one_by_one
-    return at_once
+        except (TypeError, ValueError) as error:  # as of math.cos and "if t < 0", given an array
+            self._one_by_one = True
+            try:
+                self(trial)
+            except CurveError:
+                raise
+            except (TypeError, ValueError):
+                raise CurveError(
+                    f"{what} cannot be called: {type(error).__name__}: {error}",
+                    hint="it must take an (n,) array and return a (3, n) array",
+                ) from error
+
+    def __call__(self, t: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            if not self._one_by_one:
+                # A copy: a function that works in place must not change the caller's parameters.
+                return _rows(self._what, self._function(t.copy()), t.size)
+            points = np.empty((3, t.size))
+            for i, one in enumerate(t.tolist()):
+                points[:, i] = _point(self._what, self._function, one)
+            return points
 
 
 def _point(what: str, function: Function, t: float) -> Floats:
-    """Call a callable for one parameter: (3,), nan where it has no value there."""
+    """Call a callable for one parameter; return (3,), nan where it has no value there."""
     try:
         result = function(t)
     except (ArithmeticError, ValueError):  # as of 1 / 0 and math.log(0)
@@ -245,7 +275,7 @@ def _point(what: str, function: Function, t: float) -> Floats:
 
 
 def _rows(what: str, result: Any, n: int) -> Floats:
-    """Check and copy the result of a callable: (3, n), or three rows that broadcast to that."""
+    """Return a checked copy of what a callable returned: (3, n), or rows that broadcast to that."""
     if isinstance(result, tuple | list) and len(result) == 3:
         result = np.stack(np.broadcast_arrays(*result, np.empty(n))[:3])
     points = np.array(result, dtype=np.float64)

@@ -35,6 +35,7 @@ class Lissajous(Curve):
     """
 
     t_range = (0.0, math.tau)
+    always_defined = True
     thread_safe = True
 
     def __init__(
@@ -95,6 +96,7 @@ class TorusKnot(Curve):
     """
 
     t_range = (0.0, math.tau)
+    always_defined = True
     thread_safe = True
 
     def __init__(

@@ -33,6 +33,7 @@ class Polyline(Curve):
     """
 
     degree = 1
+    always_defined = True
     thread_safe = True
     _min_points = 2
 

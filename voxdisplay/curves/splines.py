@@ -40,6 +40,7 @@ class Bezier(Curve):
     """
 
     t_range = (0.0, 1.0)
+    always_defined = True
     thread_safe = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
@@ -114,6 +115,7 @@ class BSpline(Curve):
 
     """
 
+    always_defined = True
     thread_safe = True
 
     def __init__(
@@ -244,6 +246,7 @@ class CatmullRom(Curve):
 
     """
 
+    always_defined = True
     thread_safe = True
 
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:

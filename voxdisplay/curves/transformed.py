@@ -48,6 +48,11 @@ class Transformed(Curve):
         return self.curve.degree
 
     @property
+    def always_defined(self) -> bool:
+        """`Curve.always_defined` of the curve inside."""
+        return self.curve.always_defined
+
+    @property
     def thread_safe(self) -> bool:
         """`Curve.thread_safe` of the curve inside."""
         return self.curve.thread_safe

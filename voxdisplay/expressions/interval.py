@@ -1,6 +1,6 @@
-"""Intervals: bounds of what a formula yields while its variable runs through an interval.
+"""Interval arithmetic with outward rounding: bounds of formulas over ranges of their variable.
 
-Every operation here gives bounds of the *exact* result for all real operands within their bounds
+Every operation here returns bounds of the *exact* result for all real operands within their bounds
 (Moore, *Interval Analysis*, 1966), for arrays of intervals at once. What float64 gets wrong is
 made up for by rounding outward:
 
@@ -15,9 +15,8 @@ made up for by rounding outward:
 So bounds hold what numpy evaluates within them, as well: 16 ulp are more than twice 4.
 
 If either bound is not a number, nothing is known, as after a division by an interval with 0
-inside; that spreads to all that is computed from it. What numpy warns of on the way is provided
-for: callers may silence it (``np.errstate``). This module knows no expressions and no
-curves.
+inside; that spreads to all that is computed from it. numpy's warnings on the way have no meaning:
+callers silence them (``np.errstate``). This module must not know expressions or curves.
 """
 
 from __future__ import annotations
@@ -48,8 +47,8 @@ class Interval:
         Of shapes that broadcast; possibly infinite, but lo never inf nor hi -inf. One of them nan
         where nothing is known.
     partial : bool array, or False
-        Where some operands within their bounds have no result, such as square roots of intervals
-        that begin below 0: the bounds are of the results there are.
+        True where some operands within their bounds have no result, such as square roots of
+        intervals that begin below 0: the bounds are of the results there are.
 
     """
 
@@ -61,7 +60,7 @@ class Interval:
 
     @property
     def is_point(self) -> bool:
-        """Whether it was made of numbers: bounds are the same array."""
+        """True if it was made of numbers: both bounds are the same array."""
         return self.lo is self.hi
 
     def __add__(self, other: Interval | ArrayLike) -> Interval:
@@ -87,7 +86,7 @@ class Interval:
 
 
 def interval(value: Interval | ArrayLike) -> Interval:
-    """Make an interval of numbers, which holds nothing else; an interval stays what it is."""
+    """Return the degenerate interval of numbers; an interval stays what it is."""
     if isinstance(value, Interval):
         return value
     number = np.asarray(value, dtype=np.float64)
@@ -95,7 +94,7 @@ def interval(value: Interval | ArrayLike) -> Interval:
 
 
 def _widen(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
-    """Move bounds apart. Bounds that overflowed are bounds of numbers, which have a size."""
+    """Move bounds outward by some ulp. An overflowed lower bound is the largest finite number."""
     lo, hi = np.minimum(lo, _LARGEST), np.maximum(hi, -_LARGEST)
     return Interval(
         lo - (np.abs(lo) * (ulps * _ULP) + ulps * _TINY),
@@ -108,7 +107,7 @@ def _widen(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
 
 
 def negate(a: Interval) -> Interval:
-    """Give -a."""
+    """Return -a."""
     return Interval(-a.hi, -a.lo, a.may_be_undefined)
 
 
@@ -119,17 +118,17 @@ def _sum(lo: Floats, hi: Floats, partial: Any) -> Interval:
 
 
 def add(a: Interval, b: Interval) -> Interval:
-    """Give a + b."""
+    """Return a + b."""
     return _sum(a.lo + b.lo, a.hi + b.hi, a.may_be_undefined | b.may_be_undefined)
 
 
 def subtract(a: Interval, b: Interval) -> Interval:
-    """Give a - b."""
+    """Return a - b."""
     return _sum(a.lo - b.hi, a.hi - b.lo, a.may_be_undefined | b.may_be_undefined)
 
 
 def multiply(a: Interval, b: Interval) -> Interval:
-    """Give a b. An interval times itself (the same object) is its square."""
+    """Return a b. An interval times itself (the same object) is its square."""
     if a is b:
         return _whole_power(a, 2.0)
     if a.is_point:
@@ -142,7 +141,7 @@ def multiply(a: Interval, b: Interval) -> Interval:
 
 
 def divide(a: Interval, b: Interval) -> Interval:
-    """Give a / b; nothing is known where b has 0 inside."""
+    """Return a / b; nothing is known where b has 0 inside."""
     bottom = np.where((b.lo > 0) | (b.hi < 0), b.lo, np.nan)
     lo, hi = _ordered(a.lo / bottom, a.hi / bottom)
     if not b.is_point:
@@ -156,24 +155,24 @@ def _ordered(one: Floats, other: Floats) -> tuple[Floats, Floats]:
 
 
 def absolute(a: Interval) -> Interval:
-    """Give |a|."""
+    """Return |a|."""
     return Interval(_least_magnitude(a), np.maximum(np.abs(a.lo), np.abs(a.hi)), a.may_be_undefined)
 
 
 def _least_magnitude(a: Interval) -> Floats:
-    """Give the least |x| of the x in a."""
+    """Return the least |x| of the x in a."""
     return np.maximum(np.maximum(a.lo, -a.hi), 0.0)
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
-    """Give the smaller of a and b."""
+    """Return the smaller of a and b."""
     return Interval(
         np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi), a.may_be_undefined | b.may_be_undefined
     )
 
 
 def maximum(a: Interval, b: Interval) -> Interval:
-    """Give the greater of a and b."""
+    """Return the greater of a and b."""
     return Interval(
         np.maximum(a.lo, b.lo), np.maximum(a.hi, b.hi), a.may_be_undefined | b.may_be_undefined
     )
@@ -183,7 +182,7 @@ def maximum(a: Interval, b: Interval) -> Interval:
 
 
 def power(a: Interval, b: Interval) -> Interval:
-    """Give a to the power of b, with 0**0 = 1, as numpy does.
+    """Return a to the power of b, with 0**0 = 1, as numpy does.
 
     A whole constant exponent takes any base, though a negative one none with 0 inside. With other
     exponents there is a value only for bases above 0, and for 0 if the exponent is positive;
@@ -223,7 +222,7 @@ def _whole_power(a: Interval, exponent: float) -> Interval:
 
 
 def sqrt(a: Interval) -> Interval:
-    """Give the square root of what is not negative in a."""
+    """Return the square root of what is not negative in a."""
     a = _clip_to_domain(a, 0.0, np.inf)
     out = _widen(np.sqrt(a.lo), np.sqrt(a.hi), a.may_be_undefined, _EXACT)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
@@ -246,55 +245,85 @@ def _clip_to_domain(a: Interval, low: float, high: float) -> Interval:
 def _increasing(
     function: Callable[[Floats], Floats], a: Interval, low: float = -np.inf, high: float = np.inf
 ) -> Interval:
-    """Bound a function that rises, from low to high."""
+    """Bound an increasing function whose values are from low to high."""
     out = _widen(function(a.lo), function(a.hi), a.may_be_undefined, _ASSUMED)
     return Interval(np.maximum(out.lo, low), np.minimum(out.hi, high), out.may_be_undefined)
 
 
 def exp(a: Interval) -> Interval:
-    """Give e**a."""
+    """Return e**a."""
     return _increasing(np.exp, a, low=0.0)
 
 
 def log(a: Interval) -> Interval:
-    """Give the natural logarithm of what is positive in a."""
+    """Return the natural logarithm of what is positive in a."""
     return _increasing(np.log, _clip_to_domain(a, 0.0, np.inf))
 
 
+def log10(a: Interval) -> Interval:
+    """Return the logarithm of base 10 of what is positive in a."""
+    return _increasing(np.log10, _clip_to_domain(a, 0.0, np.inf))
+
+
+def log2(a: Interval) -> Interval:
+    """Return the logarithm of base 2 of what is positive in a."""
+    return _increasing(np.log2, _clip_to_domain(a, 0.0, np.inf))
+
+
+def cbrt(a: Interval) -> Interval:
+    """Return the cube root."""
+    return _increasing(np.cbrt, a)
+
+
 def sinh(a: Interval) -> Interval:
-    """Give the hyperbolic sine."""
+    """Return the hyperbolic sine."""
     return _increasing(np.sinh, a)
 
 
 def cosh(a: Interval) -> Interval:
-    """Give the hyperbolic cosine."""
+    """Return the hyperbolic cosine."""
     return _increasing(np.cosh, absolute(a), low=1.0)
 
 
 def tanh(a: Interval) -> Interval:
-    """Give the hyperbolic tangent."""
+    """Return the hyperbolic tangent."""
     return _increasing(np.tanh, a, -1.0, 1.0)
 
 
+def asinh(a: Interval) -> Interval:
+    """Return the inverse hyperbolic sine."""
+    return _increasing(np.arcsinh, a)
+
+
+def acosh(a: Interval) -> Interval:
+    """Return the inverse hyperbolic cosine of what is at least 1 in a."""
+    return _increasing(np.arccosh, _clip_to_domain(a, 1.0, np.inf), low=0.0)
+
+
+def atanh(a: Interval) -> Interval:
+    """Return the inverse hyperbolic tangent of what is from -1 to 1 in a."""
+    return _increasing(np.arctanh, _clip_to_domain(a, -1.0, 1.0))
+
+
 def asin(a: Interval) -> Interval:
-    """Give the arc sine of what is from -1 to 1 in a."""
+    """Return the arc sine of what is from -1 to 1 in a."""
     return _increasing(np.arcsin, _clip_to_domain(a, -1.0, 1.0))
 
 
 def acos(a: Interval) -> Interval:
-    """Give the arc cosine of what is from -1 to 1 in a."""
+    """Return the arc cosine of what is from -1 to 1 in a."""
     a = _clip_to_domain(a, -1.0, 1.0)
     out = _widen(np.arccos(a.hi), np.arccos(a.lo), a.may_be_undefined, _ASSUMED)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def atan(a: Interval) -> Interval:
-    """Give the arc tangent."""
+    """Return the arc tangent."""
     return _increasing(np.arctan, a)
 
 
 def hypot(a: Interval, b: Interval) -> Interval:
-    """Give sqrt(a**2 + b**2)."""
+    """Return sqrt(a**2 + b**2)."""
     a, b = absolute(a), absolute(b)
     out = _widen(
         np.hypot(a.lo, b.lo),
@@ -306,7 +335,7 @@ def hypot(a: Interval, b: Interval) -> Interval:
 
 
 def atan2(y: Interval, x: Interval) -> Interval:
-    """Give the angle of (x, y), from -pi to pi.
+    """Return the angle of (x, y), from -pi to pi.
 
     Seen from outside a rectangle, the greatest and the least angle are those of corners. If the
     rectangle reaches the half line where the angle jumps, or the origin, the angle is anything.
@@ -322,7 +351,7 @@ def atan2(y: Interval, x: Interval) -> Interval:
         y.may_be_undefined | x.may_be_undefined,
         _ASSUMED,
     )
-    # The comparisons above are false for bounds that are not numbers; corners tell.
+    # The comparisons above are False for nan; corners are nan then.
     unknown = np.isnan(lo)
     if not unknown.any():
         return out
@@ -331,24 +360,24 @@ def atan2(y: Interval, x: Interval) -> Interval:
     )
 
 
-# ------------------------------------------------------------------- functions with a period
+# ------------------------------------------------------------------- periodic functions
 
 # Sines and cosines are moved by 16 ulp of 1: nothing rests on how exact they are near 0.
 _WAVE = _ASSUMED * _ULP
 
 
 def sin(a: Interval) -> Interval:
-    """Give the sine."""
+    """Return the sine."""
     return _sinusoid(np.sin, a, 0.25)
 
 
 def cos(a: Interval) -> Interval:
-    """Give the cosine."""
+    """Return the cosine."""
     return _sinusoid(np.cos, a, 0.0)
 
 
 def _sinusoid(function: Callable[[Floats], Floats], a: Interval, crest: float) -> Interval:
-    """Bound sine or cosine, which is 1 at the angle ``crest`` and -1 half a turn later, in turns.
+    """Bound sine or cosine: 1 at the angle ``crest``, in turns, and -1 half a turn later.
 
     Between crests and troughs it is monotone, and so is least and greatest at the ends.
     """
@@ -363,7 +392,7 @@ def _sinusoid(function: Callable[[Floats], Floats], a: Interval, crest: float) -
 
 
 def tan(a: Interval) -> Interval:
-    """Give the tangent; nothing is known where a may have a pole inside."""
+    """Return the tangent; nothing is known where a may have a pole inside."""
     lo, hi = np.tan(a.lo), np.tan(a.hi)
     pole = _may_contain_integer(a, np.pi, 0.5)
     return _widen(
@@ -371,8 +400,26 @@ def tan(a: Interval) -> Interval:
     )
 
 
+def sec(a: Interval) -> Interval:
+    """Return 1 / cos(a); nothing is known where a may have a pole inside."""
+    return divide(interval(1.0), cos(a))
+
+
+def csc(a: Interval) -> Interval:
+    """Return 1 / sin(a); nothing is known where a may have a pole inside."""
+    return divide(interval(1.0), sin(a))
+
+
+def cot(a: Interval) -> Interval:
+    """Return the cotangent; nothing is known where a may have a pole inside."""
+    lo, hi = 1.0 / np.tan(a.hi), 1.0 / np.tan(a.lo)
+    pole = _may_contain_integer(a, np.pi, 0.0)
+    lo, hi = np.where(pole, np.nan, lo), np.where(pole, np.nan, hi)
+    return _widen(lo, hi, a.may_be_undefined, _ASSUMED)
+
+
 def _may_contain_integer(a: Interval, period: float, shift: float) -> Any:
-    """Tell where a / period - shift may have a whole number inside; period is 2 pi or pi.
+    """Return where a / period - shift may hold a whole number; period is 2 pi or pi.
 
     The quotient's error is under (|q| + 1) 2^-52 for a quotient q: half an ulp each for the
     period and the division, and for taking off a shift of at most 3/4. Where that comes near 1

@@ -1,6 +1,6 @@
-"""Params: names that a scene's or a curve's expressions share.
+"""Params: named values that the expressions of a scene or a curve share.
 
-Each is a number, or an expression in constants and other params. Knows no curves.
+Each is a number, or an expression in constants and other params. Must not know curves.
 """
 
 from __future__ import annotations
@@ -19,18 +19,24 @@ if TYPE_CHECKING:
 MAX_PARAMS = 1000
 """Most params of one scene or curve."""
 
+# Functions that came later may still name a param: a call is told by its bracket.
+_LATER = {"ln", "log10", "log2", "sign", "floor", "ceil", "round", "mod", "cbrt", "sec", "csc"}
+_LATER |= {"cot", "asinh", "acosh", "atanh"}
+RESERVED = ({*FUNCTIONS} - _LATER) | {*CONSTANTS, VARIABLE}
+"""Names that a param cannot have."""
+
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NAME_HINT = "a name is letters a-z A-Z, digits and _, and does not begin with a digit"
 
 
 def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
-    """Put params in an order in which each uses only earlier ones.
+    """Return the names of params in an order in which each uses only earlier ones.
 
     Raises
     ------
     CurveError
-        If one has a name that expressions cannot use or that means something else, or if they
-        go in a circle.
+        If a name cannot be used in expressions or has another meaning there, or if params depend
+        on each other in a circle.
 
     """
     if len(params) > MAX_PARAMS:
@@ -38,7 +44,7 @@ def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
     for name in params:
         if not _NAME.fullmatch(name):
             raise CurveError(f"{excerpt(name)} cannot be the name of a param", hint=_NAME_HINT)
-        if name in FUNCTIONS or name in CONSTANTS or name == VARIABLE:
+        if name in RESERVED:
             raise CurveError(f"a param cannot be called {name!r}: that has a meaning already")
     uses = {
         name: [word for word in names_in(str(source)) if word in params]
@@ -52,7 +58,7 @@ def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
 
 
 def resolve_params(params: Mapping[str, str | float]) -> dict[str, float]:
-    """Compute params, which are numbers or expressions in constants and other params.
+    """Return the values of params, which are numbers or expressions in constants and other params.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Safe expressions: from text to a program, see `program`.
+"""Parser of expressions: safe text to a postfix program, see `program`.
 
 ::
 
@@ -6,12 +6,13 @@
     term       = product of factors  a * b, a / b
     factor     = -a, +a, power
     power      = atom ** factor      right associative; -2**2 is -(2**2), as in Python
-    atom       = number, name, function(expression, ...), (expression)
+    atom       = number, name, function(expression, ...), (expression),
+                 if(expression < expression, expression, expression)
 
-Nothing else parses, and Python is never asked to parse or run the text. The length, the nesting
-and the number of steps are limited, and evaluation is float64 throughout, so that hostile text
-costs no more than a long expression does. Knows no curves, and nothing of where the text came
-from: an error names the column, the caller adds the place.
+A condition compares by one of < <= > >= == !=. Nothing else parses, and Python is never asked to
+parse or run the text. The length, the nesting and the number of steps are limited, and evaluation
+is float64 throughout, so that hostile text costs no more than a long expression does. Must not
+know curves, nor where the text came from: an error names the column, the caller adds the place.
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn, cast
 
 import numpy as np
 
-from voxdisplay.errors import CurveError, did_you_mean
+from voxdisplay.errors import CurveError
 from voxdisplay.expressions.operations import (
     ADD,
+    COMPARISONS,
     DIVIDE,
     FUNCTIONS,
+    IF,
     MULTIPLY,
     NEGATE,
     POWER,
@@ -36,6 +39,7 @@ from voxdisplay.expressions.operations import (
     Operation,
 )
 from voxdisplay.expressions.program import Expression, Step
+from voxdisplay.expressions.suggestions import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -60,11 +64,11 @@ def parse(
     Parameters
     ----------
     source : str or float
-        The text; a number stands for itself.
+        The text, or a number.
     names : mapping of str to float, optional
         The values of params.
     variable : bool
-        Whether t may occur.
+        True if t may occur.
 
     Raises
     ------
@@ -84,13 +88,13 @@ def parse(
 
 
 def constant(source: str | float, names: Mapping[str, float] | None = None) -> float:
-    """Parse an expression without t and give its value; raise CurveError as `parse` does."""
+    """Return the value of an expression without t; raise CurveError as `parse` does."""
     (value,) = parse(source, names, variable=False).program
     return cast("float", value)
 
 
 def excerpt(value: object) -> str:
-    """Quote a value of any length, of any characters, in an error message."""
+    """Return a short quotation of a value of any length and characters, for error messages."""
     return _EXCERPT.repr(value)
 
 
@@ -107,7 +111,7 @@ class _Token(NamedTuple):
 _TOKEN = re.compile(
     r"""(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
       | (?P<name>[A-Za-z_][A-Za-z0-9_]*)
-      | (?P<symbol>\*\*|[-+*/(),])
+      | (?P<symbol>\*\*|[<>=!]=|[-+*/(),<>])
       | (?P<other>\S)""",
     re.VERBOSE,
 )
@@ -120,8 +124,18 @@ _SPELLINGS = {
     "\N{GREEK SMALL LETTER PI}": "pi",
     "\N{DEGREE SIGN}": "*deg",
     "\N{SQUARE ROOT}": "sqrt",
+    "\N{SUPERSCRIPT TWO}": "**2",
+    "\N{SUPERSCRIPT THREE}": "**3",
+    "\N{LESS-THAN OR EQUAL TO}": "<=",
+    "\N{GREATER-THAN OR EQUAL TO}": ">=",
+    "\N{NOT EQUAL TO}": "!=",
+    "%": "mod(a, b)",
+    "=": "==",
+    "|": "abs(x)",
+    "?": "if(condition, a, b)",
+    "&": "if(a, if(b, x, y), y)",
 }
-"""What people write for what is written otherwise here."""
+"""Spellings of other notations and languages, and how the same is written here."""
 
 
 def _tokens(source: str) -> Iterator[_Token]:
@@ -131,7 +145,7 @@ def _tokens(source: str) -> Iterator[_Token]:
 
 
 def names_in(source: str) -> list[str]:
-    """Give the names in a text, in order, whether it parses or not."""
+    """Return the names in a text, in order, whether it parses or not."""
     return [token.text for token in _tokens(source[:MAX_LENGTH]) if token.kind == "name"]
 
 
@@ -150,10 +164,18 @@ _INFIX = {
 }
 _SIGN = 30
 _PRODUCT_HINT = "a product is written with *"
+_ARGUMENT_HINTS = {
+    ("log", 2): "write log(x) / log(base)",
+    ("ln", 2): "write log(x) / log(base)",
+    ("round", 2): "write round(x * 10**digits) / 10**digits",
+    ("atan", 2): "write atan2(y, x)",
+    ("mod", 1): "write mod(a, b)",
+    ("atan2", 1): "write atan(x), or atan2(y, x)",
+}
 
 
 class _Parser:
-    """Pratt parser, writing the postfix program as it goes."""
+    """Pratt parser that appends to the postfix program as it goes."""
 
     def __init__(self, source: str, names: Mapping[str, float], *, variable: bool) -> None:
         self.source = source
@@ -173,6 +195,8 @@ class _Parser:
         if self.token.kind != "end":
             another = self.token.kind in {"name", "number"} or self.token.text == "("
             hint = _PRODUCT_HINT if another else None
+            if self.token.text in COMPARISONS:
+                hint = "a comparison belongs into the condition of if(condition, a, b)"
             self.unexpected("an operator or the end", hint=hint)
         return Expression(self.source, tuple(self.program))
 
@@ -214,10 +238,13 @@ class _Parser:
         name = token.text
         self.advance()
         called = self.token.text == "("
-        if name in FUNCTIONS:
+        if name in FUNCTIONS and (called or name not in self.names):
             if not called:
                 self.fail(f"the function {name!r} {self.place(token)} needs an argument in ( )")
-            self.call(token, FUNCTIONS[name], depth)
+            if FUNCTIONS[name] is IF:
+                self.choice(depth)
+            else:
+                self.call(token, FUNCTIONS[name], depth)
             return
         meaning: Step | None = CONSTANTS.get(name, self.names.get(name))
         if name == VARIABLE and self.variable:
@@ -237,8 +264,33 @@ class _Parser:
             )
         known = [*CONSTANTS, *self.names, *FUNCTIONS] + [VARIABLE] * self.variable
         what, like = ("function", list(FUNCTIONS)) if called else ("name", known)
-        hint = did_you_mean(name, like) or f"known: {shorten(', '.join(like), 200)}"
+        hint = suggest(name, like) or f"known: {shorten(', '.join(like), 300)}"
         self.fail(f"unknown {what} {excerpt(name)} {self.place(token)}", hint=hint)
+
+    def choice(self, depth: int) -> None:
+        """Parse the arguments of ``if``: a comparison, and two expressions."""
+        self.advance()
+        self.expression(0, depth + 1)
+        comparison = COMPARISONS.get(self.token.text)
+        if comparison is None:
+            self.unexpected(
+                "a comparison",
+                hint="a condition compares two values by < <= > >= == or !=: if(t < 1, a, b)",
+            )
+        self.advance()
+        self.expression(0, depth + 1)
+        if self.token.text in COMPARISONS:
+            self.unexpected(
+                "','", hint="one comparison in each condition: if(0 < t, if(t < 1, a, b), b)"
+            )
+        self.emit(comparison)
+        for closing in (",", ",", ")"):
+            if self.token.text != closing:
+                self.unexpected(f"{closing!r}", hint="write if(condition, a, b)")
+            self.advance()
+            if closing == ",":
+                self.expression(0, depth + 1)
+        self.emit(IF)
 
     def call(self, token: _Token, function: Operation, depth: int) -> None:
         count = 0
@@ -255,11 +307,12 @@ class _Parser:
             wanted = f"{function.arity}{' or more' if function.variadic else ''}"
             plural = "" if wanted == "1" else "s"
             self.fail(
-                f"{token.text} takes {wanted} argument{plural}, not {count}, {self.place(token)}"
+                f"{token.text} takes {wanted} argument{plural}, not {count}, {self.place(token)}",
+                hint=_ARGUMENT_HINTS.get((token.text, count)),
             )
 
     def emit(self, step: Step) -> None:
-        """Append a step, computing at once what does not depend on t."""
+        """Append a step; fold operations on constants."""
         self.steps += 1
         if self.steps > MAX_STEPS:
             self.fail(f"more than {MAX_STEPS} numbers, names and operations")
@@ -279,7 +332,9 @@ class _Parser:
 
     def expect(self, symbol: str) -> None:
         if self.token.text != symbol:
-            self.unexpected(f"{symbol!r} or an operator")
+            comparison = self.token.text in COMPARISONS
+            hint = "a comparison belongs into the condition of if(condition, a, b)"
+            self.unexpected(f"{symbol!r} or an operator", hint=hint if comparison else None)
         self.advance()
 
     def place(self, token: _Token | None = None) -> str:
@@ -288,6 +343,8 @@ class _Parser:
     def unexpected(self, wanted: str, hint: str | None = None) -> NoReturn:
         if self.token.text in _SPELLINGS:
             hint = f"write {_SPELLINGS[self.token.text]!r}"
+        elif self.token.text == "/" and self.source[self.token.column - 2] == "/":
+            hint = "write floor(a / b) for the whole quotient"
         found = "the end" if self.token.kind == "end" else excerpt(self.token.text)
         self.fail(f"expected {wanted}, found {found} {self.place()}", hint=hint)
 

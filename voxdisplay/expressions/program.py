@@ -1,18 +1,19 @@
-"""What an expression is once it is parsed: a function of t, its exact derivative, and its bounds.
+"""Postfix programs of expressions: evaluation, exact derivative and enclosure.
 
-A postfix program over any kind of value: arrays, intervals, values with their derivatives; one by
-one, or many of one template at once. Knows no text: that is `expression`'s business.
+A program runs over any kind of value: arrays, intervals, values with their derivatives; one
+program, or many of one template together. Must not know text: that is `parse`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from voxdisplay.expressions.interval import Interval, interval
-from voxdisplay.expressions.operations import POWER, Operation
+from voxdisplay.expressions.operations import IF, POWER, Operation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -44,7 +45,7 @@ class Expression:
 
     @property
     def template(self) -> tuple[Step | None, ...]:
-        """The program without its numbers, but with exponents: they decide how ``**`` computes."""
+        """The program without its numbers but exponents, which decide how ``**`` computes."""
         following = (*self.program[1:], None)
         return tuple(
             None if isinstance(step, float) and after is not POWER else step
@@ -52,8 +53,18 @@ class Expression:
         )
 
     @property
+    def always_defined(self) -> bool:
+        """True if no operation may lack a value, or be infinite, at single operands."""
+        return not any(
+            isinstance(step, Operation)
+            and step.singular
+            and not (isinstance(last, float) and step.defined_for(last))
+            for last, step in pairwise((None, *self.program))
+        )
+
+    @property
     def constant(self) -> float | None:
-        """The value, when it does not depend on t."""
+        """The value if it does not depend on t, else None."""
         (first, *rest) = self.program
         return first if not rest and isinstance(first, float) else None
 
@@ -68,7 +79,7 @@ class Expression:
         Parameters
         ----------
         variable : V
-            What t is.
+            The value of t.
         constant : callable
             Makes a value of a number.
         apply : callable
@@ -78,8 +89,9 @@ class Expression:
         stack: list[V] = []
         for step in self.program:
             if isinstance(step, Operation):
-                last = stack.pop()
-                stack.append(apply(step, (last,) if step.arity == 1 else (stack.pop(), last)))
+                operands = tuple(stack[-step.arity :])
+                del stack[-step.arity :]
+                stack.append(apply(step, operands))
             else:
                 stack.append(variable if isinstance(step, str) else constant(step))
         (result,) = stack
@@ -90,9 +102,10 @@ class Expression:
         return compile_rows([self])(t).ravel()
 
     def derivative(self, t: Floats) -> Floats:
-        """Give the derivative at t, (n,) float64; not finite where the rules find none.
+        """Return the derivative at t, (n,) float64; not finite where the rules find none.
 
-        At a kink of ``abs``, ``min`` and ``max`` it is that of one side, or 0.
+        At a kink of ``abs``, ``min`` and ``max`` it is that of one side, or 0; at a step of
+        ``floor``, ``sign`` and their like it is 0.
         """
         out = np.empty_like(t, dtype=np.float64)
         variable: _Dual = (t, np.float64(1))
@@ -102,7 +115,7 @@ class Expression:
         return out
 
     def enclosure(self, t: Interval) -> Interval:
-        """Bound the exact values of the program for all real t in intervals.
+        """Return bounds of the exact values of the program for all real t in intervals.
 
         Its numbers, float64, are taken as they are.
         """
@@ -111,7 +124,7 @@ class Expression:
 
 
 def compile_rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
-    """Prepare to evaluate k expressions at t, (n,) float64, to (k, n): as `Expression.value`."""
+    """Return an evaluator of k expressions: t, (n,) float64, to (k, n), as `Expression.value`."""
     programs = [_flatten(each.program) for each in expressions]
 
     @np.errstate(all="ignore")
@@ -125,7 +138,7 @@ def compile_rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats
 
 
 def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
-    """Prepare to evaluate expressions of one template at once.
+    """Return an evaluator of expressions of one template.
 
     Returns
     -------
@@ -137,7 +150,7 @@ def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
     programs = [each.program for each in expressions]
     numbers = np.array([[x for x in program if isinstance(x, float)] for program in programs])
     bits = numbers.view(np.int64)
-    # Numbers that all have in common, as exponents are, stay scalars.
+    # Numbers that are the same in all, as exponents are, stay scalars.
     columns = [
         column[0] if same else column
         for column, same in zip(numbers.T, (bits == bits[0]).all(axis=0), strict=True)
@@ -156,7 +169,7 @@ def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
 
 
 def _flatten(program: tuple[Step, ...]) -> list[tuple[int, Any]]:
-    """Give the steps of a program as `_run` takes them: how many operands, and what to do."""
+    """Return the steps of a program as `_run` takes them: arity and function, or 0 and a number."""
     return [
         (step.arity, step.value)
         if isinstance(step, Operation)
@@ -168,7 +181,7 @@ def _flatten(program: tuple[Step, ...]) -> list[tuple[int, Any]]:
 
 
 def _run(program: list[tuple[int, Any]], t: Floats) -> Any:
-    """Do what `Expression.fold` does with arrays, but faster: small ones take no longer than it."""
+    """Run a program over arrays, as `Expression.fold` does but with less overhead per step."""
     stack: list[Any] = []
     for arity, step in program:
         if arity == 2:
@@ -176,6 +189,9 @@ def _run(program: list[tuple[int, Any]], t: Floats) -> Any:
             stack[-1] = step(stack[-1], last)
         elif arity == 1:
             stack[-1] = step(stack[-1])
+        elif arity == 3:
+            last, middle = stack.pop(), stack.pop()
+            stack[-1] = step(stack[-1], middle, last)
         else:
             stack.append(t if arity else step)
     (result,) = stack
@@ -190,6 +206,9 @@ _Dual = tuple[Any, Any]
 def _chain_rule(operation: Operation, operands: tuple[_Dual, ...]) -> _Dual:
     values = [value for value, _ in operands]
     result = operation.value(*values)
+    if operation is IF:  # the branch that is not taken may have no slope, nor a finite one
+        condition, *slopes = values[0], *(0.0 if s is None else s for _, s in operands[1:])
+        return result, np.where(condition, *slopes)
     terms = [
         partial(result, *values) * slope
         for partial, (_, slope) in zip(operation.partials, operands, strict=True)

@@ -18,6 +18,7 @@ import numpy as np
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.batch_evaluation import BatchEvaluator
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.singular_points import complete, singular_points
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns
 
@@ -96,9 +97,42 @@ class CurveBatch:
                 f"{self.message_prefix(index)}the range of t must be finite and ascending, "
                 f"not {self.first[index]} to {self.last[index]}"
             )
+        if not all(map(attrgetter("always_defined"), self.curves)):
+            self.curves = [self._complete(*each) for each in enumerate(self.curves)]
+        # The last position that was not finite: index of the curve, t.
+        self._undefined: tuple[int, float] | None = None
         self._evaluator = BatchEvaluator(self.curves)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
+
+    def _complete(self, index: int, curve: Curve, also: Iterable[float] = ()) -> Curve:
+        try:
+            return complete(curve, also)
+        except CurveError as error:
+            message = f"{self.message_prefix(index)}{error}"
+            raise CurveError(message, axis=error.axis, hint=error.hint) from None
+
+    def complete_undefined(self) -> bool:
+        """Complete the curve that was last found to have no point at a parameter.
+
+        Returns
+        -------
+        bool
+            True if that made it another curve, so that trying again has a sense.
+
+        Raises
+        ------
+        CurveError
+            If it has no limit there.
+
+        """
+        if self._undefined is None:
+            return False
+        (index, t), self._undefined = self._undefined, None
+        before = self.curves[index]
+        self.curves[index] = after = self._complete(index, before, (t,))
+        self._evaluator = BatchEvaluator(self.curves)
+        return len(singular_points(after)) > len(singular_points(before))
 
     @property
     def thread_safe(self) -> bool:
@@ -136,6 +170,7 @@ class CurveBatch:
         row = int(np.argmin(np.abs(point) < MAX_COORDINATE))
         where = f"{self.message_prefix(index)}{AXES[row]} = {point[row]:.6g} at t = {t!r}"
         if not np.isfinite(point[row]):
+            self._undefined = index, t
             hint = "shorten the range of t so that it keeps away from this parameter"
             return CurveError(f"{where} is not finite", axis=AXES[row], hint=hint)
         hint = "shorten the range of t, or scale the curve down"

@@ -56,7 +56,12 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
     def one_batch(low: int, size: int) -> list[Sequence]:
         batch = CurveBatch(curves[low : low + size], low if len(curves) > 1 else None)
         ahead = (len(curves) - low) / len(batch.curves)
-        return _digitise_batch(batch, ahead, certified=certified)
+        while True:
+            try:
+                return _digitise_batch(batch, ahead, certified=certified)
+            except CurveError:  # of which a singular parameter that bounds do not show is one
+                if not batch.complete_undefined():
+                    raise
 
     size, batches = 16, 1
     while (begin := len(sequences)) < len(curves):

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.curves.singular_points import singular_points
 from voxdisplay.voxelization.curve_batch import AXES, CurveBatch, Samples
 from voxdisplay.voxelization.index_ranges import expand_ranges
 
@@ -116,6 +117,9 @@ def enclose_curves(batch: CurveBatch, samples: Samples) -> Boxes:
             doubts[index] = f"there may be no curve at all near t = {near!r}"
         on = _provable(curve[left], doubts)
         step, t_lo, t_hi = _subdivide(step[left][on], t_lo[left][on], t_hi[left][on], parts[on])
+    for index in doubts:
+        if points := singular_points(batch.curves[index]):
+            doubts[index] = f"{points[0]}; that rests on a numerical limit, which proves nothing"
     if not settled:
         nothing = np.empty(0)
         rows = np.empty((3, 0))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.singular_points import SingularPoint, singular_points
 from voxdisplay.voxelization import measure
 from voxdisplay.voxelization.certify import END_ERROR, Certificate
 
@@ -41,6 +42,11 @@ class Report:
         Whether it is proven that voxels are within 0.7072 of the curve (the first and the last
         within 0.8661), and all of the curve, however narrow a feature, within 2.5 in max norm of
         a voxel's centre; and that they are connected, without a jump.
+    undefined : tuple of SingularPoint
+        Parameters at which a coordinate has no value and the limits of both sides are drawn, by
+        ``.axis``, ``.t`` and ``.jump``.
+    jumps : tuple of float
+        Parameters at which the curve jumps: nothing is drawn across.
 
     """
 
@@ -53,6 +59,8 @@ class Report:
     contacts: int
     seconds: float
     certified: bool
+    undefined: tuple[SingularPoint, ...] = ()
+    jumps: tuple[float, ...] = ()
 
 
 @dataclass(eq=False, init=False)
@@ -117,6 +125,16 @@ class Sequence:
             apart[lost] = measure.distances(self.voxels[lost], self.curve, hints=hints)
         return apart
 
+    @property
+    def undefined(self) -> tuple[SingularPoint, ...]:
+        """Parameters at which a coordinate has no value and the limits of both sides are drawn."""
+        return singular_points(self.curve)
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Parameters at which the curve jumps: those of the voxels that begin further pieces."""
+        return tuple(self.t[self.starts[1:]].tolist())
+
     @cached_property
     def contact_pairs(self) -> NDArray[np.int64]:
         """Where the sequence touches itself, as index pairs: see `measure.contacts`."""
@@ -135,6 +153,8 @@ class Sequence:
             contacts=measure.count_contacts(self.voxels, closed=self.closed),
             seconds=self.seconds,
             certified=isinstance(self.proof, Certificate),
+            undefined=self.undefined,
+            jumps=self.jumps,
         )
 
 

@@ -81,8 +81,8 @@ def test_where_no_thread_may_begin_all_is_done_in_this_one(
 
 def test_what_is_done_when_the_program_ends_is_done_without_threads() -> None:
     program = (
-        "import atexit; from voxdisplay.compute import parallel; parallel.processors = lambda: 3; "
-        "atexit.register(lambda: print(*parallel.in_order(abs, [-3, 5, -7])))"
+        "import atexit; from voxdisplay.compute import parallel; parallel.cpu_count = lambda: 3; "
+        "atexit.register(lambda: print(*parallel.ordered_map(abs, [-3, 5, -7])))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],

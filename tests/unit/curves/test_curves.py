@@ -353,7 +353,7 @@ class TestParametric:
         with pytest.raises(CurveError, match="unknown function 'sine'") as caught:
             Parametric("t", "sine(t)", "t", t=(0, 1))
         assert caught.value.axis == "y"
-        assert caught.value.hint == "did you mean 'sin'?"
+        assert caught.value.hint == "write 'sin'"
         with pytest.raises(CurveError, match=r"dz: .* not finite") as caught:
             Parametric("t", "t", "t", t=(0, 1), dz="9**9**9")
         assert caught.value.axis == "z"

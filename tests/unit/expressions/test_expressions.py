@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from functions_in_numpy import IN_NUMPY
 
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.operations import FUNCTIONS
@@ -46,14 +47,13 @@ def test_constant_expressions_mean_what_they_mean_in_python(text: str, value: fl
     assert constant(text) == pytest.approx(value, rel=1e-15)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", sorted(FUNCTIONS.keys() - {"if"}))
 def test_every_function_of_t_agrees_with_numpy(name: str) -> None:
-    numpys = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
-    numpys |= {"min": "minimum", "max": "maximum"}
-    function = getattr(np, numpys.get(name, name))
+    function = IN_NUMPY[name]
     arguments = (T / 3, 0.3 + 0 * T)[: FUNCTIONS[name].arity]
     text = f"{name}({', '.join(('t/3', '0.3')[: FUNCTIONS[name].arity])})"
-    np.testing.assert_array_equal(parse(text).value(T), function(*arguments))
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(parse(text).value(T), function(*arguments))
 
 
 def test_values_have_the_shape_of_t() -> None:
