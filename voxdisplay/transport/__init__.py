@@ -43,7 +43,7 @@ def open_transport(port: str, *, baud: int = 115200, reset: bool = True) -> Tran
     """
     match = re.match(r"([a-z][a-z0-9+-]+):", port, re.IGNORECASE)
     kind = match[1].lower() if match else ""
-    if kind == "tcp":
+    if kind == "tcp" or (kind == "socket" and "?" not in port):  # pyserial's has options
         from voxdisplay.transport.tcp import TcpTransport  # noqa: PLC0415 - only what is needed
 
         return TcpTransport(port)

@@ -19,49 +19,11 @@ import serial
 from serial import rfc2217
 
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS
+from voxdisplay.transport.telnet import TelnetDecoder
 
 _READ_BYTES: Final = 1 << 16
 # More is not taken from the server until some of it is read, so that it waits as a tty would.
 _MAX_BUFFERED_BYTES: Final = 1 << 20
-
-_IAC, _SB, _SE = 0xFF, 0xFA, 0xF0
-_WITH_OPTION = range(0xFB, 0xFF)  # WILL, WONT, DO, DONT
-
-
-class TelnetDecoder:
-    """Incremental separation of a telnet stream into data and commands."""
-
-    def __init__(self) -> None:
-        self._escaped = False  # the last byte was IAC
-        self._option = False  # the next byte is the option of a command
-        self._within = False  # between IAC SB and IAC SE
-
-    def feed(self, data: bytes) -> tuple[bytes, bytes]:
-        """Return the data, unescaped, and the commands as they came."""
-        plain, commands = bytearray(), bytearray()
-        at = 0
-        while at < len(data):
-            byte = data[at]
-            if self._option:
-                commands.append(byte)
-                self._option = False
-                at += 1
-            elif self._escaped:
-                self._escaped = False
-                at += 1
-                if byte == _IAC and not self._within:
-                    plain.append(byte)
-                elif byte != _SE or self._within:  # an end without a beginning ends the reader
-                    commands += bytes((_IAC, byte))
-                    self._option = byte in _WITH_OPTION
-                    self._within = (self._within or byte == _SB) and byte != _SE
-            else:
-                end = data.find(_IAC, at)
-                self._escaped = end >= 0
-                end = end if end >= 0 else len(data)
-                (commands if self._within else plain).extend(data[at:end])
-                at = end + 1
-        return bytes(plain), bytes(commands)
 
 
 class _CommandSocket:

@@ -1,4 +1,7 @@
-"""``tcp://host:port``: byte pipe over a TCP connection. Knows no packet."""
+"""``tcp://host:port``, ``socket://host:port``: byte pipe over a TCP connection. Knows no packet.
+
+Whether a server of serial lines speaks telnet there is found out from what it begins with.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from urllib.parse import urlsplit
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
+from voxdisplay.transport.telnet import TelnetDetector
 
 _READ_BYTES = 1 << 16
 _CONNECT_S = 5.0
@@ -21,7 +25,7 @@ class TcpTransport:
     Parameters
     ----------
     port : str
-        ``tcp://host:port``.
+        ``tcp://host:port`` or ``socket://host:port``.
 
     Raises
     ------
@@ -32,6 +36,7 @@ class TcpTransport:
 
     def __init__(self, port: str) -> None:
         self.port = port
+        self._telnet = TelnetDetector()
         try:
             url = urlsplit(port)
             host, number = url.hostname, url.port
@@ -64,20 +69,20 @@ class TcpTransport:
             raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
         if not data:
             raise TransportClosed(f"{self.port} was closed by the device")
-        return data
+        return self._telnet.received(data)
 
     def write(self, data: bytes, timeout_s: float) -> None:
         """See `Transport.write`."""
         deadline_s = time.monotonic() + timeout_s
-        view = memoryview(data)
+        view = memoryview(self._telnet.escaped(data))
+        size = len(view)
         while view:
             try:
                 self._socket.settimeout(max(deadline_s - time.monotonic(), 1e-3))
                 view = view[self._socket.send(view) :]
             except TimeoutError as error:
                 raise TransportTimeout(
-                    f"{self.port} took only {len(data) - len(view)} of {len(data)} bytes "
-                    f"in {timeout_s:.1f} s"
+                    f"{self.port} took only {size - len(view)} of {size} bytes in {timeout_s:.1f} s"
                 ) from error
             except LIBRARY_ERRORS as error:
                 raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error

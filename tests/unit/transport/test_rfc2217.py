@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from voxdisplay.transport import rfc2217
-from voxdisplay.transport.rfc2217 import TelnetDecoder
+from voxdisplay.transport.telnet import TelnetDecoder
 
 IAC = b"\xff"
 # A few bytes, of which telnet's are many: each means something else after another.
