@@ -8,7 +8,6 @@ does not read.
 import contextlib
 import ipaddress
 import os
-import select
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Final
 from firmware_sim.baud_pacing import PacedWire
 from firmware_sim.device_on_line import Wire
 from firmware_sim.in_process import InProcessPort, open_in_process
+from firmware_sim.readiness import wait_ready
 
 __all__ = [
     "InProcessPort",
@@ -60,7 +60,7 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
                     readers.append(line)
                 out += wire.transmit()  # last: a tick may have come with each call before
             writers = [line] if out else []
-            readable, writable, _ = select.select(readers, writers, [], _pause(wire, out))
+            readable, writable = wait_ready(readers, writers, _pause(wire, out))
             if stop in readable:
                 return True
             if writable:
@@ -195,7 +195,7 @@ def serve_tcp(wire: Wire | PacedWire, listener: socket.socket, stop: int) -> Non
     """
     stopped = False
     while not stopped:
-        readable, _, _ = select.select([listener.fileno(), stop], [], [])
+        readable, _ = wait_ready([listener.fileno(), stop])
         if stop in readable:
             return
         connection, _ = listener.accept()

@@ -30,7 +30,6 @@ twentieth of the time.
 """
 
 import contextlib
-import select
 import socket
 import struct
 import threading
@@ -40,6 +39,7 @@ from typing import Final, Self
 from firmware_sim import spec
 from firmware_sim.bench import Bench
 from firmware_sim.device import Device
+from firmware_sim.readiness import wait_ready
 
 _HOST: Final = "127.0.0.1"
 _QUESTION: Final = struct.Struct("<HI")
@@ -153,7 +153,7 @@ class Tap:
 
     def _wait(self, one: socket.socket) -> list[socket.socket]:
         """Wait for a socket or the bell; return the socket if it has something."""
-        readable, _, _ = select.select([self._bell, one], [], [])
+        readable, _ = wait_ready([self._bell, one])
         if self._bell in readable:
             self._bell.recv(64)
             readable.remove(self._bell)

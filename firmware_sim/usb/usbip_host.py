@@ -6,12 +6,12 @@ of what is transferred.
 
 import contextlib
 import errno
-import select
 import socket
 import threading
 import time
 from typing import Final
 
+from firmware_sim.readiness import wait_ready
 from firmware_sim.usb import usbip
 from firmware_sim.usb.descriptors import IN
 from firmware_sim.usb.device import ECONNRESET, ESHUTDOWN, Urb
@@ -165,7 +165,7 @@ class _Imported:
         self._reading = True
         self._changed.release()
         try:
-            ready, _, _ = select.select([self._socket], [], [], timeout_s)
+            ready, _ = wait_ready([self._socket], timeout_s=timeout_s)
             data = self._socket.recv(_CHUNK) if ready else None
         except (OSError, ValueError):  # closed, by the other side or another thread
             data = b""

@@ -6,10 +6,10 @@ is done, which is how a device holds its host back.
 """
 
 import contextlib
-import select
 import socket
 from typing import Final
 
+from firmware_sim.readiness import wait_ready
 from firmware_sim.usb import usbip
 from firmware_sim.usb.descriptors import IN
 from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, Urb, UsbDevice
@@ -206,7 +206,7 @@ class Server:
                 taking = [s for s, c in self._connections.items() if len(c.out) < CLOGGED]
                 sending = [s for s, c in self._connections.items() if c.out]
                 readers: list[socket.socket | int] = [listener, stop, *taking]
-                ready, _, _ = select.select(readers, sending, [], self.device.until_due())
+                ready, _ = wait_ready(readers, sending, self.device.until_due())
                 if stop in ready:
                     return
                 if listener in ready:

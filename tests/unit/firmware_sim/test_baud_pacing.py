@@ -2,11 +2,9 @@
 
 import contextlib
 import os
-import select
 import socket
 import threading
 import time
-from types import SimpleNamespace
 
 import pytest
 from simwire import ACK, CLEAR, COMMIT, INFO, PENDING, SHOWN, answers, data, hello, status
@@ -17,6 +15,7 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import Wire
 from firmware_sim.in_process import open_in_process
+from firmware_sim.readiness import wait_ready
 from firmware_sim.serve import serve_wire
 
 WAIT = 20
@@ -170,9 +169,9 @@ def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch
 
     def look(*arguments):
         looks.append(arguments[-1])
-        return select.select(*arguments)
+        return wait_ready(*arguments)
 
-    monkeypatch.setattr(serve, "select", SimpleNamespace(select=look))
+    monkeypatch.setattr(serve, "wait_ready", look)
     stop, stopper = os.pipe()
     pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
     pump.start()
