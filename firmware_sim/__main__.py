@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from firmware_sim.baud_pacing import PacedWire, paced
+from firmware_sim.baud_pacing import PacedDevice, with_baud
 from firmware_sim.bench import Bench
 from firmware_sim.config import (
     FEATURES,
@@ -27,11 +27,18 @@ from firmware_sim.config import (
     parse_size,
 )
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import write_npy
-from firmware_sim.serve import check_local, linked, listen, open_pty, serve_tcp, serve_wire
+from firmware_sim.serve import (
+    listen_tcp,
+    open_pty,
+    require_loopback,
+    serve_tcp,
+    serve_wire,
+    symbolic_link,
+)
 from firmware_sim.tap import Tap
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction, SerialFunction
@@ -89,9 +96,9 @@ def main(argv: list[str] | None = None) -> int:
         device = Device(config)
         if options.dump:
             _dump_swaps(device, options.dump)
-        with _signals() as stop:
-            wire = Wire(device, options.fault, options.seed)
-            _serve(paced(wire, options.baud), options, stop)
+        with _stop_on_signal() as stop:
+            wire = DeviceOnLine(device, options.fault, options.seed)
+            _serve(with_baud(wire, options.baud), options, stop)
     except (ValueError, OSError) as error:
         parser.error(str(error))
     return 0
@@ -244,10 +251,10 @@ def _dump_swaps(device: Device, path: Path) -> None:
         except OSError as error:
             sys.stderr.write(f"voxdisplay-sim: {error}: this picture is not dumped\n")
 
-    _also(device, dump)
+    _on_swap_also(device, dump)
 
 
-def _also(device: Device, act: Callable[[], object]) -> None:
+def _on_swap_also(device: Device, act: Callable[[], object]) -> None:
     """Do something more at each swap."""
     before = device.on_swap
 
@@ -259,7 +266,7 @@ def _also(device: Device, act: Callable[[], object]) -> None:
 
 
 @contextlib.contextmanager
-def _signals() -> Iterator[int]:
+def _stop_on_signal() -> Iterator[int]:
     """Turn SIGINT and SIGTERM into a file descriptor that becomes readable."""
     stop, stopper = os.pipe()
     names = (signal.SIGINT, signal.SIGTERM)
@@ -273,36 +280,36 @@ def _signals() -> Iterator[int]:
         os.close(stopper)
 
 
-def _serve(wire: Wire | PacedWire, options: argparse.Namespace, stop: int) -> None:
+def _serve(wire: DeviceOnLine | PacedDevice, options: argparse.Namespace, stop: int) -> None:
     with contextlib.ExitStack() as stack:
-        port, serve = _carrier(wire, options, stack)
+        port, serve = _open_carrier(wire, options, stack)
         config = wire.device.config
         place = {"port": port, "size": str(config.shape), "format": config.pixel_format}
         if options.view:
-            check_local(options.view[0], remote=options.allow_remote)
+            require_loopback(options.view[0], remote=options.allow_remote)
             tap = stack.enter_context(Tap(wire.device))
-            _also(wire.device, tap.notice)
-            place["view"] = stack.enter_context(viewer(tap, _address(options.view), port))
+            _on_swap_also(wire.device, tap.notify_swap)
+            place["view"] = stack.enter_context(viewer(tap, _format_address(options.view), port))
         _announce(place)
         serve(stop)
 
 
-def _carrier(
-    wire: Wire | PacedWire, options: argparse.Namespace, stack: contextlib.ExitStack
+def _open_carrier(
+    wire: DeviceOnLine | PacedDevice, options: argparse.Namespace, stack: contextlib.ExitStack
 ) -> tuple[str, Callable[[int], object]]:
     """Open what carries the bytes; return its port, and what serves it until told to stop."""
     if options.tcp:
-        listener = stack.enter_context(listen(*options.tcp, remote=options.allow_remote))
-        port = f"tcp://{_address(listener.getsockname())}"
+        listener = stack.enter_context(listen_tcp(*options.tcp, remote=options.allow_remote))
+        port = f"tcp://{_format_address(listener.getsockname())}"
         return port, lambda stop: serve_tcp(wire, listener, stop)
     if options.usbip:
         kind = SerialFunction if options.usb_class == "cdc-acm" else DisplayFunction
-        listener = stack.enter_context(listen(*options.usbip, remote=options.allow_remote))
-        port = f"usbip://{_address(listener.getsockname())}"
+        listener = stack.enter_context(listen_tcp(*options.usbip, remote=options.allow_remote))
+        port = f"usbip://{_format_address(listener.getsockname())}"
         return port, lambda stop: serve_usbip(UsbDevice(kind(wire)), listener, stop)
     line, port = stack.enter_context(open_pty())
     if options.link:
-        stack.enter_context(linked(options.link, port))
+        stack.enter_context(symbolic_link(options.link, port))
     return port, lambda stop: serve_wire(wire, line, stop)
 
 
@@ -311,7 +318,7 @@ def _announce(place: dict[str, str]) -> None:
     sys.stdout.flush()
 
 
-def _address(place: tuple[Any, ...]) -> str:
+def _format_address(place: tuple[Any, ...]) -> str:
     """Write an address as `_parse_address` reads it."""
     host, port = place[:2]
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

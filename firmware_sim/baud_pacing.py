@@ -8,15 +8,15 @@ from collections.abc import Callable
 from typing import Final
 
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 
-_BITS: Final = 10  # of a byte: a start bit, eight, a stop bit
-_LOOK_S: Final = 0.001  # who waits for bytes looks this often, or when the last one has arrived
-_LEAST: Final = 4096  # bytes that wait before the line, as before a real one,
-_WAIT_S: Final = 0.05  # or what it carries in this time, if that is more
+_BITS_PER_BYTE: Final = 10  # of a byte: a start bit, eight, a stop bit
+_POLL_S: Final = 0.001  # who waits for bytes looks this often, or when the last one has arrived
+_MIN_QUEUE_BYTES: Final = 4096  # bytes that wait before the line, as before a real one,
+_QUEUE_S: Final = 0.05  # or what it carries in this time, if that is more
 
 
-class Pace:
+class PacedDirection:
     """Bytes on their way along one direction of a line.
 
     Parameters
@@ -28,14 +28,14 @@ class Pace:
     """
 
     def __init__(self, baud: int, clock: Callable[[], float]) -> None:
-        self._byte_s = _BITS / baud
-        self._room = max(_LEAST, int(baud / _BITS * _WAIT_S))
+        self._byte_s = _BITS_PER_BYTE / baud
+        self._room = max(_MIN_QUEUE_BYTES, int(baud / _BITS_PER_BYTE * _QUEUE_S))
         self._clock = clock
         self._queue = bytearray()
         self._began = 0.0  # when the first byte of the queue began to be sent
 
     @property
-    def full(self) -> bool:
+    def is_full(self) -> bool:
         """Whether so many bytes wait that no more should be handed over."""
         return len(self._queue) >= self._room
 
@@ -55,11 +55,11 @@ class Pace:
         self._began += count * self._byte_s  # and not now: what is late is made up for
         return data
 
-    def until_due(self) -> float | None:
+    def next_event_s(self) -> float | None:
         """Return the seconds until it is worth looking again; None if nothing is on its way."""
         if not self._queue:
             return None
-        count = min(len(self._queue), max(1, int(_LOOK_S / self._byte_s)))
+        count = min(len(self._queue), max(1, int(_POLL_S / self._byte_s)))
         return max(0.0, self._began + count * self._byte_s - self._clock())
 
     def clear(self) -> None:
@@ -67,8 +67,8 @@ class Pace:
         self._queue.clear()
 
 
-class PacedWire:
-    """A wire whose bytes take their time, each way; it has the face of a `Wire`.
+class PacedDevice:
+    """A wire whose bytes take their time, each way; it has the face of a `DeviceOnLine`.
 
     Parameters
     ----------
@@ -85,20 +85,22 @@ class PacedWire:
         The device.
     """
 
-    def __init__(self, wire: Wire, baud: int, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, wire: DeviceOnLine, baud: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._wire = wire
-        self._down = Pace(baud, clock)
-        self._up = Pace(baud, clock)
+        self._down = PacedDirection(baud, clock)
+        self._up = PacedDirection(baud, clock)
 
     @property
     def device(self) -> Device:
         """The device."""
         return self._wire.device
 
-    def takes(self) -> bool:
+    def accepts_data(self) -> bool:
         """Tell whether the line takes bytes from the host: not if too many wait before it."""
         self.advance()
-        return not self._down.full and self._wire.takes()
+        return not self._down.is_full and self._wire.accepts_data()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host; the device has them when the line has carried them."""
@@ -119,15 +121,15 @@ class PacedWire:
             self._wire.advance()
 
     def _load(self) -> None:
-        if not self._up.full:
+        if not self._up.is_full:
             self._up.put(self._wire.transmit())
 
-    def until_tick(self) -> float | None:
+    def next_event_s(self) -> float | None:
         """Return the seconds until anything happens by itself; None if nothing is in sight."""
         self.advance()
-        tick = self._wire.until_tick()
+        tick = self._wire.next_event_s()
         self._load()  # what the device has said since it was asked last is on its way, too
-        times = (tick, self._down.until_due(), self._up.until_due())
+        times = (tick, self._down.next_event_s(), self._up.next_event_s())
         return min((seconds for seconds in times if seconds is not None), default=None)
 
     def disconnect(self) -> None:
@@ -137,6 +139,6 @@ class PacedWire:
         self._wire.disconnect()
 
 
-def paced(wire: Wire, baud: int) -> Wire | PacedWire:
+def with_baud(wire: DeviceOnLine, baud: int) -> DeviceOnLine | PacedDevice:
     """Give a wire its pace; with a rate of 0 it stays as it is, and its bytes take no time."""
-    return PacedWire(wire, baud) if baud else wire
+    return PacedDevice(wire, baud) if baud else wire

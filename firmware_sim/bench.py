@@ -93,7 +93,7 @@ class Bench:
         """Return what is on display; any thread may ask."""
         device = self._device
         has_palette = device.config.pixels.code == spec.FORMAT_INDEX8
-        with device.showing:
+        with device.page_lock:
             front, session = device.memory.front, device.session
             return Snapshot(
                 bytes(front.pixels),
@@ -110,11 +110,11 @@ class Bench:
         """Return what has happened since the start of the device."""
         device = self._device
         return Counters(
-            {_TYPES.get(kind, str(kind)): n for kind, n in sorted(device.taken.items())},
-            {_CODES[code]: n for code, n in sorted(device.refused.items())},
+            {_TYPES.get(kind, str(kind)): n for kind, n in sorted(device.taken_by_type.items())},
+            {_CODES[code]: n for code, n in sorted(device.errors_by_code.items())},
             device.damaged,
             device.swaps,
-            device.refused.get(spec.CODE_OVERRUN, 0),
+            device.errors_by_code.get(spec.CODE_OVERRUN, 0),
         )
 
     def power_cycle(self) -> None:

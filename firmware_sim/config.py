@@ -11,7 +11,7 @@ from typing import Final
 from firmware_sim import spec
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, PixelFormat
-from firmware_sim.sender import wire_size
+from firmware_sim.sender import max_wire_bytes
 
 FEATURES: Final = {
     "line": spec.FEATURE_LINE,
@@ -82,7 +82,7 @@ class Config:
     firmware: str = "1.0"
     serial: str = ""
     features: frozenset[str] | None = None
-    silent: int = 0
+    max_silent_acks: int = 0
     lies: frozenset[str] = frozenset()
     shape: Grid = field(init=False, repr=False, compare=False)
     pixels: PixelFormat = field(init=False, repr=False, compare=False)
@@ -107,9 +107,9 @@ class Config:
         _check_names("lie", self.lies, LIES)
         _check("refresh", self.refresh, 0, _U32)
         _check("max_payload", self.max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
-        longest = wire_size(self.max_payload + spec.LIMIT_OVERHEAD)
+        longest = max_wire_bytes(self.max_payload + spec.LIMIT_OVERHEAD)
         _check("rx_buffer", self.rx_buffer, spec.LIMIT_RESERVE + longest, _U32)
-        _check("silent", self.silent, 0, spec.LIMIT_MAX_SILENT)
+        _check("max_silent_acks", self.max_silent_acks, 0, spec.LIMIT_MAX_SILENT)
         if self.boot is not None:
             _check("boot", self.boot, 0, 0xFFFF)
         for name, text in (

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 from firmware_sim import spec
 from firmware_sim.config import Config
-from firmware_sim.info import announce
+from firmware_sim.info import make_announcement
 from firmware_sim.memory import Memory
-from firmware_sim.op_decoder import Unpacker
-from firmware_sim.packet_error import Refusal
-from firmware_sim.page_encoder import pack
+from firmware_sim.op_decoder import OpDecoder
+from firmware_sim.packet_error import PacketError
+from firmware_sim.page_encoder import encode_page
 from firmware_sim.receiver import Receiver
-from firmware_sim.sender import send
-from firmware_sim.session import Session, State, Verdict
+from firmware_sim.sender import encode_packet
+from firmware_sim.session import BackPage, DataAction, Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,22 +67,22 @@ class Device:
         self.on_swap: Callable[[], object] = lambda: None
         # What it does, which is what it announces unless it lies.
         self._features = 0 if "features" in config.lies else config.feature_bits
-        self._unpacker = Unpacker(config.shape, config.pixels, self._features)
-        self.showing = threading.Lock()
+        self._unpacker = OpDecoder(config.shape, config.pixels, self._features)
+        self.page_lock = threading.Lock()
         self._start()
 
     def _start(self) -> None:
-        self._announcement = announce(self.config, self.boot)
+        self._announcement = make_announcement(self.config, self.boot)
         self.memory = Memory(self.config.shape, self.config.pixels)
-        self.taken: dict[int, int] = {}
-        self.refused: dict[int, int] = {}
+        self.taken_by_type: dict[int, int] = {}
+        self.errors_by_code: dict[int, int] = {}
         self.damaged = 0
         self.swaps = 0
         self.disconnect()
 
     def power_cycle(self) -> None:
         """Start again: another boot id, no session, dark pages."""
-        with self.showing:
+        with self.page_lock:
             self.boot = (self.boot + 1) % 0x10000
             self._start()
         self.on_swap()
@@ -92,11 +92,11 @@ class Device:
         self.session: Session | None = None
         self._receiver = Receiver(self.config.max_payload + spec.LIMIT_OVERHEAD)
         self._ring = bytearray()  # whole segments and a begun one that have not been read
-        self._waiting = b""  # the packet that waits for the tick (6, point 6)
-        self._waiting_size = 0  # its bytes on the wire, which still stand in the ring
-        self._lost = False  # bytes were lost, and the ring has not been read since
-        self._torn = False  # the stream stands in a segment whose begin was lost
-        self._unanswered = 0  # DATA packets whose ACK was left out
+        self._deferred = b""  # the packet that waits for the tick (6, point 6)
+        self._deferred_bytes = 0  # its bytes on the wire, which still stand in the ring
+        self._overrun = False  # bytes were lost, and the ring has not been read since
+        self._skip_to_delimiter = False  # the stream stands in a segment whose begin was lost
+        self._unacknowledged = 0  # DATA packets whose ACK was left out
         self._out = bytearray()
 
     # The wire
@@ -104,21 +104,21 @@ class Device:
     @property
     def pending(self) -> bool:
         """Whether a whole frame waits for its tick."""
-        return self.session is not None and self.session.state is State.PENDING
+        return self.session is not None and self.session.state is BackPage.PENDING
 
     @property
-    def room(self) -> int:
+    def free_bytes(self) -> int:
         """How many bytes the receive ring has room for: what a carrier may hand over."""
-        return self.config.rx_buffer - self._waiting_size - len(self._ring)
+        return self.config.rx_buffer - self._deferred_bytes - len(self._ring)
 
     @property
-    def _stopped(self) -> bool:
+    def _blocked(self) -> bool:
         """Whether the device takes no packet for now.
 
         Either one waits for the tick, or the host does not read the answers. It stops between
         two segments, so that the ring begins with a whole one.
         """
-        return bool(self._waiting) or (len(self._out) >= TX_BUFFER and self._receiver.idle)
+        return bool(self._deferred) or (len(self._out) >= TX_BUFFER and self._receiver.at_boundary)
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the carrier.
@@ -130,14 +130,14 @@ class Device:
         """
         if not data:
             return
-        if self._lost:
-            self._torn = not data.endswith(b"\0")
+        if self._overrun:
+            self._skip_to_delimiter = not data.endswith(b"\0")
             return
         at = 0
-        if self._torn:
+        if self._skip_to_delimiter:
             at = data.find(0) + 1
-            self._torn = not at
-            if self._torn:
+            self._skip_to_delimiter = not at
+            if self._skip_to_delimiter:
                 return
         at = self._take(data, at)
         self._store(data[at:])
@@ -145,7 +145,7 @@ class Device:
     def transmit(self) -> bytes:
         """Return all that waits to be sent."""
         out, self._out = self._out, bytearray()
-        if (self._ring or self._lost) and not self._stopped:
+        if (self._ring or self._overrun) and not self._blocked:
             self._drain()
         return bytes(out)
 
@@ -155,27 +155,27 @@ class Device:
             return
         self._swap(self.session)
         self._acknowledge()
-        if self._waiting:
-            packet, self._waiting, self._waiting_size = self._waiting, b"", 0
+        if self._deferred:
+            packet, self._deferred, self._deferred_bytes = self._deferred, b"", 0
             self._dispatch(packet)
             self._drain()
 
     def _drain(self) -> None:
         """Go on with what stands in the ring."""
         ring, self._ring = self._ring, bytearray()
-        self._lost = False
+        self._overrun = False
         self._ring += ring[self._take(ring, 0) :]
 
     def _take(self, data: bytes | bytearray, at: int) -> int:
         """Take packets until the data ends or the device stops; return where that is."""
         receiver = self._receiver
-        while at < len(data) and not self._stopped:
+        while at < len(data) and not self._blocked:
             at = receiver.read(data, at)
             if receiver.packet is not None:
                 self._dispatch(receiver.packet)
             elif receiver.damaged:
-                self._damage()
-        if self._unanswered:
+                self._count_damaged()
+        if self._unacknowledged:
             self._acknowledge()
         return at
 
@@ -184,23 +184,23 @@ class Device:
         # A 00 behind a 00 says nothing and needs no room: section 9.2 lets the host send it.
         ends = self._ring.endswith(b"\0") if self._ring else True
         data = re.sub(rb"\0+", b"\0", data.lstrip(b"\0") if ends else data)
-        room = self.room
+        room = self.free_bytes
         self._ring += data[:room]
         if len(data) <= room:
             return
         # The segment that was cut is a damaged one: nothing of it stays.
         del self._ring[self._ring.rfind(0) + 1 :]
-        self._lost = True
-        self._torn = not data.endswith(b"\0")
-        self._refuse(0, 0, Refusal(spec.CODE_OVERRUN, 0, "more bytes than credit"))
-        self._damage()
+        self._overrun = True
+        self._skip_to_delimiter = not data.endswith(b"\0")
+        self._send_error(0, 0, PacketError(spec.CODE_OVERRUN, 0, "more bytes than credit"))
+        self._count_damaged()
 
-    def _damage(self) -> None:
+    def _count_damaged(self) -> None:
         self.damaged += 1
         self._acknowledge()
 
     def _send(self, kind: int, flags: int, seq: int, frame: int, payload: bytes) -> None:
-        self._out += send(kind, flags, seq, frame, payload)
+        self._out += encode_packet(kind, flags, seq, frame, payload)
 
     # Packets
 
@@ -209,24 +209,24 @@ class Device:
         kind = packet[0] >> 4
         session = self.session
         if session and kind == spec.TYPE_DATA and session.must_wait(packet[1], packet[2]):
-            self._waiting = packet
-            self._waiting_size = self._receiver.size + 1
+            self._deferred = packet
+            self._deferred_bytes = self._receiver.size + 1
             return
-        self.taken[kind] = self.taken.get(kind, 0) + 1
+        self.taken_by_type[kind] = self.taken_by_type.get(kind, 0) + 1
         try:
-            self._answer(packet)
-        except Refusal as refusal:
-            self._refuse(packet[1], packet[2], refusal)
+            self._process(packet)
+        except PacketError as refusal:
+            self._send_error(packet[1], packet[2], refusal)
             if kind == spec.TYPE_DATA:
                 self.session = None
 
-    def _answer(self, packet: bytes) -> None:
+    def _process(self, packet: bytes) -> None:
         kind, flags = packet[0] >> 4, packet[0] & 15
         seq, frame = packet[1:3]
         if kind == spec.TYPE_HELLO:
             self._hello(packet)
         elif not self.session:
-            raise Refusal(spec.CODE_NO_SESSION, 0, "no session is open")
+            raise PacketError(spec.CODE_NO_SESSION, 0, "no session is open")
         elif kind == spec.TYPE_DATA:
             self._data(self.session, packet, flags, seq, frame)
         elif kind == spec.TYPE_STATUS:
@@ -234,45 +234,45 @@ class Device:
         elif kind == spec.TYPE_READ and self._features >> spec.FEATURE_READ & 1:
             self._read(packet, flags, seq, frame)
         else:
-            raise Refusal(spec.CODE_TYPE, 0, f"type {kind} is not one of a host's")
+            raise PacketError(spec.CODE_TYPE, 0, f"type {kind} is not one of a host's")
 
-    def _refuse(self, seq: int, frame: int, refusal: Refusal) -> None:
-        self.refused[refusal.code] = self.refused.get(refusal.code, 0) + 1
+    def _send_error(self, seq: int, frame: int, refusal: PacketError) -> None:
+        self.errors_by_code[refusal.code] = self.errors_by_code.get(refusal.code, 0) + 1
         number = self.session.number if self.session else 0
         error = _ERROR.pack(refusal.code, number, refusal.offset)
         self._send(spec.TYPE_ERROR, 0, seq, frame, error + refusal.text.encode())
 
     def _hello(self, packet: bytes) -> None:
         if len(packet) < 3 + _HELLO.size:
-            raise Refusal(spec.CODE_LENGTH, 0, "a HELLO has 5 bytes of payload")
+            raise PacketError(spec.CODE_LENGTH, 0, "a HELLO has 5 bytes of payload")
         major, number, _minor, _reserved = _HELLO.unpack_from(packet, 3)
         if not number:
-            raise Refusal(spec.CODE_FIELD, 4, "a session has a number other than 0")
+            raise PacketError(spec.CODE_FIELD, 4, "a session has a number other than 0")
         if major == spec.VERSION_MAJOR:
             self.session = Session(number)
-            self._unanswered = 0
+            self._unacknowledged = 0
         self._send(spec.TYPE_INFO, 0, 0, 0, self._announcement.payload(number))
 
     def _data(self, session: Session, packet: bytes, flags: int, seq: int, frame: int) -> None:
         if flags & ~_DATA_FLAGS:
-            raise Refusal(spec.CODE_FIELD, 0, "a reserved flag of DATA is not 0")
-        verdict = session.judge(seq, frame, flags)
-        if verdict is Verdict.BEGIN:
-            session.begin(frame, flags)
-            self.memory.begin(dark=bool(flags & spec.DATA_FLAG_CLEAR))
-        if verdict in (Verdict.BEGIN, Verdict.APPLY):
+            raise PacketError(spec.CODE_FIELD, 0, "a reserved flag of DATA is not 0")
+        verdict = session.classify(seq, frame, flags)
+        if verdict is DataAction.BEGIN:
+            session.begin_frame(frame, flags)
+            self.memory.begin_frame(dark=bool(flags & spec.DATA_FLAG_CLEAR))
+        if verdict in (DataAction.BEGIN, DataAction.APPLY):
             self._unpacker.draw(packet, self.memory.back)
-            session.mark(seq, flags)
+            session.mark_received(seq, flags)
         session.last = seq
-        self._unanswered += 1
+        self._unacknowledged += 1
         if self.pending and not self.config.refresh:
             self._swap(session)
             self._acknowledge()
-        elif self._unanswered > self.config.silent:
+        elif self._unacknowledged > self.config.max_silent_acks:
             self._acknowledge()
 
     def _swap(self, session: Session) -> None:
-        with self.showing:
+        with self.page_lock:
             session.swap()
             self.memory.swap()
             self.swaps += 1
@@ -283,10 +283,10 @@ class Device:
         session = self.session
         if not session:
             return
-        self._unanswered = 0
+        self._unacknowledged = 0
         shown = session.shown is not None
         flags = spec.ACK_FLAG_SHOWN if shown else 0
-        if session.state is State.PENDING:
+        if session.state is BackPage.PENDING:
             flags |= spec.ACK_FLAG_PENDING
         if tag is not None:
             flags |= spec.ACK_FLAG_ASKED
@@ -303,22 +303,22 @@ class Device:
 
     def _status(self, packet: bytes, flags: int, seq: int, frame: int) -> None:
         if len(packet) > 3:
-            raise Refusal(spec.CODE_LENGTH, 0, "a STATUS has no payload")
+            raise PacketError(spec.CODE_LENGTH, 0, "a STATUS has no payload")
         _check_zero((flags, 0), (frame, 2))
         self._acknowledge(tag=seq)
 
     def _read(self, packet: bytes, flags: int, seq: int, frame: int) -> None:
         if len(packet) != 3 + _READ.size:
-            raise Refusal(spec.CODE_LENGTH, 0, f"a READ has {_READ.size} bytes of payload")
+            raise PacketError(spec.CODE_LENGTH, 0, f"a READ has {_READ.size} bytes of payload")
         reserved, start, count = _READ.unpack_from(packet, 3)
         _check_zero((flags & ~spec.READ_FLAG_BACK, 0), (frame, 2), (reserved, 3))
         if not count:
-            raise Refusal(spec.CODE_FIELD, 8, "a READ asks for one voxel at least")
+            raise PacketError(spec.CODE_FIELD, 8, "a READ asks for one voxel at least")
         if start + count > self.config.shape.volume:
-            raise Refusal(spec.CODE_OUTSIDE, 4, f"{count} voxels from {start} on")
+            raise PacketError(spec.CODE_OUTSIDE, 4, f"{count} voxels from {start} on")
         page = self.memory.back if flags & spec.READ_FLAG_BACK else self.memory.front
         room = self.config.max_payload - _PAGE.size
-        covered, ops = pack(page, self.config.pixels, start, count, room)
+        covered, ops = encode_page(page, self.config.pixels, start, count, room)
         shown = (self.session and self.session.shown) or 0
         self._send(spec.TYPE_PAGE, flags, seq, shown, _PAGE.pack(0, start, covered) + ops)
 
@@ -327,4 +327,4 @@ def _check_zero(*fields: tuple[int, int]) -> None:
     """Refuse the first reserved (value, offset) that is not 0."""
     for value, offset in fields:
         if value:
-            raise Refusal(spec.CODE_FIELD, offset, "a reserved flag or field is not 0")
+            raise PacketError(spec.CODE_FIELD, offset, "a reserved flag or field is not 0")

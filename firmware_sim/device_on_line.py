@@ -11,13 +11,13 @@ from typing import Final
 
 from firmware_sim.device import Device
 from firmware_sim.fault_types import Event
-from firmware_sim.faults import Line, Spec
+from firmware_sim.faults import FaultSpec, FaultyLine
 
-_BACKLOG: Final = 65_536  # with so many bytes on its way, a direction takes no more
-_LONG: Final = 3600.0  # seconds: longer than this nobody should wait without looking
+_MAX_BACKLOG_BYTES: Final = 65_536  # with so many bytes on its way, a direction takes no more
+_MAX_WAIT_S: Final = 3600.0  # seconds: longer than this nobody should wait without looking
 
 
-class Wire:
+class DeviceOnLine:
     """A device that runs.
 
     Parameters
@@ -45,47 +45,47 @@ class Wire:
     def __init__(
         self,
         device: Device,
-        faults: tuple[Spec, ...] = (),
+        faults: tuple[FaultSpec, ...] = (),
         seed: int = 0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.device = device
         self._unplugged = False
-        self._down = Line(faults, seed, "down")
-        self._up = Line(faults, seed, "up")
+        self._down = FaultyLine(faults, seed, "down")
+        self._up = FaultyLine(faults, seed, "up")
         self._clock = clock
         self._epoch = clock()
-        self._due: int | None = None  # number of the tick that a swap waits for
+        self._swap_tick: int | None = None  # number of the tick that a swap waits for
 
     def receive(self, data: bytes) -> None:
         """Carry bytes from the host to the device."""
         now = self._clock()
-        self._run(now)
+        self._run_until(now)
         self._down.send(now, data)
-        self._run(now)
+        self._run_until(now)
 
     def transmit(self) -> bytes:
         """Carry to the host what the device has sent, or as much of it as comes together."""
         now = self._clock()
-        self._run(now)
+        self._run_until(now)
         while self._up.due <= now:
             come = self._up.take(now)
             if isinstance(come, bytes):
-                self._settle(now)
+                self._collect_output(now)
                 return come
-            self._happen(come, now)
+            self._apply_event(come, now)
         return b""
 
-    def takes(self) -> bool:
+    def accepts_data(self) -> bool:
         """Tell whether the line takes bytes from the host: not if it stands still and is full."""
         self.advance()
-        return self._down.backlog < _BACKLOG
+        return self._down.backlog < _MAX_BACKLOG_BYTES
 
     def advance(self) -> None:
         """Let all happen that has come due."""
-        self._run(self._clock())
+        self._run_until(self._clock())
 
-    def until_tick(self) -> float | None:
+    def next_event_s(self) -> float | None:
         """Return in how many seconds to look again; None if nothing is in sight.
 
         Then comes a tick that swaps, or bytes arrive that the line has held back. What the device
@@ -93,65 +93,65 @@ class Wire:
         """
         now = self._clock()
         left = self._up.due <= now  # by who carries it, who need not be told again
-        self._run(now)
+        self._run_until(now)
         if self._up.due <= now and not left:
             return 0.0
         up = self._up.due if self._up.due > now else math.inf
-        at = min(self._tick_at(), self._down.due, up)
-        return min(at - now, _LONG) if at < math.inf else None
+        at = min(self._swap_time(), self._down.due, up)
+        return min(at - now, _MAX_WAIT_S) if at < math.inf else None
 
     def disconnect(self) -> None:
         """Break the connection: the session ends, and what is on its way is gone."""
         self.device.disconnect()
         self._down.connect()
         self._up.connect()
-        self._due = None
+        self._swap_tick = None
         self._unplugged = False
 
-    def _tick_at(self) -> float:
+    def _swap_time(self) -> float:
         """Return when the tick comes that a swap waits for; infinity if none does.
 
         Only those that swap matter. They are counted from the start, so that none drifts.
         """
-        if self._due is None:
+        if self._swap_tick is None:
             return math.inf
-        return self._epoch + self._due * 1000 / self.device.config.refresh
+        return self._epoch + self._swap_tick * 1000 / self.device.config.refresh
 
-    def _run(self, now: float) -> None:
+    def _run_until(self, now: float) -> None:
         while True:
-            self._check_plug()
-            tick, comes = self._tick_at(), self._down.due
+            self._check_plugged()
+            tick, comes = self._swap_time(), self._down.due
             if min(tick, comes) > now:
                 return
-            if self._due is not None and tick <= comes:
-                self._due += 1
+            if self._swap_tick is not None and tick <= comes:
+                self._swap_tick += 1
                 self.device.tick()
-                self._settle(tick)
+                self._collect_output(tick)
                 continue
             come = self._down.take(comes)
             if isinstance(come, bytes):
                 self.device.receive(come)
-                self._settle(comes)
+                self._collect_output(comes)
             else:
-                self._happen(come, comes)
+                self._apply_event(come, comes)
 
-    def _happen(self, event: Event, at: float) -> None:
+    def _apply_event(self, event: Event, at: float) -> None:
         if event is Event.REBOOT:
             self.device.power_cycle()
-            self._settle(at)
+            self._collect_output(at)
         elif event is Event.UNPLUG:
             self._unplugged = True
-            self._check_plug()
+            self._check_plugged()
 
-    def _check_plug(self) -> None:
+    def _check_plugged(self) -> None:
         if self._unplugged:
             raise ConnectionError("the device is unplugged")
 
-    def _settle(self, at: float) -> None:
+    def _collect_output(self, at: float) -> None:
         """Let the device send, and see whether a swap waits for a tick."""
-        while self._up.backlog < _BACKLOG and (data := self.device.transmit()):
+        while self._up.backlog < _MAX_BACKLOG_BYTES and (data := self.device.transmit()):
             self._up.send(at, data)
         if not self.device.pending:
-            self._due = None
-        elif self._due is None:  # the frame has just become whole
-            self._due = int((at - self._epoch) * self.device.config.refresh / 1000) + 1
+            self._swap_tick = None
+        elif self._swap_tick is None:  # the frame has just become whole
+            self._swap_tick = int((at - self._epoch) * self.device.config.refresh / 1000) + 1

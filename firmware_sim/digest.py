@@ -20,7 +20,7 @@ _ONES = int.from_bytes(array("Q", [1]) * _BLOCK, "little")
 _RAMP = int.from_bytes(array("Q", range(_BLOCK)), "little")
 
 
-def terms(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
+def mix_sum(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
     """Sum mix(index, value) over the voxels that are not dark.
 
     Parameters
@@ -41,11 +41,11 @@ def terms(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) ->
     for start in range(0, len(indices), _BLOCK):
         block = pixels[start * pixel_size : (start + _BLOCK) * pixel_size]
         if block.count(0) < len(block):
-            total += _block(indices[start : start + _BLOCK], block, pixel_size)
+            total += _block_sum(indices[start : start + _BLOCK], block, pixel_size)
     return total & _LOW
 
 
-def _block(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
+def _block_sum(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
     ones = _ones(len(indices))
     low = ones * _LOW
     spread = bytearray(len(indices) * _LANE // 8)

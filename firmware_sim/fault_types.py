@@ -14,9 +14,9 @@ from enum import Enum, auto
 from typing import Final, NamedTuple, Protocol
 
 from firmware_sim import spec
-from firmware_sim.sender import wire_size
+from firmware_sim.sender import max_wire_bytes
 
-_LONGEST: Final = wire_size(spec.LIMIT_MAX_PAYLOAD + spec.LIMIT_OVERHEAD)  # of a packet
+_LONGEST: Final = max_wire_bytes(spec.LIMIT_MAX_PAYLOAD + spec.LIMIT_OVERHEAD)  # of a packet
 
 
 class Event(Enum):
@@ -42,14 +42,14 @@ class Piece(NamedTuple):
     what: bytes | Event
 
 
-class Strokes(Protocol):
+class HitSelector(Protocol):
     """Which of a row of chances strike."""
 
-    def among(self, chances: int) -> list[int]:
+    def select(self, chances: int) -> list[int]:
         """Return which of the next chances strike."""
 
 
-class Random:
+class RandomHits:
     """Each chance strikes at a fixed rate.
 
     Parameters
@@ -72,7 +72,7 @@ class Random:
             return math.inf
         return math.log(1 - self._rng.random()) // math.log1p(-self._rate)
 
-    def among(self, chances: int) -> list[int]:
+    def select(self, chances: int) -> list[int]:
         """Return which of the next chances strike."""
         hits = []
         while self._next < chances:
@@ -82,7 +82,7 @@ class Random:
         return hits
 
 
-class Once:
+class SingleHit:
     """One chance strikes, and none after it.
 
     Parameters
@@ -94,7 +94,7 @@ class Once:
     def __init__(self, count: int) -> None:
         self._next: float = count - 1
 
-    def among(self, chances: int) -> list[int]:
+    def select(self, chances: int) -> list[int]:
         """Return which of the next chances strike."""
         hits = [int(self._next)] if self._next < chances else []
         self._next = math.inf if hits else self._next - chances
@@ -114,8 +114,8 @@ class Fault(ABC):
         Where chance comes from besides.
     """
 
-    def __init__(self, strokes: Strokes, seconds: float, rng: random.Random) -> None:
-        self._strokes = strokes
+    def __init__(self, strokes: HitSelector, seconds: float, rng: random.Random) -> None:
+        self._hits = strokes
         self._seconds = seconds
         self._rng = rng
         self.connect()
@@ -142,7 +142,7 @@ class Flip(Fault):
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes with some bits inverted."""
         changed = bytearray(data)
-        for hit in self._strokes.among(8 * len(data)):
+        for hit in self._hits.select(8 * len(data)):
             changed[hit >> 3] ^= 1 << (hit & 7)
         yield Piece(at, bytes(changed))
 
@@ -153,7 +153,7 @@ class Drop(Fault):
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes without some of them."""
         changed = bytearray(data)
-        for hit in reversed(self._strokes.among(len(data))):
+        for hit in reversed(self._hits.select(len(data))):
             del changed[hit]
         yield Piece(at, bytes(changed))
 
@@ -164,7 +164,7 @@ class Double(Fault):
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, some of them twice."""
         changed = bytearray(data)
-        for hit in reversed(self._strokes.among(len(data))):
+        for hit in reversed(self._hits.select(len(data))):
             changed.insert(hit, changed[hit])
         yield Piece(at, bytes(changed))
 
@@ -174,14 +174,14 @@ class Insert(Fault):
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, random ones between some of them."""
-        hits = self._strokes.among(len(data))
+        hits = self._hits.select(len(data))
         changed = bytearray(data)
         for hit, noise in reversed([(hit, self._rng.randrange(256)) for hit in hits]):
             changed.insert(hit, noise)
         yield Piece(at, bytes(changed))
 
 
-class _Between(Fault):
+class _EventFault(Fault):
     """Something happens behind bytes."""
 
     event: Event
@@ -189,26 +189,26 @@ class _Between(Fault):
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes and what happens between them."""
         begin = 0
-        for hit in self._strokes.among(len(data)):
+        for hit in self._hits.select(len(data)):
             yield Piece(at, data[begin : hit + 1])
             yield Piece(at, self.event)
             begin = hit + 1
         yield Piece(at, data[begin:])
 
 
-class Short(_Between):
+class Short(_EventFault):
     """Writes and reads take or give a part of what is offered: the rate is that of ends."""
 
     event = Event.CUT
 
 
-class Reboot(_Between):
+class Reboot(_EventFault):
     """The device starts again behind a byte: another boot id, no session, dark pages."""
 
     event = Event.REBOOT
 
 
-class Unplug(_Between):
+class Unplug(_EventFault):
     """The pipe ends behind a byte."""
 
     event = Event.UNPLUG
@@ -224,7 +224,7 @@ class Stall(Fault):
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, some later than they came."""
         begin = 0
-        for hit in self._strokes.among(len(data)):
+        for hit in self._hits.select(len(data)):
             self._free = max(self._free, at)
             yield Piece(self._free, data[begin:hit])
             self._free += self._seconds
@@ -232,7 +232,7 @@ class Stall(Fault):
         yield Piece(max(self._free, at), data[begin:])
 
 
-class _OfPackets(Fault):
+class _PacketFault(Fault):
     """Strikes packets: bytes up to and including a 00, which may stand alone."""
 
     def connect(self) -> None:
@@ -247,10 +247,10 @@ class _OfPackets(Fault):
             yield part, begins, ends
 
     def _strikes(self) -> bool:
-        return bool(self._strokes.among(1))
+        return bool(self._hits.select(1))
 
 
-class Lose(_OfPackets):
+class Lose(_PacketFault):
     """Loses packets."""
 
     def connect(self) -> None:
@@ -269,7 +269,7 @@ class Lose(_OfPackets):
         yield Piece(at, bytes(kept))
 
 
-class Delay(_OfPackets):
+class Delay(_PacketFault):
     """Holds packets back; those behind come no sooner, so that the order stays."""
 
     def connect(self) -> None:
@@ -285,7 +285,7 @@ class Delay(_OfPackets):
             yield Piece(max(self._free, at), part)
 
 
-class Reorder(_OfPackets):
+class Reorder(_PacketFault):
     """Exchanges a packet with the one behind it.
 
     protocol.md has the order of bytes from the pipe (9.3), so that such a line is outside of what

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim import fault_types
-from firmware_sim.fault_types import Event, Fault, Piece, Strokes
+from firmware_sim.fault_types import Event, Fault, HitSelector, Piece
 
 KINDS: Final[dict[str, type[Fault]]] = {
     "flip": fault_types.Flip,
@@ -28,13 +28,13 @@ KINDS: Final[dict[str, type[Fault]]] = {
     "unplug": fault_types.Unplug,
 }
 DIRECTIONS: Final = ("down", "up")  # to the device, and from it
-_TIMED: Final = ("delay", "stall")
-_EVENTS: Final = ("reboot", "unplug")
-_PART: Final = re.compile(r"(?:(\w+)\.)?(\w+)(?:[=:]([^@]*))?(?:@(.*))?")
+_WITH_DURATION: Final = ("delay", "stall")
+_AT_BYTE: Final = ("reboot", "unplug")
+_FAULT: Final = re.compile(r"(?:(\w+)\.)?(\w+)(?:[=:]([^@]*))?(?:@(.*))?")
 
 
 @dataclass(frozen=True)
-class Spec:
+class FaultSpec:
     """A fault as a text asks for it.
 
     Parameters
@@ -58,7 +58,7 @@ class Spec:
     after: int | None = None
 
 
-def parse_faults(text: str) -> tuple[Spec, ...]:
+def parse_faults(text: str) -> tuple[FaultSpec, ...]:
     """Read a list of faults such as ``flip=1e-5,down.drop=1e-6,stall=0.2@0.01,reboot@5000``.
 
     Parameters
@@ -82,8 +82,8 @@ def parse_faults(text: str) -> tuple[Spec, ...]:
     return tuple(_parse(part) for part in text.split(",") if part)
 
 
-def _parse(part: str) -> Spec:
-    match = _PART.fullmatch(part.strip())
+def _parse(part: str) -> FaultSpec:
+    match = _FAULT.fullmatch(part.strip())
     direction, kind, value, behind = match.groups() if match else (None, part, None, None)
     if kind not in KINDS:
         near = difflib.get_close_matches(kind, KINDS, 1)
@@ -91,26 +91,26 @@ def _parse(part: str) -> Spec:
         raise ValueError(f"fault {kind!r} is not known: {hint}there are {', '.join(KINDS)}")
     if direction not in (None, *DIRECTIONS):
         raise ValueError(f"fault {part!r}: write down. (to the device) or up. (from it) in front")
-    one_way = DIRECTIONS[:1] if kind in _EVENTS else DIRECTIONS
+    one_way = DIRECTIONS[:1] if kind in _AT_BYTE else DIRECTIONS
     directions = one_way if direction is None else (direction,)
-    if kind in _TIMED:
-        seconds, rate = _number(value), _number(behind)
+    if kind in _WITH_DURATION:
+        seconds, rate = _non_negative(value), _non_negative(behind)
         if seconds < math.inf and rate <= 1:
-            return Spec(kind, directions, rate, seconds)
+            return FaultSpec(kind, directions, rate, seconds)
         raise ValueError(
             f"fault {part!r}: write {kind}=SECONDS@RATE with a time and a rate from 0 to 1"
         )
-    if kind in _EVENTS and value is None and behind is not None and re.fullmatch("[0-9]+", behind):
+    if kind in _AT_BYTE and value is None and behind is not None and re.fullmatch("[0-9]+", behind):
         after = int(behind)
         if after:
-            return Spec(kind, directions, after=after)
-    if behind is None and _number(value) <= 1:
-        return Spec(kind, directions, _number(value))
-    also = f" or {kind}@BYTES with a number from 1 on" if kind in _EVENTS else ""
+            return FaultSpec(kind, directions, after=after)
+    if behind is None and _non_negative(value) <= 1:
+        return FaultSpec(kind, directions, _non_negative(value))
+    also = f" or {kind}@BYTES with a number from 1 on" if kind in _AT_BYTE else ""
     raise ValueError(f"fault {part!r}: write {kind}=RATE with a rate from 0 to 1{also}")
 
 
-def _number(text: str | None) -> float:
+def _non_negative(text: str | None) -> float:
     """Return a number from 0 on, infinity if it is none."""
     try:
         number = float(text or "")
@@ -119,7 +119,7 @@ def _number(text: str | None) -> float:
     return number if number >= 0 else math.inf
 
 
-class Line:
+class FaultyLine:
     """One direction of a line with its faults.
 
     Parameters
@@ -137,9 +137,9 @@ class Line:
         How many bytes are on their way.
     """
 
-    def __init__(self, faults: tuple[Spec, ...], seed: int, direction: str) -> None:
+    def __init__(self, faults: tuple[FaultSpec, ...], seed: int, direction: str) -> None:
         self._faults = [
-            _make(fault, f"{seed} {direction} {place} {fault.kind}")
+            _build(fault, f"{seed} {direction} {place} {fault.kind}")
             for place, fault in enumerate(faults)
             if direction in fault.directions
         ]
@@ -165,7 +165,7 @@ class Line:
         """
         pieces = [Piece(at, data)]
         for fault in self._faults:
-            pieces = [new for old in pieces for new in _through(fault, old)]
+            pieces = [new for old in pieces for new in _apply(fault, old)]
         for when, what in pieces:
             if what:
                 self._last = max(self._last, when)
@@ -198,16 +198,16 @@ class Line:
         return bytes(come)
 
 
-def _make(fault: Spec, seed: str) -> Fault:
-    strokes: Strokes = (
-        fault_types.Random(fault.rate, random.Random(seed))
+def _build(fault: FaultSpec, seed: str) -> Fault:
+    strokes: HitSelector = (
+        fault_types.RandomHits(fault.rate, random.Random(seed))
         if fault.after is None
-        else fault_types.Once(fault.after)
+        else fault_types.SingleHit(fault.after)
     )
     return KINDS[fault.kind](strokes, fault.seconds, random.Random(f"{seed} besides"))
 
 
-def _through(fault: Fault, piece: Piece) -> list[Piece]:
+def _apply(fault: Fault, piece: Piece) -> list[Piece]:
     """Return what becomes of a piece; what happens, happens."""
     if isinstance(piece.what, Event):
         return [piece]

@@ -62,7 +62,7 @@ class Grid:
     def __str__(self) -> str:
         return f"{self.nx}x{self.ny}x{self.nz}"
 
-    def holds(self, x: int, y: int, z: int) -> bool:
+    def contains(self, x: int, y: int, z: int) -> bool:
         """Tell whether a voxel, with coordinates from 0 on, is on the grid."""
         return x < self.nx and y < self.ny and z < self.nz
 
@@ -70,13 +70,13 @@ class Grid:
         """Return the index of a voxel on the grid."""
         return x + self.nx * (y + self.ny * z)
 
-    def place(self, index: int) -> tuple[int, int, int]:
+    def coordinates(self, index: int) -> tuple[int, int, int]:
         """Return the coordinates of the voxel with an index, x, y and z."""
         row, x = divmod(index, self.nx)
         z, y = divmod(row, self.ny)
         return x, y, z
 
-    def leaves(self, index: int, octant: int, moves: tuple[int, int, int]) -> bool:
+    def chain_leaves(self, index: int, octant: int, moves: tuple[int, int, int]) -> bool:
         """Tell whether a chain leaves the grid.
 
         All its steps go in one direction on each axis, so that its last voxel tells for all.
@@ -91,7 +91,7 @@ class Grid:
             How many steps move on the main axis, on the one after it, and on the third.
         """
         main = octant >> 3
-        start = self.place(index)
+        start = self.coordinates(index)
         for k, count in enumerate(moves):
             axis = (main + k) % 3
             end = start[axis] + (-count if octant >> axis & 1 else count)
@@ -99,7 +99,7 @@ class Grid:
                 return True
         return False
 
-    def steps(self, octant: int) -> tuple[int, int, int, int]:
+    def crumb_offsets(self, octant: int) -> tuple[int, int, int, int]:
         """Return what each crumb adds to the index.
 
         Parameters

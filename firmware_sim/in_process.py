@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
-from firmware_sim.baud_pacing import PacedWire, paced
+from firmware_sim.baud_pacing import PacedDevice, with_baud
 from firmware_sim.bench import Bench
 from firmware_sim.config import (
     Config,
@@ -22,7 +22,7 @@ from firmware_sim.config import (
     parse_size,
 )
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.faults import parse_faults
 
 # Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
@@ -37,7 +37,7 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "firmware": ("firmware", str),
     "serial": ("serial", str),
     "features": ("features", parse_names),
-    "silent": ("silent", parse_number),
+    "silent": ("max_silent_acks", parse_number),
     "lie": ("lies", parse_names),
     "fault": ("faults", parse_faults),
     "seed": ("seed", parse_number),
@@ -61,7 +61,7 @@ class InProcessPort:
         The device's bench face.
     """
 
-    def __init__(self, wire: Wire | PacedWire) -> None:
+    def __init__(self, wire: DeviceOnLine | PacedDevice) -> None:
         self.bench = Bench(wire.device)
         self._wire = wire
         self._changed = threading.Condition()
@@ -116,7 +116,7 @@ class InProcessPort:
         deadline = time.monotonic() + timeout_s
         with self._changed:
             self._check_open()
-            while not self._wire.takes():
+            while not self._wire.accepts_data():
                 if not self._wait(deadline):
                     raise TimeoutError("the line is full: none of these bytes were taken")
                 self._check_open()
@@ -134,7 +134,7 @@ class InProcessPort:
         left = deadline - time.monotonic()
         if left <= 0:
             return False
-        happens = self._wire.until_tick()
+        happens = self._wire.next_event_s()
         self._changed.wait(left if happens is None else min(left, happens))
         return True
 
@@ -176,7 +176,7 @@ def open_in_process(url: str) -> InProcessPort:
     faults = fields.pop("faults", ())
     seed = fields.pop("seed", 0)
     baud = fields.pop("baud", 0)
-    return InProcessPort(paced(Wire(Device(Config(**fields)), faults, seed), baud))
+    return InProcessPort(with_baud(DeviceOnLine(Device(Config(**fields)), faults, seed), baud))
 
 
 def parse_url(

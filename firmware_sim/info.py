@@ -65,7 +65,7 @@ class Announcement:
         return info + self.strings
 
 
-def announce(config: Config, boot: int) -> Announcement:
+def make_announcement(config: Config, boot: int) -> Announcement:
     """Return what a device says of itself, lies included.
 
     Parameters

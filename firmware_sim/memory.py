@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.digest import terms
+from firmware_sim.digest import mix_sum
 from firmware_sim.grid import Grid
 
 _COLOR: Final = 3  # bytes of a colour: red, green, blue
-_LOG: Final = 4096  # so many voxels are written before the digest catches up with them
-_LONG: Final = 256  # so many voxels in scan order are worth a calculation of their own
+_LOG_VOXELS: Final = 4096  # so many voxels are written before the digest catches up with them
+_DIRECT_VOXELS: Final = 256  # so many voxels in scan order are worth a calculation of their own
 
 
 @dataclass(frozen=True)
@@ -91,14 +91,14 @@ class Page:
         self.pixels = bytearray(self.volume * self.pixel_size)
         self.palette = bytearray(DEFAULT_PALETTE)
         self._digest = 0
-        self._forget()
+        self._clear_log()
 
-    def copy(self, other: "Page") -> None:
+    def copy_from(self, other: "Page") -> None:
         """Take over picture and palette of another page of the same shape."""
         self.pixels[:] = other.pixels
         self.palette[:] = other.palette
         self._digest = other.digest
-        self._forget()
+        self._clear_log()
 
     def put(self, start: int, pixels: bytes) -> None:
         """Write pixels in scan order.
@@ -114,7 +114,7 @@ class Page:
         place = slice(start * size, start * size + len(pixels))
         old = self.pixels[place]
         self.pixels[place] = pixels
-        self._replaced(range(start, start + len(pixels) // size), old, pixels)
+        self._log_replaced(range(start, start + len(pixels) // size), old, pixels)
 
     def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
         """Write one pixel to runs of voxels in scan order.
@@ -150,9 +150,9 @@ class Page:
             old[k::size] = bytes(map(pixels.__getitem__, places))
             for place in places:
                 pixels[place] = value
-        self._replaced(indices, old, pixel * len(indices))
+        self._log_replaced(indices, old, pixel * len(indices))
 
-    def color(self, first: int, colors: bytes) -> None:
+    def set_colors(self, first: int, colors: bytes) -> None:
         """Set entries of the palette.
 
         Parameters
@@ -173,28 +173,28 @@ class Page:
     def digest(self) -> int:
         """Section 8: of the picture as it is now."""
         size = self.pixel_size
-        gain = terms(self._written, self._new, size) - terms(self._written, self._old, size)
+        gain = mix_sum(self._written, self._new, size) - mix_sum(self._written, self._old, size)
         self._digest = (self._digest + gain) & 0xFFFFFFFF
-        self._forget()
+        self._clear_log()
         return self._digest
 
-    def _forget(self) -> None:
+    def _clear_log(self) -> None:
         """Begin a new log of what has been written and is not in the digest yet."""
         self._written = array("Q")  # indices in the order of the writes, the same one perhaps twice
         self._old = bytearray()  # their pixels before
         self._new = bytearray()  # and after
 
-    def _replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
+    def _log_replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
         if old == new:
             return
         size = self.pixel_size
-        if len(indices) >= _LONG:
-            self._digest += terms(indices, new, size) - terms(indices, old, size)
+        if len(indices) >= _DIRECT_VOXELS:
+            self._digest += mix_sum(indices, new, size) - mix_sum(indices, old, size)
             return
         self._written.extend(indices)
         self._old += old
         self._new += new
-        if len(self._written) >= _LOG:
+        if len(self._written) >= _LOG_VOXELS:
             self._digest = self.digest
 
     def _color_terms(self, place: slice) -> int:
@@ -205,7 +205,7 @@ class Page:
             if self.palette[at : at + _COLOR] != DEFAULT_PALETTE[at : at + _COLOR]
         ]
         values = b"".join(self.palette[at : at + _COLOR] + b"\1" for at in entries)
-        return terms([self.volume + at // _COLOR for at in entries], values, _COLOR + 1)
+        return mix_sum([self.volume + at // _COLOR for at in entries], values, _COLOR + 1)
 
 
 class Memory:
@@ -232,12 +232,12 @@ class Memory:
         self.front = Page(grid.volume, pixel_format.size)
         self.back = Page(grid.volume, pixel_format.size)
 
-    def begin(self, dark: bool) -> None:
+    def begin_frame(self, dark: bool) -> None:
         """Prepare the back page for a frame: dark, or a copy of the front page and its palette."""
         if dark:
             self.back.clear()
         else:
-            self.back.copy(self.front)
+            self.back.copy_from(self.front)
 
     def swap(self) -> None:
         """Exchange the pages."""

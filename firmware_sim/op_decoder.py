@@ -12,10 +12,10 @@ from typing import Final
 from firmware_sim import spec
 from firmware_sim.grid import Grid
 from firmware_sim.memory import Page, PixelFormat
-from firmware_sim.operands import OPERAND, Operands
-from firmware_sim.packet_error import Refusal
-from firmware_sim.range_coded_chains import arc
-from firmware_sim.shapes import Brick, box, brick_strides, line
+from firmware_sim.operands import OPERAND_MASK, Operands
+from firmware_sim.packet_error import PacketError
+from firmware_sim.range_coded_chains import decode_chains
+from firmware_sim.shapes import Brick, box, brick_offsets, line
 
 # The four crumbs of a byte, the eight pixels of MONO1 and the two differences: a byte each, the
 # lowest bits first. A difference below 0 is one modulo 256.
@@ -26,7 +26,7 @@ _DIFFERENCES: Final = [
 ]
 
 
-class Unpacker:
+class OpDecoder:
     """Draws packets.
 
     Parameters
@@ -41,9 +41,9 @@ class Unpacker:
         self.grid = grid
         self.pixel_format = pixel_format
         self.mono = pixel_format.code == spec.FORMAT_MONO1
-        self.ops = _ops(features)
-        self.steps = [grid.steps(octant) for octant in range(spec.LIMIT_MAX_OCTANT + 1)]
-        self.brick_strides = brick_strides(grid)
+        self.ops = _op_table(features)
+        self.steps = [grid.crumb_offsets(octant) for octant in range(spec.LIMIT_MAX_OCTANT + 1)]
+        self.brick_offsets = brick_offsets(grid)
 
     def draw(self, packet: bytes, page: Page) -> None:
         """Draw the ops of a packet.
@@ -57,95 +57,95 @@ class Unpacker:
 
         Raises
         ------
-        Refusal
+        PacketError
             At the first fault, when the ops before it have been drawn.
         """
         operands = Operands(packet, self.grid.coordinate_size)
-        decoder = _Decoder(self, operands, page)
+        decoder = _PacketDecoder(self, operands, page)
         while (op := operands.op()) is not None:
             draw = self.ops[op]
             if draw is None:
-                raise operands.refusal(spec.CODE_OP, f"op {op:02X} is reserved or not announced")
-            draw(decoder, op & OPERAND)
+                raise operands.error(spec.CODE_OP, f"op {op:02X} is reserved or not announced")
+            draw(decoder, op & OPERAND_MASK)
 
 
-class _Decoder:
+class _PacketDecoder:
     """Decoder of one packet: a cursor and a pen. A method for each op gets its low five bits."""
 
-    def __init__(self, device: Unpacker, operands: Operands, page: Page) -> None:
+    def __init__(self, device: OpDecoder, operands: Operands, page: Page) -> None:
         self._device = device
         self._grid = device.grid
         self._format = device.pixel_format
-        self._in = operands
+        self._operands = operands
         self._page = page
         self._cursor = 0
         self._pen = device.pixel_format.full
 
     # Where it leads
 
-    def _outside(self, text: str) -> Refusal:
-        return self._in.refusal(spec.CODE_OUTSIDE, text)
+    def _outside_error(self, text: str) -> PacketError:
+        return self._operands.error(spec.CODE_OUTSIDE, text)
 
     def _check_cursor(self) -> None:
         if self._cursor == self._grid.volume:
-            raise self._outside("the cursor is behind the last voxel")
+            raise self._outside_error("the cursor is behind the last voxel")
 
-    def _check_place(self, place: tuple[int, int, int]) -> None:
-        if not self._grid.holds(*place):
-            raise self._outside("({}, {}, {})".format(*place))
+    def _check_coordinates(self, place: tuple[int, int, int]) -> None:
+        if not self._grid.contains(*place):
+            raise self._outside_error("({}, {}, {})".format(*place))
 
-    def _room(self, count: int) -> int:
+    def _check_room(self, count: int) -> int:
         """Return a count, if so many voxels follow from the cursor on."""
         if count > self._grid.volume - self._cursor:
-            raise self._outside(f"{count} voxels from {self._cursor} on")
+            raise self._outside_error(f"{count} voxels from {self._cursor} on")
         return count
 
     # Cursor, pen and palette
 
     def end(self, _: int) -> None:
-        rest = self._in.rest()
+        rest = self._operands.remaining()
         if rest.count(0) < len(rest):
-            raise self._in.refusal(spec.CODE_PADDING, "bytes behind END are not 0")
+            raise self._operands.error(spec.CODE_PADDING, "bytes behind END are not 0")
 
     def pen(self, _: int) -> None:
-        pixel = self._in.take(self._format.size)
+        pixel = self._operands.take(self._format.size)
         if self._device.mono and pixel[0] > 1:
-            raise self._in.refusal(spec.CODE_PIXEL, "a pixel of MONO1 is 00 or 01")
+            raise self._operands.error(spec.CODE_PIXEL, "a pixel of MONO1 is 00 or 01")
         self._pen = pixel
 
     def move(self, _: int) -> None:
-        place = self._in.place()
-        self._check_place(place)
+        place = self._operands.coordinates()
+        self._check_coordinates(place)
         self._cursor = self._grid.index(*place)
 
     def colors(self, _: int) -> None:
-        first = self._in.byte()
-        count = self._in.byte() + 1
-        colors = self._in.take(3 * count)
+        first = self._operands.byte()
+        count = self._operands.byte() + 1
+        colors = self._operands.take(3 * count)
         if first + count > spec.LIMIT_MAX_COLORS:
-            raise self._outside(f"{count} colours from {first} on")
-        self._page.color(first, colors)
+            raise self._outside_error(f"{count} colours from {first} on")
+        self._page.set_colors(first, colors)
 
     # Chains
 
     def step(self, octant: int) -> None:
-        count = self._in.byte() + 1
-        self._walk(octant, count, self._in.small(count, 2))
+        count = self._operands.byte() + 1
+        self._draw_chain(octant, count, self._operands.packed(count, 2))
 
-    def begin(self, octant: int) -> None:
-        place = self._in.place()
-        count = self._in.byte() + 1
-        crumbs = self._in.small(count, 2)
-        self._check_place(place)
+    def from_(self, octant: int) -> None:
+        place = self._operands.coordinates()
+        count = self._operands.byte() + 1
+        crumbs = self._operands.packed(count, 2)
+        self._check_coordinates(place)
         self._cursor = self._grid.index(*place)
-        self._walk(octant, count, crumbs)
+        self._draw_chain(octant, count, crumbs)
 
     def arc(self, _: int) -> None:
-        pieces = arc(self._in, self._grid, self._format, self._pen)
+        pieces = decode_chains(self._operands, self._grid, self._format, self._pen)
         for pen, voxels in pieces:
             self._page.plot(array("Q", set(voxels)), pen)
 
-    def _walk(self, octant: int, count: int, raw: bytes) -> None:
+    def _draw_chain(self, octant: int, count: int, raw: bytes) -> None:
         self._check_cursor()
         crumbs = int.from_bytes(raw, "little")
         every_other = (4**count - 1) // 3  # 0101...01, a one for each crumb
@@ -154,8 +154,8 @@ class _Decoder:
             (crumbs & every_other).bit_count(),
             (crumbs >> 1 & every_other).bit_count(),
         )
-        if self._grid.leaves(self._cursor, octant, moves):
-            raise self._outside("a step leaves the grid")
+        if self._grid.chain_leaves(self._cursor, octant, moves):
+            raise self._outside_error("a step leaves the grid")
         steps = self._device.steps[octant]
         path = b"".join([_CRUMBS[byte] for byte in raw])[:count]
         chain = array("Q", accumulate(map(steps.__getitem__, path), initial=self._cursor))
@@ -165,33 +165,33 @@ class _Decoder:
     # Runs
 
     def skip(self, operand: int) -> None:
-        self._cursor += self._room(self._in.count(operand))
+        self._cursor += self._check_room(self._operands.count(operand))
 
     def run(self, operand: int) -> None:
-        count = self._room(self._in.count(operand))
+        count = self._check_room(self._operands.count(operand))
         self._page.put(self._cursor, self._pen * count)
         self._cursor += count
 
     def literal(self, operand: int) -> None:
-        count = self._in.count(operand)
+        count = self._operands.count(operand)
         if self._device.mono:
-            raw = self._in.small(count, 1)
-            self._room(count)
+            raw = self._operands.packed(count, 1)
+            self._check_room(count)
             pixels = b"".join([_BITS[byte] for byte in raw])[:count]
         else:
-            pixels = self._in.take(count * self._format.size)
-            self._room(count)
-        self._write(count, pixels)
+            pixels = self._operands.take(count * self._format.size)
+            self._check_room(count)
+        self._write_pixels(count, pixels)
 
     def differences(self, operand: int) -> None:
-        count = self._in.count(operand)
-        raw = self._in.small(count, 4)
-        self._room(count)
+        count = self._operands.count(operand)
+        raw = self._operands.packed(count, 4)
+        self._check_room(count)
         steps = b"".join([_DIFFERENCES[byte] for byte in raw])[:count]
         values = accumulate(steps, initial=self._pen[0])
-        self._write(count, bytes([value & 0xFF for value in values])[1:])
+        self._write_pixels(count, bytes([value & 0xFF for value in values])[1:])
 
-    def _write(self, count: int, pixels: bytes) -> None:
+    def _write_pixels(self, count: int, pixels: bytes) -> None:
         self._page.put(self._cursor, pixels)
         self._cursor += count
         self._pen = pixels[-self._format.size :]
@@ -199,36 +199,36 @@ class _Decoder:
     # Shapes
 
     def line(self, _: int) -> None:
-        place = self._in.place()
+        place = self._operands.coordinates()
         self._check_cursor()
-        self._check_place(place)
+        self._check_coordinates(place)
         self._page.plot(line(self._grid, self._cursor, place), self._pen)
         self._cursor = self._grid.index(*place)
 
     def box(self, _: int) -> None:
-        place = self._in.place()
+        place = self._operands.coordinates()
         self._check_cursor()
-        self._check_place(place)
+        self._check_coordinates(place)
         for starts, count in box(self._grid, self._cursor, place):
             self._page.fill(starts, count, self._pen)
         self._cursor = self._grid.index(*place)
 
     def dots(self, _: int) -> None:
-        x, y, z = self._in.places(self._in.byte() + 1)
-        self._check_place((max(x), max(y), max(z)))
+        x, y, z = self._operands.coordinate_lists(self._operands.byte() + 1)
+        self._check_coordinates((max(x), max(y), max(z)))
         _, row, plane = self._grid.strides
         voxels = [i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)]
         self._page.plot(array("Q", set(voxels)), self._pen)
         self._cursor = voxels[-1]
 
     def brick(self, level: int) -> None:
-        x, y, z = (axis << level for axis in self._in.place())
-        brick = Brick(level, self._in.take)
+        x, y, z = (axis << level for axis in self._operands.coordinates())
+        brick = Brick(level, self._operands.take)
         nx, ny, nz = self._grid.sides
         if not brick.fits((nx - x, ny - y, nz - z)):
-            raise self._outside(f"a brick at ({x}, {y}, {z}) leaves the grid")
+            raise self._outside_error(f"a brick at ({x}, {y}, {z}) leaves the grid")
         first = self._grid.index(x, y, z)
-        strides = self._device.brick_strides
+        strides = self._device.brick_offsets
         for count, places in brick.rows:
             voxels = array("Q", [first + strides[place] for place in places])
             if count > 1:
@@ -237,29 +237,29 @@ class _Decoder:
                 self._page.plot(voxels, self._pen)
 
 
-_Op = Callable[[_Decoder, int], None]
+_Op = Callable[[_PacketDecoder, int], None]
 
 
-def _ops(features: int) -> list[_Op | None]:
+def _op_table(features: int) -> list[_Op | None]:
     """Return what draws each op byte; None where it is reserved or not announced."""
     ops: list[_Op | None] = [None] * 256
-    last = OPERAND
+    last = OPERAND_MASK
     for feature, op, low_bits, draw in (
-        (None, spec.OP_END, 0, _Decoder.end),
-        (None, spec.OP_PEN, 0, _Decoder.pen),
-        (None, spec.OP_MOVE, 0, _Decoder.move),
-        (spec.FEATURE_LINE, spec.OP_LINE, 0, _Decoder.line),
-        (spec.FEATURE_BOX, spec.OP_BOX, 0, _Decoder.box),
-        (spec.FEATURE_DOTS, spec.OP_DOTS, 0, _Decoder.dots),
-        (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _Decoder.colors),
-        (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _Decoder.step),
-        (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _Decoder.begin),
-        (spec.FEATURE_ARC, spec.OP_ARC, 0, _Decoder.arc),
-        (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _Decoder.brick),
-        (None, spec.OP_SKIP, last, _Decoder.skip),
-        (None, spec.OP_RUN, last, _Decoder.run),
-        (None, spec.OP_LIT, last, _Decoder.literal),
-        (spec.FEATURE_DIFF, spec.OP_DIFF, last, _Decoder.differences),
+        (None, spec.OP_END, 0, _PacketDecoder.end),
+        (None, spec.OP_PEN, 0, _PacketDecoder.pen),
+        (None, spec.OP_MOVE, 0, _PacketDecoder.move),
+        (spec.FEATURE_LINE, spec.OP_LINE, 0, _PacketDecoder.line),
+        (spec.FEATURE_BOX, spec.OP_BOX, 0, _PacketDecoder.box),
+        (spec.FEATURE_DOTS, spec.OP_DOTS, 0, _PacketDecoder.dots),
+        (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _PacketDecoder.colors),
+        (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _PacketDecoder.step),
+        (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _PacketDecoder.from_),
+        (spec.FEATURE_ARC, spec.OP_ARC, 0, _PacketDecoder.arc),
+        (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _PacketDecoder.brick),
+        (None, spec.OP_SKIP, last, _PacketDecoder.skip),
+        (None, spec.OP_RUN, last, _PacketDecoder.run),
+        (None, spec.OP_LIT, last, _PacketDecoder.literal),
+        (spec.FEATURE_DIFF, spec.OP_DIFF, last, _PacketDecoder.differences),
     ):
         if feature is None or features >> feature & 1:
             for low in range(low_bits + 1):

@@ -7,9 +7,9 @@ written in another form than the document's; it knows nothing of what the ops do
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.packet_error import Refusal
+from firmware_sim.packet_error import PacketError
 
-OPERAND: Final = 0x1F  # the low five bits of an op byte
+OPERAND_MASK: Final = 0x1F  # the low five bits of an op byte
 _COUNT_BYTES: Final = 5  # section 7.2: the longest LEB128
 _COUNT_LIMIT: Final = 1 << 32  # section 7.2: n MUST be below
 
@@ -38,19 +38,19 @@ class Operands:
         self._at += 1
         return self._packet[self._op_at]
 
-    def refusal(self, code: int, text: str) -> Refusal:
+    def error(self, code: int, text: str) -> PacketError:
         """Return a refusal that points at the op."""
-        return Refusal(code, self._op_at, text)
+        return PacketError(code, self._op_at, text)
 
     def take(self, size: int) -> bytes:
         """Return so many bytes."""
         start = self._at
         self._at += size
         if self._at > len(self._packet):
-            raise self.refusal(spec.CODE_TRUNCATED, "the payload ends inside the op")
+            raise self.error(spec.CODE_TRUNCATED, "the payload ends inside the op")
         return self._packet[start : self._at]
 
-    def rest(self) -> bytes:
+    def remaining(self) -> bytes:
         """Return all bytes that are left."""
         return self.take(len(self._packet) - self._at)
 
@@ -58,7 +58,7 @@ class Operands:
         """Return a u8."""
         return self.take(1)[0]
 
-    def place(self) -> tuple[int, int, int]:
+    def coordinates(self) -> tuple[int, int, int]:
         """Return the coordinates of one voxel, or brick (2)."""
         size = self._coordinate_size
         raw = self.take(3 * size)
@@ -66,7 +66,7 @@ class Operands:
             return raw[0], raw[1], raw[2]
         return raw[0] | raw[1] << 8, raw[2] | raw[3] << 8, raw[4] | raw[5] << 8
 
-    def places(self, count: int) -> tuple[list[int], list[int], list[int]]:
+    def coordinate_lists(self, count: int) -> tuple[list[int], list[int], list[int]]:
         """Return the coordinates of many voxels: all x, all y, all z."""
         size = self._coordinate_size
         raw = self.take(3 * size * count)
@@ -77,7 +77,7 @@ class Operands:
 
     def count(self, operand: int) -> int:
         """Return a count whose begin is in the op byte (7.2)."""
-        if operand < OPERAND:
+        if operand < OPERAND_MASK:
             return operand + 1
         count = 0
         for k in range(_COUNT_BYTES):
@@ -86,18 +86,18 @@ class Operands:
             if byte < 0x80:
                 break
         else:
-            raise self.refusal(spec.CODE_COUNT, "the count has more than 5 bytes")
+            raise self.error(spec.CODE_COUNT, "the count has more than 5 bytes")
         if k and not byte:
-            raise self.refusal(spec.CODE_COUNT, "the count is not in its shortest form")
-        count += OPERAND + 1
+            raise self.error(spec.CODE_COUNT, "the count is not in its shortest form")
+        count += OPERAND_MASK + 1
         if count >= _COUNT_LIMIT:
-            raise self.refusal(spec.CODE_COUNT, "the count is 2^32 or more")
+            raise self.error(spec.CODE_COUNT, "the count is 2^32 or more")
         return count
 
-    def small(self, count: int, bits: int) -> bytes:
+    def packed(self, count: int, bits: int) -> bytes:
         """Return the bytes of so many numbers of 1, 2 or 4 bits; what is left over is 0."""
         raw = self.take((count * bits + 7) // 8)
         used = count * bits % 8
         if used and raw[-1] >> used:
-            raise self.refusal(spec.CODE_PADDING, f"unused bits of {raw[-1]:02X} are not 0")
+            raise self.error(spec.CODE_PADDING, f"unused bits of {raw[-1]:02X} are not 0")
         return raw

@@ -1,7 +1,7 @@
 """Why a packet is refused, on its way from where that is seen to the ERROR that says so (11)."""
 
 
-class Refusal(Exception):  # noqa: N818 - it is no error of the device
+class PacketError(Exception):
     """A packet that the device refuses.
 
     Parameters

@@ -19,7 +19,7 @@ _SAME: Final = {  # a pixel and its repetitions
 }
 
 
-def pack(
+def encode_page(
     page: Page, pixel_format: PixelFormat, start: int, count: int, room: int
 ) -> tuple[int, bytes]:
     """Describe pixels by ops, as many as fit.
@@ -43,15 +43,15 @@ def pack(
         The ops, at most `room` bytes.
     """
     size = pixel_format.size
-    writer = _Writer(pixel_format)
+    writer = _OpWriter(pixel_format)
     at, end = start * size, (start + count) * size
     while at < end and writer.size + _MARGIN <= room:
         at += writer.add(page.pixels, at, end)
-    writer.close()
+    writer.close_literal()
     return at // size - start, bytes(writer.ops)
 
 
-class _Writer:
+class _OpWriter:
     """Writes ops; the last of them may be an open LIT, to which pixels are still added."""
 
     def __init__(self, pixel_format: PixelFormat) -> None:
@@ -77,40 +77,40 @@ class _Writer:
     def add(self, pixels: bytearray, at: int, end: int) -> int:
         """Describe a stretch of pixels that begins at a place in memory; return its bytes."""
         size = self._size
-        if self._mono and _is_busy(chunk := pixels[at : min(at + _CHUNK, end)]):
-            self._extend(chunk)
+        if self._mono and _prefers_literal(chunk := pixels[at : min(at + _CHUNK, end)]):
+            self._extend_literal(chunk)
             return len(chunk)
         pixel = pixels[at : at + size]
         dark = not any(pixel)
         stretch = _length(_DARK if dark else _SAME[size], pixels, at, end)
         count = stretch // size  # the zeros at the end of a dark one may belong to the next pixel
         if self._literal and count <= self._cheap:
-            self._extend(pixel * count)
+            self._extend_literal(pixel * count)
         elif dark:
-            self._draw(spec.OP_SKIP, count)
+            self._append_op(spec.OP_SKIP, count)
         elif pixel == self._pen:
-            self._draw(spec.OP_RUN, count)
+            self._append_op(spec.OP_RUN, count)
         elif count == 1:
-            self._extend(pixel)
+            self._extend_literal(pixel)
         elif self._literal:
-            self._extend(pixel)
-            self._draw(spec.OP_RUN, count - 1)
+            self._extend_literal(pixel)
+            self._append_op(spec.OP_RUN, count - 1)
         else:
             self.ops.append(spec.OP_PEN)
             self.ops += pixel
             self._pen = bytes(pixel)
-            self._draw(spec.OP_RUN, count)
+            self._append_op(spec.OP_RUN, count)
         return count * size
 
-    def _extend(self, pixels: bytearray) -> None:
+    def _extend_literal(self, pixels: bytearray) -> None:
         self._literal += pixels
         self._pen = bytes(pixels[-self._size :])
 
-    def _draw(self, op: int, count: int) -> None:
-        self.close()
+    def _append_op(self, op: int, count: int) -> None:
+        self.close_literal()
         self.ops += _op(op, count)
 
-    def close(self) -> None:
+    def close_literal(self) -> None:
         """Write out the open LIT."""
         if not self._literal:
             return
@@ -124,7 +124,7 @@ class _Writer:
         self._literal.clear()
 
 
-def _is_busy(pixels: bytearray) -> bool:
+def _prefers_literal(pixels: bytearray) -> bool:
     """Tell whether pixels of MONO1 need fewer bytes as a LIT than as SKIPs and RUNs."""
     ops = 1 + pixels.count(b"\0\1") + pixels.count(b"\1\0")
     return ops > 1 + (len(pixels) + 7) // 8

@@ -14,7 +14,7 @@ _SHIFT: Final = 13  # by so much the range is smaller before it is shared out
 _BEGIN: Final = 3  # bytes of the code at first
 
 
-class Bits:
+class RangeDecoder:
     """Decoder of one sequence.
 
     Parameters
@@ -35,11 +35,11 @@ class Bits:
         self._at = _BEGIN
 
     @property
-    def done(self) -> bool:
+    def exhausted(self) -> bool:
         """Whether the whole sequence has been read, and all that is read behind it."""
         return self._at == len(self._data)
 
-    def _split(self, bound: int) -> int:
+    def _decode(self, bound: int) -> int:
         """Return a bit, which is 0 if the code is below a bound."""
         bit = 0
         if self._code < bound:
@@ -49,7 +49,7 @@ class Bits:
             self._code -= bound
             self._range -= bound
         while self._range < _RANGE:
-            if self.done:
+            if self.exhausted:
                 raise self._cut_off()
             self._range <<= 8
             self._code = self._code << 8 | self._data[self._at]
@@ -59,19 +59,19 @@ class Bits:
     def bit(self, model: int) -> int:
         """Return a bit by one model."""
         chance = self._chances[model]
-        bit = self._split((self._range >> _SHIFT) * 2 * chance)
-        self._learn(model, chance, bit)
+        bit = self._decode((self._range >> _SHIFT) * 2 * chance)
+        self._update(model, chance, bit)
         return bit
 
-    def mixed(self, one: int, other: int) -> int:
+    def mixed_bit(self, one: int, other: int) -> int:
         """Return a bit by two models."""
         chance, second = self._chances[one], self._chances[other]
-        bit = self._split((self._range >> _SHIFT) * (chance + second))
-        self._learn(one, chance, bit)
-        self._learn(other, second, bit)
+        bit = self._decode((self._range >> _SHIFT) * (chance + second))
+        self._update(one, chance, bit)
+        self._update(other, second, bit)
         return bit
 
-    def _learn(self, model: int, chance: int, bit: int) -> None:
+    def _update(self, model: int, chance: int, bit: int) -> None:
         seen = self._seen[model]
         shift = 1 + (seen >> 1)
         self._chances[model] = (
@@ -80,11 +80,11 @@ class Bits:
         if seen < spec.ARC_ENOUGH:
             self._seen[model] = seen + 1
 
-    def plain(self, count: int) -> int:
+    def plain_bits(self, count: int) -> int:
         """Return a number of so many bits without models, the highest first."""
         value = 0
         for _ in range(count):
-            value = value << 1 | self._split((self._range >> _SHIFT) * _ONE)
+            value = value << 1 | self._decode((self._range >> _SHIFT) * _ONE)
         return value
 
     def number(self) -> int:
@@ -92,4 +92,4 @@ class Bits:
         k = 0
         while k < spec.ARC_MAX_K and self.bit(spec.ARC_COUNT + k):
             k += 1
-        return (1 << k) - 1 + self.plain(k)
+        return (1 << k) - 1 + self.plain_bits(k)

@@ -35,7 +35,7 @@ class Receiver:
         self._buffer = bytearray(longest)
         self.packet: bytes | None = None
         self.damaged = False
-        self.idle = True
+        self.at_boundary = True
         self._begin()
 
     def _begin(self) -> None:
@@ -43,7 +43,7 @@ class Receiver:
         self._length = 0  # bytes decoded
         self._left = 0  # bytes that the current group still lacks
         self._implied = False  # a 00 follows the current group, if anything does
-        self._bad = False  # the packet is too long
+        self._too_long = False  # the packet is too long
 
     def read(self, data: bytes | bytearray, at: int) -> int:
         """Read on until a segment ends, or the data.
@@ -62,10 +62,10 @@ class Receiver:
         """
         self.packet = None
         self.damaged = False
-        if self.idle:
+        if self.at_boundary:
             self._begin()
         end = data.find(0, at)
-        self.idle = end >= 0
+        self.at_boundary = end >= 0
         if end < 0:
             end = len(data)
         self.size += end - at
@@ -80,7 +80,7 @@ class Receiver:
             self._append(piece)
             self._left -= len(piece)
             at += len(piece)
-        if not self.idle:
+        if not self.at_boundary:
             return end
         self._end()
         return end + 1
@@ -88,7 +88,7 @@ class Receiver:
     def _append(self, piece: bytes | bytearray) -> None:
         length = self._length + len(piece)
         if length > len(self._buffer):
-            self._bad = True
+            self._too_long = True
         else:
             self._buffer[self._length : length] = piece
             self._length = length
@@ -96,7 +96,7 @@ class Receiver:
     def _end(self) -> None:
         if self.size < spec.LIMIT_MIN_SEGMENT:
             return
-        if not (self._left or self._bad):
+        if not (self._left or self._too_long):
             body = bytes(self._buffer[: self._length - _CHECK])
             check = self._buffer[len(body) : self._length]
             if crc32(body) == int.from_bytes(check, "little"):

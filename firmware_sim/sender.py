@@ -9,7 +9,7 @@ from firmware_sim.crc import crc32
 _GROUP = 254  # section 3: a group ends after so many bytes without a 00
 
 
-def wire_size(packet: int) -> int:
+def max_wire_bytes(packet: int) -> int:
     """Return how many bytes a packet has on the wire at most.
 
     Parameters
@@ -25,7 +25,7 @@ def wire_size(packet: int) -> int:
     return packet + -(-packet // _GROUP) + 1
 
 
-def encode(packet: bytes) -> bytes:
+def encode_segment(packet: bytes) -> bytes:
     """Undo every 00 of some bytes by COBS and end them with one.
 
     Parameters
@@ -41,11 +41,11 @@ def encode(packet: bytes) -> bytes:
     wire = bytearray()
     *parts, last = packet.split(b"\0")
     for part in parts:
-        _groups(wire, part)
+        _append_full_groups(wire, part)
         rest = len(part) % _GROUP
         wire.append(rest + 1)
         wire += part[len(part) - rest :]
-    _groups(wire, last)
+    _append_full_groups(wire, last)
     rest = len(last) % _GROUP
     if rest or not last:  # nothing follows a last group of 254 bytes
         wire.append(rest + 1)
@@ -54,14 +54,14 @@ def encode(packet: bytes) -> bytes:
     return bytes(wire)
 
 
-def _groups(wire: bytearray, part: bytes) -> None:
+def _append_full_groups(wire: bytearray, part: bytes) -> None:
     """Append all groups of 254 bytes of a part without 00."""
     for start in range(0, len(part) - _GROUP + 1, _GROUP):
         wire.append(_GROUP + 1)
         wire += part[start : start + _GROUP]
 
 
-def send(kind: int, flags: int, seq: int, frame: int, payload: bytes) -> bytes:
+def encode_packet(kind: int, flags: int, seq: int, frame: int, payload: bytes) -> bytes:
     """Make a packet and encode it.
 
     Parameters
@@ -79,4 +79,4 @@ def send(kind: int, flags: int, seq: int, frame: int, payload: bytes) -> bytes:
         The packet as it is on the wire.
     """
     packet = bytes((kind << 4 | flags, seq, frame)) + payload
-    return encode(packet + crc32(packet).to_bytes(spec.CRC_WIDTH // 8, "little"))
+    return encode_segment(packet + crc32(packet).to_bytes(spec.CRC_WIDTH // 8, "little"))

@@ -13,28 +13,30 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from firmware_sim.baud_pacing import PacedWire
-from firmware_sim.device_on_line import Wire
+from firmware_sim.baud_pacing import PacedDevice
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.in_process import InProcessPort, open_in_process
 from firmware_sim.readiness import wait_ready
 
 __all__ = [
     "InProcessPort",
-    "check_local",
-    "linked",
-    "listen",
+    "listen_tcp",
     "open_in_process",
     "open_pty",
+    "require_loopback",
     "serve_tcp",
     "serve_wire",
+    "symbolic_link",
 ]
 
-_LOOK: Final = 0.02  # seconds between looks at a host that does not read
-_CHUNK: Final = 4096  # bytes to read at a time
-_CLOGGED: Final = 65_536  # with so many bytes that the host has not read, none are taken from it
+_UNREAD_POLL_S: Final = 0.02  # seconds between looks at a host that does not read
+_READ_BYTES: Final = 4096  # bytes to read at a time
+_MAX_UNREAD_BYTES: Final = (
+    65_536  # with so many bytes that the host has not read, none are taken from it
+)
 
 
-def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
+def serve_wire(wire: DeviceOnLine | PacedDevice, line: int, stop: int) -> bool:
     """Run a device on a line until the line ends or something tells it to stop.
 
     Parameters
@@ -55,8 +57,8 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
     while True:
         try:
             readers = [stop]
-            if len(out) < _CLOGGED:
-                if wire.takes():
+            if len(out) < _MAX_UNREAD_BYTES:
+                if wire.accepts_data():
                     readers.append(line)
                 out += wire.transmit()  # last: a tick may have come with each call before
             writers = [line] if out else []
@@ -66,7 +68,7 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
             if writable:
                 del out[: os.write(line, out)]
             if line in readable:
-                data = os.read(line, _CHUNK)
+                data = os.read(line, _READ_BYTES)
                 if not data:
                     return False
                 wire.receive(data)
@@ -76,10 +78,10 @@ def serve_wire(wire: Wire | PacedWire, line: int, stop: int) -> bool:
             return False
 
 
-def _pause(wire: Wire | PacedWire, out: bytearray) -> float | None:
+def _pause(wire: DeviceOnLine | PacedDevice, out: bytearray) -> float | None:
     """Return how long to sleep; what is due for a host that does not read stays due."""
-    pause = wire.until_tick()
-    return pause if pause is None or len(out) < _CLOGGED else max(pause, _LOOK)
+    pause = wire.next_event_s()
+    return pause if pause is None or len(out) < _MAX_UNREAD_BYTES else max(pause, _UNREAD_POLL_S)
 
 
 @contextlib.contextmanager
@@ -106,7 +108,7 @@ def open_pty() -> Iterator[tuple[int, str]]:
 
 
 @contextlib.contextmanager
-def linked(link: Path, target: str) -> Iterator[None]:
+def symbolic_link(link: Path, target: str) -> Iterator[None]:
     """Keep a symbolic link; put it there at once, and remove it in the end if it is still ours.
 
     Parameters
@@ -133,7 +135,7 @@ def linked(link: Path, target: str) -> Iterator[None]:
             link.unlink()
 
 
-def listen(host: str, port: int, *, remote: bool = False) -> socket.socket:
+def listen_tcp(host: str, port: int, *, remote: bool = False) -> socket.socket:
     """Listen for TCP connections.
 
     Parameters
@@ -150,12 +152,12 @@ def listen(host: str, port: int, *, remote: bool = False) -> socket.socket:
     OSError
         If there is no such address, or it is taken.
     """
-    check_local(host, "draw", remote=remote)
+    require_loopback(host, "draw", remote=remote)
     family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     return socket.create_server(address[:2], family=family, backlog=1)
 
 
-def check_local(host: str, what: str = "look on", *, remote: bool) -> None:
+def require_loopback(host: str, what: str = "look on", *, remote: bool) -> None:
     """Refuse to listen where other machines could come, unless they may.
 
     Parameters
@@ -181,7 +183,7 @@ def check_local(host: str, what: str = "look on", *, remote: bool) -> None:
         )
 
 
-def serve_tcp(wire: Wire | PacedWire, listener: socket.socket, stop: int) -> None:
+def serve_tcp(wire: DeviceOnLine | PacedDevice, listener: socket.socket, stop: int) -> None:
     """Run a device for one connection after the other until something tells it to stop.
 
     Parameters

@@ -7,13 +7,13 @@ answers.
 from enum import Enum, auto
 
 from firmware_sim import spec
-from firmware_sim.packet_error import Refusal
+from firmware_sim.packet_error import PacketError
 
 _NO_FRAME = 255  # section 6, point 6: f before the first frame
 _SEQ, _FRAME, _CLEAR = 1, 2, 0  # offsets in the header that a refusal points at
 
 
-class State(Enum):
+class BackPage(Enum):
     """States of the back page, section 13."""
 
     EMPTY = auto()
@@ -21,7 +21,7 @@ class State(Enum):
     PENDING = auto()
 
 
-class Verdict(Enum):
+class DataAction(Enum):
     """What the device does with a DATA packet that it takes."""
 
     APPLY = auto()  # draw it
@@ -58,7 +58,7 @@ class Session:
         self.received = 0
         self.last = 255
         self.shown: int | None = None
-        self.state = State.EMPTY
+        self.state = BackPage.EMPTY
         self._newest = _NO_FRAME  # f of section 6
         self._clear = False  # the CLEAR flag with which f began
         self._commit: int | None = None  # lowest sequence number of a COMMIT of f
@@ -80,9 +80,11 @@ class Session:
         seq, frame
             Bytes 1 and 2 of its header.
         """
-        return self.state is State.PENDING and frame != self._newest and not self._is_duplicate(seq)
+        return (
+            self.state is BackPage.PENDING and frame != self._newest and not self._is_duplicate(seq)
+        )
 
-    def judge(self, seq: int, frame: int, flags: int) -> Verdict:
+    def classify(self, seq: int, frame: int, flags: int) -> DataAction:
         """Say what to do with a DATA packet that need not wait.
 
         Parameters
@@ -99,41 +101,41 @@ class Session:
 
         Raises
         ------
-        Refusal
+        PacketError
             SEQUENCE or FRAME.
         """
         ahead = self._ahead(seq)
         if self._is_duplicate(seq):
-            return Verdict.DUPLICATE
+            return DataAction.DUPLICATE
         if ahead >= spec.LIMIT_WINDOW:
-            raise Refusal(spec.CODE_SEQUENCE, _SEQ, f"{seq} is not within 32 of {self.next}")
+            raise PacketError(spec.CODE_SEQUENCE, _SEQ, f"{seq} is not within 32 of {self.next}")
         if frame == self._newest:
-            self._check_own(seq, flags)
-            return Verdict.APPLY
+            self._check_same_frame(seq, flags)
+            return DataAction.APPLY
         # What is missing may belong to a frame that is not whole, and to none other.
-        if frame == (self._newest + 1) % 256 and (self.state is State.EMPTY or not ahead):
-            return Verdict.BEGIN
+        if frame == (self._newest + 1) % 256 and (self.state is BackPage.EMPTY or not ahead):
+            return DataAction.BEGIN
         if ahead:
-            return Verdict.DROP
-        raise Refusal(spec.CODE_FRAME, _FRAME, f"frame {frame} does not follow {self._newest}")
+            return DataAction.DROP
+        raise PacketError(spec.CODE_FRAME, _FRAME, f"frame {frame} does not follow {self._newest}")
 
-    def _check_own(self, seq: int, flags: int) -> None:
+    def _check_same_frame(self, seq: int, flags: int) -> None:
         """Check a packet of f (6, points 8 and 1)."""
-        if self.state is not State.FILLING:
-            raise Refusal(spec.CODE_FRAME, _FRAME, "the frame is not open")
+        if self.state is not BackPage.FILLING:
+            raise PacketError(spec.CODE_FRAME, _FRAME, "the frame is not open")
         if self._commit is not None and self._ahead(self._commit) < self._ahead(seq):
-            raise Refusal(spec.CODE_FRAME, _FRAME, "the frame has ended before this packet")
+            raise PacketError(spec.CODE_FRAME, _FRAME, "the frame has ended before this packet")
         if bool(flags & spec.DATA_FLAG_CLEAR) != self._clear:
-            raise Refusal(spec.CODE_FRAME, _CLEAR, "the frame began with another CLEAR flag")
+            raise PacketError(spec.CODE_FRAME, _CLEAR, "the frame began with another CLEAR flag")
 
-    def begin(self, frame: int, flags: int) -> None:
+    def begin_frame(self, frame: int, flags: int) -> None:
         """Begin a frame, and drop the one before if it is not on display."""
-        self.state = State.FILLING
+        self.state = BackPage.FILLING
         self._newest = frame
         self._clear = bool(flags & spec.DATA_FLAG_CLEAR)
         self._commit = None
 
-    def mark(self, seq: int, flags: int) -> None:
+    def mark_received(self, seq: int, flags: int) -> None:
         """Remember that a packet of f has been received, and see whether f is whole now."""
         if flags & spec.DATA_FLAG_COMMIT and (
             self._commit is None or self._ahead(seq) < self._ahead(self._commit)
@@ -143,7 +145,7 @@ class Session:
         if seq == self.next:
             self._advance()
         if self._commit is not None and self._ahead(self._commit) >= spec.LIMIT_WINDOW:
-            self.state = State.PENDING
+            self.state = BackPage.PENDING
 
     def _advance(self) -> None:
         while True:
@@ -156,4 +158,4 @@ class Session:
     def swap(self) -> None:
         """Remember that f has been put on display."""
         self.shown = self._newest
-        self.state = State.EMPTY
+        self.state = BackPage.EMPTY

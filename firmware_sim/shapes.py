@@ -20,13 +20,13 @@ _PLACES: Final = _SIDE**3
 _LEVELS: Final = range(spec.LIMIT_MAX_LEVEL + 1)
 
 
-def _place(x: int, y: int, z: int) -> int:
+def _brick_index(x: int, y: int, z: int) -> int:
     return x + _SIDE * (y + _SIDE * z)
 
 
 def _children(level: int, mask: int) -> tuple[int, ...]:
     half = 1 << level >> 1
-    return tuple(half * _place(c & 1, c >> 1 & 1, c >> 2) for c in range(8) if mask >> c & 1)
+    return tuple(half * _brick_index(c & 1, c >> 1 & 1, c >> 2) for c in range(8) if mask >> c & 1)
 
 
 # By level and mask, where the children of a node begin. Mask 00 has none, but that of the lowest
@@ -36,7 +36,8 @@ _CHILDREN[1][0] = _CHILDREN[1][0xFF]
 
 # By level, where the rows of a cube begin.
 _ROWS: Final = [
-    [_place(0, y, z) for z in range(1 << level) for y in range(1 << level)] for level in _LEVELS
+    [_brick_index(0, y, z) for z in range(1 << level) for y in range(1 << level)]
+    for level in _LEVELS
 ]
 
 
@@ -57,7 +58,7 @@ def line(grid: Grid, start: int, target: tuple[int, int, int]) -> "array[int]":
     array of type ``"Q"``
         Their indices, in this order.
     """
-    deltas = [q - p for p, q in zip(grid.place(start), target, strict=True)]
+    deltas = [q - p for p, q in zip(grid.coordinates(start), target, strict=True)]
     length = max(map(abs, deltas))
     axes: list[Iterable[int]] = [repeat(start)]
     for delta, stride in zip(deltas, grid.strides, strict=True):
@@ -89,7 +90,7 @@ def box(grid: Grid, start: int, target: tuple[int, int, int]) -> Iterator[tuple[
     count : int
         How many voxels each of them has.
     """
-    corners = zip(grid.place(start), target, strict=True)
+    corners = zip(grid.coordinates(start), target, strict=True)
     spans = [(min(corner), max(corner)) for corner in corners]
     first = grid.index(*(low for low, _ in spans))
     axes = [(high - low + 1, s) for (low, high), s in zip(spans, grid.strides, strict=True)]
@@ -152,7 +153,7 @@ class Brick:
         )
 
 
-def brick_strides(grid: Grid) -> list[int]:
+def brick_offsets(grid: Grid) -> list[int]:
     """Return what each place in a brick adds to the index of the brick's first voxel."""
     x, y, z = grid.strides
     return [

@@ -46,7 +46,7 @@ _QUESTION: Final = struct.Struct("<HI")
 _HEADER: Final = struct.Struct("<4sHHHHHHIIIIII")
 _MAGIC: Final = b"VXT1"
 _NO_FRAME: Final = 0xFFFF
-_REST: Final = 20  # times as long as it took to copy a page, none is copied
+_IDLE_FACTOR: Final = 20  # times as long as it took to copy a page, none is copied
 _U32: Final = 0xFFFFFFFF
 
 
@@ -77,18 +77,18 @@ class Tap:
         self._thread = threading.Thread(target=self._run, name="tap", daemon=True)
         self._thread.start()
 
-    def notice(self) -> None:
+    def notify_swap(self) -> None:
         """Take notice of a swap. Costs next to nothing unless a watcher waits for it."""
         if self._waiting:
             self._waiting = False
-            self._ring()
+            self._wake()
 
     def close(self) -> None:
         """Stop; the watcher is cut off. Twice is fine."""
         if self._closing.is_set():
             return
         self._closing.set()
-        self._ring()
+        self._wake()
         if connection := self._connection:
             with contextlib.suppress(OSError):  # it has just gone by itself
                 connection.shutdown(socket.SHUT_RDWR)
@@ -102,7 +102,7 @@ class Tap:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _ring(self) -> None:
+    def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):  # then it rings already
             self._ringer.send(b"\0")
 
@@ -124,15 +124,15 @@ class Tap:
         """
         while self._readable(watcher):
             question = watcher.recv(_QUESTION.size, socket.MSG_WAITALL)
-            if len(question) < _QUESTION.size or not self._await_other(watcher, question):
+            if len(question) < _QUESTION.size or not self._await_new_picture(watcher, question):
                 return
             began = time.thread_time()
-            header, page = self._look()
+            header, page = self._capture()
             spent = time.thread_time() - began
             watcher.sendall(header)
             watcher.sendall(page)
             del page
-            self._closing.wait(_REST * spent)
+            self._closing.wait(_IDLE_FACTOR * spent)
 
     def _readable(self, one: socket.socket) -> bool:
         """Wait until a socket has something; return False if the tap is closed instead."""
@@ -141,10 +141,10 @@ class Tap:
                 return True
         return False
 
-    def _await_other(self, watcher: socket.socket, question: bytes) -> bool:
+    def _await_new_picture(self, watcher: socket.socket, question: bytes) -> bool:
         """Wait for another picture than the watcher has; return whether there is one for it."""
         self._waiting = True  # before looking, so that no swap goes unnoticed
-        while self._name() == question:
+        while self._current_picture() == question:
             if self._wait(watcher) or self._closing.is_set():
                 return False
             self._waiting = True
@@ -159,11 +159,11 @@ class Tap:
             readable.remove(self._bell)
         return readable
 
-    def _name(self) -> bytes:
+    def _current_picture(self) -> bytes:
         """Return the question of a watcher that has the picture which is on display."""
         return _QUESTION.pack(self._device.boot, self._device.swaps & _U32)
 
-    def _look(self) -> tuple[bytes, bytes]:
+    def _capture(self) -> tuple[bytes, bytes]:
         shown = self._bench.snapshot()
         device = self._device
         header = _HEADER.pack(
@@ -174,9 +174,9 @@ class Tap:
             device.config.pixels.code,
             shown.swaps & _U32,
             shown.digest,
-            sum(device.taken.values()) & _U32,
-            sum(device.refused.values()) & _U32,
+            sum(device.taken_by_type.values()) & _U32,
+            sum(device.errors_by_code.values()) & _U32,
             device.damaged & _U32,
-            device.refused.get(spec.CODE_OVERRUN, 0) & _U32,
+            device.errors_by_code.get(spec.CODE_OVERRUN, 0) & _U32,
         )
         return header, shown.pixels + shown.palette

@@ -122,7 +122,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(segment: bytes) -> bytes:
-    """Undo `cobs_encode`."""
+    """Undo `encode_segment`."""
     out = bytearray()
     at = 0
     while at < len(segment):

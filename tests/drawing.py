@@ -10,7 +10,7 @@ from plain_decoder import PlainDecoder
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid as DeviceGrid
 from firmware_sim.memory import FORMATS, Page
-from firmware_sim.op_decoder import Unpacker
+from firmware_sim.op_decoder import OpDecoder
 from voxdisplay.raster.pixel_format import PixelFormat
 
 HEADER = bytes(3)
@@ -21,7 +21,7 @@ def page_after(payloads, grid, pixel_format):
     shape, format_ = DeviceGrid(*grid), FORMATS[pixel_format.value]
     page = Page(shape.volume, format_.size)
     bits = Config(tuple(grid), pixel_format.value).feature_bits
-    unpacker = Unpacker(shape, format_, bits)
+    unpacker = OpDecoder(shape, format_, bits)
     for payload in payloads:
         unpacker.draw(HEADER + payload, page)
     return page

@@ -11,7 +11,7 @@ from pathlib import Path
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.serve import serve_wire
 
 WAIT_S = 20
@@ -44,7 +44,7 @@ class Plug:
 
     def _run(self):
         """Serve until it is pulled out; the pump itself lets go, so that nobody else's file is."""
-        serve_wire(Wire(self.device), self._master, self._stop)
+        serve_wire(DeviceOnLine(self.device), self._master, self._stop)
         for descriptor in (self._master, self._slave):
             os.close(descriptor)
         os.close(self._stop)

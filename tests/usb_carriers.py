@@ -9,12 +9,12 @@ import os
 import threading
 import time
 
-from firmware_sim.serve import listen
+from firmware_sim.serve import listen_tcp
 from firmware_sim.usb import open_usbip
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.descriptors import BULK, Descriptors, Endpoint, Interface
 from firmware_sim.usb.device import UsbDevice
-from firmware_sim.usb.function import TRIPLE, ByteStream
+from firmware_sim.usb.function import TRIPLE, PacketStream
 from firmware_sim.usb.host import Bus
 from firmware_sim.usb.usbip_server import serve_usbip
 from voxdisplay.transport.usb import UsbTransport
@@ -35,9 +35,9 @@ class Pipe:
         )
         self.lock = threading.Lock()
         self.heard = bytearray()
-        self.to_say = ByteStream(PACKET)
+        self.to_say = PacketStream(PACKET)
 
-    def takes(self, endpoint, size):
+    def accepts(self, endpoint, size):
         del endpoint
         return len(self.heard) + size <= _ROOM
 
@@ -46,10 +46,10 @@ class Pipe:
         with self.lock:
             self.heard += packet
 
-    def packet(self, endpoint):
+    def next_packet(self, endpoint):
         del endpoint
         with self.lock:
-            return self.to_say.next()
+            return self.to_say.next_packet()
 
     def request(self, setup, data):
         del setup, data
@@ -57,7 +57,7 @@ class Pipe:
     def reset(self):
         pass
 
-    def until_due(self):
+    def next_event_s(self):
         return _POLL_S
 
 
@@ -113,7 +113,7 @@ def usb():
 def over_usbip():
     device = PipeDevice(Pipe())
     stop, stopper = os.pipe()
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         server = threading.Thread(target=serve_usbip, args=(device, listener, stop))
         server.start()
         try:

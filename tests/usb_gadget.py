@@ -19,7 +19,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from firmware_sim.serve import listen
+from firmware_sim.serve import listen_tcp
 from firmware_sim.usb.descriptors import BULK, INTERRUPT, Descriptors, Endpoint, Interface
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.usbip_server import serve_usbip
@@ -60,7 +60,7 @@ class Gadget:
 
     # what a function does
 
-    def takes(self, endpoint, size):
+    def accepts(self, endpoint, size):
         del endpoint, size
         return self.budget is None or self.budget > 0
 
@@ -72,7 +72,7 @@ class Gadget:
         if self.echoes and packet:
             self.sending.append(packet)
 
-    def packet(self, endpoint):
+    def next_packet(self, endpoint):
         if endpoint != IN or not self.sending:
             return None
         return self.sending.popleft()
@@ -86,7 +86,7 @@ class Gadget:
         self.resets += 1
         self.sending.clear()
 
-    def until_due(self):
+    def next_event_s(self):
         return None
 
 
@@ -151,7 +151,7 @@ class ToldDevice(GadgetDevice):
             sys.stdout.write(json.dumps(answer) + "\n")
             sys.stdout.flush()
 
-    def until_due(self):
+    def next_event_s(self):
         return POLL_S
 
 
@@ -164,7 +164,7 @@ def main():
             device.commands.put(json.loads(line))
         os.write(stopper, b"\0")
 
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         threading.Thread(target=obey, daemon=True).start()
         sys.stdout.write(json.dumps({"address": listener.getsockname()}) + "\n")
         sys.stdout.flush()

@@ -16,10 +16,10 @@ backends of pyusb.
 import re
 from typing import Any, Final
 
-from firmware_sim.baud_pacing import paced
+from firmware_sim.baud_pacing import with_baud
 from firmware_sim.config import Config, parse_number
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.in_process import parse_url
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.device import UsbDevice
@@ -52,7 +52,7 @@ def open_in_process(url: str) -> Backend:
     fields = parse_url(url, "sim-usb:", _KEYS)
     faults, seed = fields.pop("faults", ()), fields.pop("seed", 0)
     baud, unplug_at = fields.pop("baud", 0), fields.pop("unplug_at", None)
-    wire = paced(Wire(Device(Config(**fields)), faults, seed), baud)
+    wire = with_baud(DeviceOnLine(Device(Config(**fields)), faults, seed), baud)
     device = UsbDevice(DisplayFunction(wire))
     device.unplug_at = unplug_at
     return Backend(Bus(device))

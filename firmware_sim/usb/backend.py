@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from firmware_sim.usb import descriptors, device
 from firmware_sim.usb.device import Request, Urb
-from firmware_sim.usb.host import HIGH_SPEED, Connection, Host, Plugged
+from firmware_sim.usb.host import HIGH_SPEED, Connection, Host, PluggedDevice
 
 # What libusb calls these errors.
 _LIBUSB: Final = {
@@ -32,15 +32,15 @@ _FAILED: Final = {
 _CONTROL_S: Final = 1.0
 
 
-class _Node:
+class _SharedDevice:
     """A device that is plugged in, as all who use this backend share it."""
 
-    def __init__(self, plugged: Plugged) -> None:
+    def __init__(self, plugged: PluggedDevice) -> None:
         self.plugged = plugged
         self.claims: dict[int, _Handle] = {}
         self._connection: Connection | None = None
         self._opened = 0
-        self._said: tuple[Any, Any] | None = None
+        self._descriptors: tuple[Any, Any] | None = None
 
     def open(self) -> None:
         if not self._opened:
@@ -75,12 +75,12 @@ class _Node:
         setup = struct.pack("<BBHHH", kind, request, value, index, length)
         urb = Urb(0, length=length, setup=setup)
         self.transfer(urb, _CONTROL_S)
-        return bytes(urb.got)
+        return bytes(urb.received)
 
     @property
-    def said(self) -> tuple[Any, Any]:
+    def descriptors(self) -> tuple[Any, Any]:
         """What the device says of itself: device and configuration."""
-        if self._said is None:
+        if self._descriptors is None:
             self.open()
             try:
                 get = Request.GET_DESCRIPTOR
@@ -89,7 +89,7 @@ class _Node:
                 total = int.from_bytes(head[2:4], "little")
                 rest = self.control(0x80, get, descriptors.CONFIGURATION << 8, length=total)
                 about = descriptors.read_device(raw)
-                self._said = about, descriptors.read_configuration(rest)
+                self._descriptors = about, descriptors.read_configuration(rest)
             except ValueError as error:
                 raise _error(errno.EIO) from error
             finally:
@@ -97,13 +97,13 @@ class _Node:
             place = {"bus": self.plugged.bus, "address": self.plugged.number}
             ports = {"port_number": 1, "port_numbers": (1,), "speed": HIGH_SPEED}
             about.__dict__.update(place | ports)
-        return self._said
+        return self._descriptors
 
 
 class _Handle:
     """A device as somebody has opened it."""
 
-    def __init__(self, node: _Node) -> None:
+    def __init__(self, node: _SharedDevice) -> None:
         self.node = node
 
 
@@ -123,43 +123,45 @@ class Backend:
 
     def __init__(self, host: Host) -> None:
         self.host = host
-        self._nodes: dict[Plugged, _Node] = {}
+        self._nodes: dict[PluggedDevice, _SharedDevice] = {}
 
     # Devices
 
-    def enumerate_devices(self) -> list[_Node]:
+    def enumerate_devices(self) -> list[_SharedDevice]:
         """List the devices that are plugged in."""
         try:
             plugged = self.host.plugged()
         except OSError as error:
             raise _error(error.errno or errno.ENODEV) from error
-        self._nodes = {each: self._nodes.get(each) or _Node(each) for each in plugged}
+        self._nodes = {each: self._nodes.get(each) or _SharedDevice(each) for each in plugged}
         return list(self._nodes.values())
 
-    def get_parent(self, dev: _Node) -> None:
+    def get_parent(self, dev: _SharedDevice) -> None:
         """Give the hub of a device: there is none."""
 
-    def get_device_descriptor(self, dev: _Node) -> Any:
+    def get_device_descriptor(self, dev: _SharedDevice) -> Any:
         """Give the device descriptor."""
-        return dev.said[0]
+        return dev.descriptors[0]
 
-    def get_configuration_descriptor(self, dev: _Node, config: int) -> Any:
+    def get_configuration_descriptor(self, dev: _SharedDevice, config: int) -> Any:
         """Give a configuration; there is one."""
-        return [dev.said[1][0]][config]
+        return [dev.descriptors[1][0]][config]
 
-    def get_interface_descriptor(self, dev: _Node, intf: int, alt: int, config: int) -> Any:
+    def get_interface_descriptor(self, dev: _SharedDevice, intf: int, alt: int, config: int) -> Any:
         """Give an interface; none has alternate settings."""
         self.get_configuration_descriptor(dev, config)
-        return [dev.said[1][1][intf][0]][alt]
+        return [dev.descriptors[1][1][intf][0]][alt]
 
-    def get_endpoint_descriptor(self, dev: _Node, ep: int, intf: int, alt: int, config: int) -> Any:
+    def get_endpoint_descriptor(
+        self, dev: _SharedDevice, ep: int, intf: int, alt: int, config: int
+    ) -> Any:
         """Give an endpoint of an interface."""
         self.get_interface_descriptor(dev, intf, alt, config)
-        return dev.said[1][1][intf][1][ep]
+        return dev.descriptors[1][1][intf][1][ep]
 
     # Handles
 
-    def open_device(self, dev: _Node) -> _Handle:
+    def open_device(self, dev: _SharedDevice) -> _Handle:
         """Open a device; more than one may have it open."""
         dev.open()
         return _Handle(dev)
@@ -191,7 +193,7 @@ class Backend:
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
         """Claim an interface, unless somebody else has it."""
         node = dev_handle.node
-        if intf not in {interface.bInterfaceNumber for interface, _ in node.said[1][1]}:
+        if intf not in {interface.bInterfaceNumber for interface, _ in node.descriptors[1][1]}:
             raise _error(errno.ENOENT)
         if intf in node.plugged.drivers or node.claims.get(intf, dev_handle) is not dev_handle:
             raise _error(errno.EBUSY)
@@ -235,7 +237,7 @@ class Backend:
         del intf
         urb = Urb(ep, length=len(buff) * buff.itemsize)
         count = dev_handle.node.transfer(urb, _seconds(timeout))
-        memoryview(buff).cast("B")[:count] = urb.got
+        memoryview(buff).cast("B")[:count] = urb.received
         return count
 
     intr_write = iso_write = bulk_write  # which one, the endpoint's descriptor says
@@ -259,7 +261,7 @@ class Backend:
         else:
             urb = Urb(0, data.tobytes(), setup=setup)
         count = dev_handle.node.transfer(urb, _seconds(timeout))
-        memoryview(data).cast("B")[: len(urb.got)] = urb.got
+        memoryview(data).cast("B")[: len(urb.received)] = urb.received
         return count
 
 

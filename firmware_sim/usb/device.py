@@ -42,13 +42,13 @@ class Function(Protocol):
 
     descriptors: Descriptors
 
-    def takes(self, endpoint: int, size: int) -> bool:
+    def accepts(self, endpoint: int, size: int) -> bool:
         """Tell whether a packet of a size to an OUT endpoint has room; else it is NAKed."""
 
     def receive(self, endpoint: int, packet: bytes) -> None:
         """Take a packet."""
 
-    def packet(self, endpoint: int) -> bytes | None:
+    def next_packet(self, endpoint: int) -> bytes | None:
         """Give the next packet of an IN endpoint, at most as long as the endpoint says.
 
         None is NAK.
@@ -60,7 +60,7 @@ class Function(Protocol):
     def reset(self) -> None:
         """Forget what was under way: plugged in anew, or given a configuration."""
 
-    def until_due(self) -> float | None:
+    def next_event_s(self) -> float | None:
         """Return the seconds until something happens without the host; None if nothing will."""
 
 
@@ -107,7 +107,7 @@ class Urb:
         self.data = data
         self.length = length
         self.setup = setup
-        self.got = bytearray()
+        self.received = bytearray()
         self.actual = 0
         self.status: int | None = None
 
@@ -171,11 +171,11 @@ class UsbDevice:
             if self.packets == self.unplug_at:
                 self.unplug()
 
-    def until_due(self) -> float | None:
+    def next_event_s(self) -> float | None:
         """Return the seconds until something moves without the host; 0 if it just has."""
         before = self.packets
         self.advance()  # a tick may have come while the last packets were moved
-        return 0.0 if self.packets != before else self.function.until_due()
+        return 0.0 if self.packets != before else self.function.next_event_s()
 
     def unplug(self) -> None:
         """Go away; what was under way fails."""
@@ -218,7 +218,7 @@ class UsbDevice:
 
     def _step_out(self, address: int, urb: Urb) -> bool:
         packet = urb.data[urb.actual : urb.actual + self._endpoints[address].packet]
-        if not self.function.takes(address, len(packet)):
+        if not self.function.accepts(address, len(packet)):
             return False
         urb.actual += len(packet)
         if urb.actual == len(urb.data):
@@ -228,14 +228,14 @@ class UsbDevice:
         return True
 
     def _step_in(self, address: int, urb: Urb) -> bool:
-        packet = self.function.packet(address)
+        packet = self.function.next_packet(address)
         if packet is None:
             return False
         self.packets += 1
         if len(packet) > urb.length - urb.actual:
             urb.status = EOVERFLOW  # and the packet is lost
             return True
-        urb.got += packet
+        urb.received += packet
         urb.actual += len(packet)
         if len(packet) < self._endpoints[address].packet or urb.actual == urb.length:
             urb.status = DONE
@@ -253,8 +253,8 @@ class UsbDevice:
             urb.status = EPIPE
             return
         if setup.is_in:
-            urb.got += answer[: min(setup.length, urb.length)]
-            urb.actual = len(urb.got)
+            urb.received += answer[: min(setup.length, urb.length)]
+            urb.actual = len(urb.received)
         else:
             urb.actual = len(urb.data)
         urb.status = DONE

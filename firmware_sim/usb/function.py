@@ -8,8 +8,8 @@ import struct
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.baud_pacing import PacedWire
-from firmware_sim.device_on_line import Wire
+from firmware_sim.baud_pacing import PacedDevice
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.usb.descriptors import (
     BULK,
     CS_INTERFACE,
@@ -35,7 +35,7 @@ _LINE_CODING: Final = struct.pack("<IBBB", 115_200, 0, 0, 8)
 _DTR: Final = 1
 
 
-class ByteStream:
+class PacketStream:
     """Bytes on their way to the host, cut into packets.
 
     A transfer is over for the host when a packet is not full. So if the last one that there is to
@@ -50,19 +50,19 @@ class ByteStream:
     def __init__(self, packet: int) -> None:
         self._packet = packet
         self._bytes = bytearray()
-        self._owes_end = False
+        self._needs_zero_length = False
 
     def put(self, data: bytes) -> None:
         """Append bytes."""
         self._bytes += data
 
-    def next(self) -> bytes | None:
+    def next_packet(self) -> bytes | None:
         """Give the next packet; None if there is nothing to send."""
-        if not self._bytes and not self._owes_end:
+        if not self._bytes and not self._needs_zero_length:
             return None
         packet = bytes(self._bytes[: self._packet])
         del self._bytes[: self._packet]
-        self._owes_end = len(packet) == self._packet
+        self._needs_zero_length = len(packet) == self._packet
         return packet
 
     def __len__(self) -> int:
@@ -85,10 +85,10 @@ class DisplayFunction:
         What it says of itself. Its serial number is the device's.
     """
 
-    def __init__(self, wire: Wire | PacedWire, packet: int = HIGH_SPEED_PACKET) -> None:
+    def __init__(self, wire: DeviceOnLine | PacedDevice, packet: int = HIGH_SPEED_PACKET) -> None:
         self.wire = wire
         self._packet = packet
-        self._out = ByteStream(packet)
+        self._out = PacketStream(packet)
         bulk = (Endpoint(_OUT, BULK, packet), Endpoint(_IN, BULK, packet))
         config = wire.device.config
         texts = ("voxdisplay project", config.name, config.serial)
@@ -101,24 +101,24 @@ class DisplayFunction:
         """Give the interfaces, and the class of the whole device."""
         return (Interface(0, TRIPLE, bulk),), 0
 
-    def takes(self, endpoint: int, size: int) -> bool:
-        """See `Function.takes`. What is longer than all of an empty ring, the device refuses."""
+    def accepts(self, endpoint: int, size: int) -> bool:
+        """See `Function.accepts`. What is longer than all of an empty ring, the device refuses."""
         del endpoint
         device = self.wire.device
-        return self.wire.takes() and device.room >= min(size, device.config.rx_buffer)
+        return self.wire.accepts_data() and device.free_bytes >= min(size, device.config.rx_buffer)
 
     def receive(self, endpoint: int, packet: bytes) -> None:
         """See `Function.receive`."""
         del endpoint
         self.wire.receive(packet)
 
-    def packet(self, endpoint: int) -> bytes | None:
-        """See `Function.packet`."""
+    def next_packet(self, endpoint: int) -> bytes | None:
+        """See `Function.next_packet`."""
         if endpoint != _IN:
             return None  # there is nothing to notify of
         if not self._out:
             self._out.put(self.wire.transmit())
-        return self._out.next()
+        return self._out.next_packet()
 
     def request(self, setup: Setup, data: bytes) -> bytes | None:
         """See `Function.request`: the protocol has none."""
@@ -127,12 +127,12 @@ class DisplayFunction:
 
     def reset(self) -> None:
         """See `Function.reset`: the session ends."""
-        self._out = ByteStream(self._packet)
+        self._out = PacketStream(self._packet)
         self.wire.disconnect()
 
-    def until_due(self) -> float | None:
-        """See `Function.until_due`: the tick that swaps."""
-        return self.wire.until_tick()
+    def next_event_s(self) -> float | None:
+        """See `Function.next_event_s`: the tick that swaps."""
+        return self.wire.next_event_s()
 
 
 class SerialFunction(DisplayFunction):
@@ -144,7 +144,7 @@ class SerialFunction(DisplayFunction):
         Baud rate and the rest, as the host has set it last; they change nothing.
     """
 
-    def __init__(self, wire: Wire | PacedWire, packet: int = HIGH_SPEED_PACKET) -> None:
+    def __init__(self, wire: DeviceOnLine | PacedDevice, packet: int = HIGH_SPEED_PACKET) -> None:
         super().__init__(wire, packet)
         self.line_coding = _LINE_CODING
 

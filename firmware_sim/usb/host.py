@@ -34,7 +34,7 @@ class Connection(Protocol):
 
 
 @dataclass(frozen=True)
-class Plugged:
+class PluggedDevice:
     """A device that is plugged in.
 
     Parameters
@@ -56,7 +56,7 @@ class Plugged:
 class Host(Protocol):
     """What devices are plugged into."""
 
-    def plugged(self) -> list[Plugged]:
+    def plugged(self) -> list[PluggedDevice]:
         """List what is plugged in now."""
 
 
@@ -85,12 +85,12 @@ class Bus:
         self._changed = threading.Condition()
         self._configure()
 
-    def plugged(self) -> list[Plugged]:
+    def plugged(self) -> list[PluggedDevice]:
         """See `Host.plugged`."""
         if not self.device.plugged:
             return []
         number = self.device.number
-        return [Plugged(1, number, lambda: self._connect(number), self.drivers)]
+        return [PluggedDevice(1, number, lambda: self._connect(number), self.drivers)]
 
     def unplug(self) -> None:
         """Pull the device out; transfers under way fail."""
@@ -126,7 +126,7 @@ class Bus:
                 if left is not None and left <= 0:
                     device.unlink(urb)
                     return
-                waits = [wait for wait in (left, device.until_due()) if wait is not None]
+                waits = [wait for wait in (left, device.next_event_s()) if wait is not None]
                 self._changed.wait(min(waits, default=None))
                 device.advance()
 

@@ -67,7 +67,7 @@ class Unlink:
 
 
 @dataclass(frozen=True)
-class Returned:
+class SubmitReply:
     """A transfer is done; what came follows if it was IN. The status is 0 or a negative errno."""
 
     seqnum: int
@@ -81,7 +81,7 @@ class Returned:
 
 
 @dataclass(frozen=True)
-class Unlinked:
+class UnlinkReply:
     """What became of an `Unlink`: 0 if the transfer was done before, else a negative errno."""
 
     seqnum: int
@@ -92,7 +92,7 @@ class Unlinked:
         return _HEADER.pack(RET_UNLINK, self.seqnum, 0, 0, 0) + _UNLINKED.pack(self.status)
 
 
-def parse(raw: bytes) -> Submit | Unlink | Returned | Unlinked:
+def parse_message(raw: bytes) -> Submit | Unlink | SubmitReply | UnlinkReply:
     """Read the 48 bytes of a message.
 
     Raises
@@ -108,13 +108,13 @@ def parse(raw: bytes) -> Submit | Unlink | Returned | Unlinked:
         return Unlink(seqnum, devid, _UNLINK.unpack_from(raw, _HEADER.size)[0])
     if command == RET_SUBMIT:
         status, actual, *_ = _RETURN.unpack_from(raw, _HEADER.size)
-        return Returned(seqnum, status, actual)
+        return SubmitReply(seqnum, status, actual)
     if command == RET_UNLINK:
-        return Unlinked(seqnum, _UNLINKED.unpack_from(raw, _HEADER.size)[0])
+        return UnlinkReply(seqnum, _UNLINKED.unpack_from(raw, _HEADER.size)[0])
     raise ValueError(f"there is no USB/IP message {command}")
 
 
-def describe(about: Descriptors, number: int, configuration: int) -> bytes:
+def pack_device(about: Descriptors, number: int, configuration: int) -> bytes:
     """Give a device as lists and imports do, without its interfaces."""
     return DEVICE.pack(
         f"/sys/devices/voxdisplay/{BUS_ID}".encode(),

@@ -15,10 +15,10 @@ from firmware_sim.readiness import wait_ready
 from firmware_sim.usb import usbip
 from firmware_sim.usb.descriptors import IN
 from firmware_sim.usb.device import ECONNRESET, ESHUTDOWN, Urb
-from firmware_sim.usb.host import SET_CONFIGURATION, Plugged
+from firmware_sim.usb.host import SET_CONFIGURATION, PluggedDevice
 
 DEFAULT_PORT: Final = 3240
-_ANSWER_S: Final = 5.0  # for a server to connect, and to answer what it answers at once
+_REPLY_TIMEOUT_S: Final = 5.0  # for a server to connect, and to answer what it answers at once
 _CHUNK: Final = 1 << 18
 _MOST_DEVICES: Final = 256
 
@@ -35,7 +35,7 @@ class UsbIpHost:
     def __init__(self, host: str, port: int = DEFAULT_PORT) -> None:
         self._address = host, port
 
-    def plugged(self) -> list[Plugged]:
+    def plugged(self) -> list[PluggedDevice]:
         """See `Host.plugged`."""
         found = []
         with self._connected() as sock:
@@ -48,23 +48,23 @@ class UsbIpHost:
                 found.append(self._plugged(*about[1:4]))
         return found
 
-    def _plugged(self, name: bytes, bus: int, number: int) -> Plugged:
-        return Plugged(bus, number, lambda: self._import(name))
+    def _plugged(self, name: bytes, bus: int, number: int) -> PluggedDevice:
+        return PluggedDevice(bus, number, lambda: self._import(name))
 
     def _connected(self) -> socket.socket:
-        sock = socket.create_connection(self._address, timeout=_ANSWER_S)
+        sock = socket.create_connection(self._address, timeout=_REPLY_TIMEOUT_S)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return sock
 
-    def _import(self, name: bytes) -> "_Imported":
+    def _import(self, name: bytes) -> "_ImportedDevice":
         sock = self._connected()
         try:
             request = usbip.OPERATION.pack(usbip.VERSION, usbip.REQUEST_IMPORT, 0)
             sock.sendall(request + usbip.BUS_ID_FIELD.pack(name))
             _check_reply(sock, usbip.REPLY_IMPORT)
             about = usbip.DEVICE.unpack(_read(sock, usbip.DEVICE.size))
-            imported = _Imported(sock, about[2] << 16 | about[3])
-            imported.transfer(Urb(0, setup=SET_CONFIGURATION), _ANSWER_S)
+            imported = _ImportedDevice(sock, about[2] << 16 | about[3])
+            imported.transfer(Urb(0, setup=SET_CONFIGURATION), _REPLY_TIMEOUT_S)
         except BaseException:
             sock.close()
             raise
@@ -90,7 +90,7 @@ def _read(sock: socket.socket, size: int) -> bytes:
     return data
 
 
-class _Imported:
+class _ImportedDevice:
     """A device that this host has.
 
     Threads may transfer at the same time: whoever waits reads for all.
@@ -105,13 +105,13 @@ class _Imported:
         self._in = bytearray()
         self._changed = threading.Condition()
         self._reading = False
-        self._gone = False
+        self._lost = False
 
     def transfer(self, urb: Urb, timeout_s: float | None) -> None:
         """See `Connection.transfer`."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         with self._changed:
-            if self._gone:
+            if self._lost:
                 raise ConnectionError("it is not plugged in")
             is_in = bool(urb.endpoint & IN or (urb.setup and urb.setup[0] & IN))
             length = urb.length if is_in else len(urb.data)
@@ -126,8 +126,8 @@ class _Imported:
             unlink = self._next()
             self._unlinks[unlink] = seqnum
             self._send(usbip.Unlink(unlink, self._devid, seqnum).pack())
-            if not self._wait(urb, time.monotonic() + _ANSWER_S, unlink):
-                self._lose()
+            if not self._wait(urb, time.monotonic() + _REPLY_TIMEOUT_S, unlink):
+                self._fail_all()
 
     def _next(self) -> int:
         self._seqnum += 1
@@ -137,11 +137,11 @@ class _Imported:
         try:
             self._socket.sendall(data)
         except OSError:
-            self._lose()
+            self._fail_all()
 
-    def _lose(self) -> None:
+    def _fail_all(self) -> None:
         """Fail all that is under way: the device is gone."""
-        self._gone = True
+        self._lost = True
         for urb in self._urbs.values():
             urb.status = ESHUTDOWN
         self._urbs.clear()
@@ -175,38 +175,38 @@ class _Imported:
             self._changed.notify_all()
         if data:
             self._in += data
-            while self._take():
+            while self._parse_message():
                 pass
         elif data is not None:
-            self._lose()
+            self._fail_all()
 
-    def _take(self) -> bool:
+    def _parse_message(self) -> bool:
         """Take a message, if a whole one is there."""
         if len(self._in) < usbip.MESSAGE_BYTES:
             return False
         try:
-            message = usbip.parse(bytes(self._in[: usbip.MESSAGE_BYTES]))
+            message = usbip.parse_message(bytes(self._in[: usbip.MESSAGE_BYTES]))
         except ValueError:
             message = None
         end = usbip.MESSAGE_BYTES
-        if isinstance(message, usbip.Returned):
+        if isinstance(message, usbip.SubmitReply):
             urb = self._urbs.get(message.seqnum)
             if urb is None or not 0 <= message.actual <= max(len(urb.data), urb.length):
-                self._lose()
+                self._fail_all()
                 return False
             end += message.actual if urb.length else 0
             if len(self._in) < end:
                 return False
-            urb.got += self._in[usbip.MESSAGE_BYTES : end]
+            urb.received += self._in[usbip.MESSAGE_BYTES : end]
             urb.actual = message.actual
             del self._urbs[message.seqnum]
             urb.status = -message.status
-        elif isinstance(message, usbip.Unlinked):
+        elif isinstance(message, usbip.UnlinkReply):
             given_up = self._urbs.pop(self._unlinks.pop(message.seqnum, 0), None)
             if given_up:
                 given_up.status = ECONNRESET
         else:
-            self._lose()
+            self._fail_all()
             return False
         del self._in[:end]
         return True
@@ -214,7 +214,7 @@ class _Imported:
     def close(self) -> None:
         """See `Connection.close`."""
         with self._changed:
-            self._lose()
+            self._fail_all()
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)  # wakes who reads
         self._socket.close()

@@ -16,8 +16,8 @@ from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, Urb, UsbDevice
 
 _CHUNK: Final = 1 << 18
 # What a host may have under way, as Linux limits it for programs; and what it may leave unread.
-MOST_BYTES: Final = 16 << 20
-CLOGGED: Final = 1 << 20
+MAX_PENDING_BYTES: Final = 16 << 20
+MAX_UNREAD_BYTES: Final = 1 << 20
 _MOST_CONNECTIONS: Final = 16
 
 
@@ -39,7 +39,7 @@ class Connection:
 
     def __init__(self, server: "Server") -> None:
         self.out = bytearray()
-        self.over = False
+        self.closing = False
         self._server = server
         self._in = bytearray()
         self._urbs: dict[int, Urb] = {}
@@ -47,11 +47,11 @@ class Connection:
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""
         self._in += data
-        self.go_on()
+        self.process()
 
-    def go_on(self) -> None:
+    def process(self) -> None:
         """Take what the host has sent, as long as it reads the answers."""
-        while not self.over and len(self.out) < CLOGGED:
+        while not self.closing and len(self.out) < MAX_UNREAD_BYTES:
             if not (self._message() if self.imported else self._operation()):
                 return
 
@@ -67,7 +67,7 @@ class Connection:
             return False
         version, code, _ = usbip.OPERATION.unpack_from(self._in)
         if version != usbip.VERSION:
-            self.over = True
+            self.closing = True
         elif code == usbip.REQUEST_LIST:
             del self._in[: usbip.OPERATION.size]
             self._list()
@@ -79,7 +79,7 @@ class Connection:
             del self._in[:end]
             self._import(name.rstrip(b"\0"))
         else:
-            self.over = True
+            self.closing = True
         return True
 
     def _list(self) -> None:
@@ -88,10 +88,10 @@ class Connection:
         self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_LIST, usbip.OK)
         self.out += usbip.COUNT.pack(device.plugged)
         if device.plugged:
-            self.out += usbip.describe(about, device.number, device.configuration)
+            self.out += usbip.pack_device(about, device.number, device.configuration)
             for interface in about.interfaces:
                 self.out += usbip.INTERFACE.pack(*interface.triple)
-        self.over = True
+        self.closing = True
 
     def _import(self, name: bytes) -> None:
         server = self._server
@@ -104,10 +104,10 @@ class Connection:
         self.out += usbip.OPERATION.pack(usbip.VERSION, usbip.REPLY_IMPORT, status)
         if status == usbip.OK:
             about = device.function.descriptors
-            self.out += usbip.describe(about, device.number, device.configuration)
+            self.out += usbip.pack_device(about, device.number, device.configuration)
             server.owner = self
         else:
-            self.over = True
+            self.closing = True
 
     # After it
 
@@ -115,9 +115,9 @@ class Connection:
         if len(self._in) < usbip.MESSAGE_BYTES:
             return False
         try:
-            message = usbip.parse(bytes(self._in[: usbip.MESSAGE_BYTES]))
+            message = usbip.parse_message(bytes(self._in[: usbip.MESSAGE_BYTES]))
         except ValueError:
-            self.over = True
+            self.closing = True
             return False
         if isinstance(message, usbip.Submit):
             return self._submit(message)
@@ -125,13 +125,13 @@ class Connection:
         if isinstance(message, usbip.Unlink):
             self._unlink(message)
         else:
-            self.over = True
+            self.closing = True
         return True
 
     def _submit(self, message: usbip.Submit) -> bool:
         under_way = sum(max(len(urb.data), urb.length) for urb in self._urbs.values())
-        if not 0 <= message.length <= MOST_BYTES - under_way:
-            self.over = True
+        if not 0 <= message.length <= MAX_PENDING_BYTES - under_way:
+            self.closing = True
             return False
         end = usbip.MESSAGE_BYTES + (0 if message.is_in else message.length)
         if len(self._in) < end:
@@ -158,7 +158,7 @@ class Connection:
                 del self._urbs[message.target]
                 status = ECONNRESET
         self.complete()
-        self.out += usbip.Unlinked(message.seqnum, -status).pack()
+        self.out += usbip.UnlinkReply(message.seqnum, -status).pack()
 
     def complete(self) -> None:
         """Answer the transfers that are done."""
@@ -166,7 +166,7 @@ class Connection:
             if urb.status is not None:
                 del self._urbs[seqnum]
                 status = DONE if urb.status == ECONNRESET else urb.status
-                self.out += usbip.Returned(seqnum, -status, urb.actual).pack() + urb.got
+                self.out += usbip.SubmitReply(seqnum, -status, urb.actual).pack() + urb.received
 
 
 class Server:
@@ -203,10 +203,10 @@ class Server:
         with contextlib.ExitStack() as stack:
             stack.callback(self._close_all)
             while True:
-                taking = [s for s, c in self._connections.items() if len(c.out) < CLOGGED]
+                taking = [s for s, c in self._connections.items() if len(c.out) < MAX_UNREAD_BYTES]
                 sending = [s for s, c in self._connections.items() if c.out]
                 readers: list[socket.socket | int] = [listener, stop, *taking]
-                ready, _ = wait_ready(readers, sending, self.device.until_due())
+                ready, _ = wait_ready(readers, sending, self.device.next_event_s())
                 if stop in ready:
                     return
                 if listener in ready:
@@ -219,7 +219,7 @@ class Server:
                     self.owner.complete()
                 elif self.owner:  # the end of the connection says it all
                     self.owner.out.clear()
-                    self.owner.over = True
+                    self.owner.closing = True
                 for sock in list(self._connections):
                     self._write(sock)
 
@@ -249,13 +249,13 @@ class Server:
         try:
             if connection.out:
                 del connection.out[: sock.send(connection.out)]
-                connection.go_on()
+                connection.process()
         except BlockingIOError:
             return
         except OSError:
-            connection.over = True
+            connection.closing = True
             connection.out.clear()
-        if connection.over and not connection.out:
+        if connection.closing and not connection.out:
             self._close(sock)
 
     def _close(self, sock: socket.socket) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Session, around, mutant, on_hello
 from firmware_sim import device, spec
-from firmware_sim.device_on_line import Wire
-from firmware_sim.packet_error import Refusal
-from firmware_sim.session import State, Verdict
+from firmware_sim.device_on_line import DeviceOnLine
+from firmware_sim.packet_error import PacketError
+from firmware_sim.session import BackPage, DataAction
 
 
 def _ack(patch, change):
@@ -124,10 +124,10 @@ def damaged_begins_with_the_session(patch):
     on_hello(patch, lambda self, packet, session: setattr(self, "damaged", 0))
 
 
-@mutant("9/silent-acks", silent=8)
+@mutant("9/silent-acks", max_silent_acks=8)
 def too_many_silent_acks(patch):
     def data(old, self, *args):
-        object.__setattr__(self.config, "silent", 12)
+        object.__setattr__(self.config, "max_silent_acks", 12)
         old(self, *args)
 
     around(patch, Device, "_data", data)
@@ -137,14 +137,14 @@ def too_many_silent_acks(patch):
 def duplicates_applied(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
-        self.again = verdict is Verdict.DUPLICATE
+        self.again = verdict is DataAction.DUPLICATE
         return verdict
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
     def data(old, self, session, packet, flags, seq, frame):
         old(self, session, packet, flags, seq, frame)
-        if session.again and session.state is State.FILLING:
+        if session.again and session.state is BackPage.FILLING:
             self._unpacker.draw(packet, self.memory.back)
 
     around(patch, Device, "_data", data)
@@ -177,18 +177,18 @@ def old_duplicates_refused(patch):
 def window_of_31(patch):
     def judge(old, self, seq, frame, flags):
         if self._ahead(seq) == 31:
-            raise Refusal(spec.CODE_SEQUENCE, 1, "")
+            raise PacketError(spec.CODE_SEQUENCE, 1, "")
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("9.1/window-edges", "9.1/around-256")
 def window_of_33(patch):
     def judge(old, self, seq, frame, flags):
-        return Verdict.DROP if self._ahead(seq) == 32 else old(self, seq, frame, flags)
+        return DataAction.DROP if self._ahead(seq) == 32 else old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("9.1/around-256")
@@ -240,7 +240,7 @@ def _idle(patch, lapse):
         self.heard_s = now
         old(self, data)
 
-    around(patch, Wire, "receive", receive)
+    around(patch, DeviceOnLine, "receive", receive)
 
 
 @mutant("9.2/does-not-lapse", likely="must not count the time")

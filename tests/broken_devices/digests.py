@@ -33,7 +33,7 @@ def digest_adds_dark_voxels(patch):
 
     old = Page.digest
     patch.setattr(Page, "digest", property(digest))
-    patch.setattr(Page, "copy", lambda self, other: self.put(0, bytes(other.pixels)))
+    patch.setattr(Page, "copy_from", lambda self, other: self.put(0, bytes(other.pixels)))
 
 
 @mutant("8/overwritten", "8/erased")
@@ -41,7 +41,7 @@ def digest_forgets_to_take_out(patch):
     around(
         patch,
         Page,
-        "_replaced",
+        "_log_replaced",
         lambda old, self, i, before, now: old(self, i, bytes(len(before)), now),
     )
 

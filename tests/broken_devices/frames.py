@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Page, Session, around, mutant
 from firmware_sim import device, memory, spec
-from firmware_sim.packet_error import Refusal
-from firmware_sim.session import State, Verdict
+from firmware_sim.packet_error import PacketError
+from firmware_sim.session import BackPage, DataAction
 
 
 @mutant("6/only-by-commit", "6/given-up", "6/many-packets", spreads=True)
@@ -13,9 +13,9 @@ def swap_without_commit(patch):
     def mark(old, self, seq, flags):
         old(self, seq, flags)
         if not self.received:
-            self.state = State.PENDING
+            self.state = BackPage.PENDING
 
-    around(patch, Session, "mark", mark)
+    around(patch, Session, "mark_received", mark)
 
 
 @mutant("6/only-whole", "6/two-commits", "9.1/out-of-order")
@@ -23,9 +23,9 @@ def swap_of_what_is_not_whole(patch):
     def mark(old, self, seq, flags):
         old(self, seq, flags)
         if self._commit is not None:
-            self.state = State.PENDING
+            self.state = BackPage.PENDING
 
-    around(patch, Session, "mark", mark)
+    around(patch, Session, "mark_received", mark)
 
 
 @mutant("6/two-commits")
@@ -35,41 +35,41 @@ def highest_commit_counts(patch):
             flags &= ~spec.DATA_FLAG_COMMIT
         old(self, seq, flags)
 
-    around(patch, Session, "mark", mark)
+    around(patch, Session, "mark_received", mark)
 
 
 @mutant("6/keep", "5/keep-in-new-session", "8/kept", spreads=True)
 def keep_starts_dark(patch):
-    around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, True))
+    around(patch, memory.Memory, "begin_frame", lambda old, self, dark: old(self, True))
 
 
 @mutant("6/clear", "7/move", spreads=True)
 def clear_does_not_clear(patch):
-    around(patch, memory.Memory, "begin", lambda old, self, dark: old(self, False))
+    around(patch, memory.Memory, "begin_frame", lambda old, self, dark: old(self, False))
 
 
 @mutant("6/keep", "5/keep-in-new-session", spreads=True)
 def keep_is_the_page_before_last(patch):
-    around(patch, memory.Memory, "begin", lambda old, self, dark: dark and old(self, True))
+    around(patch, memory.Memory, "begin_frame", lambda old, self, dark: dark and old(self, True))
 
 
 @mutant("6/given-up", "8/given-up")
 def given_up_frame_stays(patch):
     def begin(old, self, frame, flags):
-        given_up = self.state is State.FILLING
+        given_up = self.state is BackPage.FILLING
         old(self, frame, flags)
         self.given_up = given_up
 
-    around(patch, Session, "begin", begin)
+    around(patch, Session, "begin_frame", begin)
 
     def data(old, self, session, packet, flags, seq, frame):
-        around_memory = self.memory.begin
+        around_memory = self.memory.begin_frame
         session.given_up = False
-        self.memory.begin = lambda dark: None if session.given_up else around_memory(dark)
+        self.memory.begin_frame = lambda dark: None if session.given_up else around_memory(dark)
         try:
             old(self, session, packet, flags, seq, frame)
         finally:
-            self.memory.begin = around_memory
+            self.memory.begin_frame = around_memory
 
     around(patch, Device, "_data", data)
 
@@ -79,8 +79,8 @@ def swap_not_reported(patch):
     def tick(_, self):
         if self.session and self.pending:
             self._swap(self.session)
-            if self._waiting:
-                packet, self._waiting, self._waiting_size = self._waiting, b"", 0
+            if self._deferred:
+                packet, self._deferred, self._deferred_bytes = self._deferred, b"", 0
                 self._dispatch(packet)
                 self._drain()
 
@@ -106,18 +106,18 @@ def next_does_not_wait(patch):
     patch.setattr(Session, "must_wait", lambda *_: False)
 
     def judge(old, self, seq, frame, flags):
-        if self.state is State.PENDING:
-            self.state = State.EMPTY
+        if self.state is BackPage.PENDING:
+            self.state = BackPage.EMPTY
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("6/waits-unchecked")
 def next_is_checked_while_pending(patch):
     def must_wait(old, self, seq, frame):
         if old(self, seq, frame) and frame != (self._newest + 1) % 256:
-            raise Refusal(spec.CODE_FRAME, 2, "")
+            raise PacketError(spec.CODE_FRAME, 2, "")
         return old(self, seq, frame)
 
     around(patch, Session, "must_wait", must_wait)
@@ -125,8 +125,8 @@ def next_is_checked_while_pending(patch):
     def dispatch(old, self, packet):
         try:
             old(self, packet)
-        except Refusal as refusal:
-            self._refuse(packet[1], packet[2], refusal)
+        except PacketError as refusal:
+            self._send_error(packet[1], packet[2], refusal)
             self.session = None
 
     around(patch, Device, "_dispatch", dispatch)
@@ -137,8 +137,8 @@ def hello_overtakes_what_waits(patch):
     def take(old, self, data, at):
         at = old(self, data, at)
         hello = data[at:].rfind(b"\x02\x30")
-        if self._waiting and hello >= 0:
-            self._waiting = b""
+        if self._deferred and hello >= 0:
+            self._deferred = b""
             return old(self, data, at + hello)
         return at
 
@@ -151,35 +151,35 @@ def any_id_begins(patch):
         verdict = None
         try:
             verdict = old(self, seq, frame, flags)
-        except Refusal as refusal:
+        except PacketError as refusal:
             if refusal.code != spec.CODE_FRAME or frame == self._newest:
                 raise
-            verdict = Verdict.BEGIN
+            verdict = DataAction.BEGIN
         return verdict
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("6/next-while-missing", "6/other-while-missing", "6/first-while-missing")
 def dropped_is_marked_received(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
-        if verdict is Verdict.DROP:
+        if verdict is DataAction.DROP:
             self.received |= 1 << self._ahead(seq) >> 1
         return verdict
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("6/next-while-missing", "6/other-while-missing", "6/first-while-missing")
 def dropped_is_refused(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
-        if verdict is Verdict.DROP:
-            raise Refusal(spec.CODE_FRAME, 2, "")
+        if verdict is DataAction.DROP:
+            raise PacketError(spec.CODE_FRAME, 2, "")
         return verdict
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant(
@@ -202,7 +202,7 @@ def clear_flag_not_compared(patch):
     def check_own(old, self, seq, flags):
         old(self, seq, flags & ~1 | self._clear)
 
-    around(patch, Session, "_check_own", check_own)
+    around(patch, Session, "_check_same_frame", check_own)
 
 
 @mutant("6/behind-commit")
@@ -212,27 +212,27 @@ def behind_commit_taken(patch):
         old(self, seq, flags)
         self._commit = commit
 
-    around(patch, Session, "_check_own", check_own)
+    around(patch, Session, "_check_same_frame", check_own)
 
 
 @mutant("6/after-display", "11/order-of-packet")
 def shown_frame_is_drawn_on(patch):
     def check_own(old, self, seq, flags):
-        if self.state is not State.EMPTY or self.shown is None:
+        if self.state is not BackPage.EMPTY or self.shown is None:
             old(self, seq, flags)
 
-    around(patch, Session, "_check_own", check_own)
+    around(patch, Session, "_check_same_frame", check_own)
 
 
 @mutant("6/given-up", "11/order-of-packet")
 def clear_before_id(patch):
     def judge(old, self, seq, frame, flags):
-        begun = self.state is State.FILLING
+        begun = self.state is BackPage.FILLING
         if begun and not self._is_duplicate(seq) and bool(flags & 1) != self._clear:
-            raise Refusal(spec.CODE_FRAME, 0, "")
+            raise PacketError(spec.CODE_FRAME, 0, "")
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant(
@@ -250,16 +250,16 @@ def clear_before_id(patch):
 def out_of_order_begin_dropped(patch):
     def judge(old, self, seq, frame, flags):
         verdict = old(self, seq, frame, flags)
-        return Verdict.DROP if verdict is Verdict.BEGIN and self._ahead(seq) else verdict
+        return DataAction.DROP if verdict is DataAction.BEGIN and self._ahead(seq) else verdict
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("6/empty-packets", spreads=True)
 def empty_data_refused(patch):
     def data(old, self, session, packet, *rest):
         if len(packet) == 3:
-            raise Refusal(spec.CODE_LENGTH, 0, "")
+            raise PacketError(spec.CODE_LENGTH, 0, "")
         old(self, session, packet, *rest)
 
     around(patch, Device, "_data", data)
@@ -269,10 +269,10 @@ def empty_data_refused(patch):
 def ids_wrap_at_255(patch):
     def judge(old, self, seq, frame, flags):
         if frame == 255 and self._newest == 254 and self.shown is None:
-            raise Refusal(spec.CODE_FRAME, 2, "")
+            raise PacketError(spec.CODE_FRAME, 2, "")
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("6/one-after-another", spreads=True)
@@ -288,8 +288,8 @@ def fifth_swap_shows_the_wrong_page(patch):
 @mutant("6/own-while-pending")
 def own_while_pending_dropped(patch):
     def judge(old, self, seq, frame, flags):
-        if self.state is State.PENDING and frame == self._newest:
-            return Verdict.DROP
+        if self.state is BackPage.PENDING and frame == self._newest:
+            return DataAction.DROP
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)

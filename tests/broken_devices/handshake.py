@@ -6,13 +6,15 @@ import dataclasses
 
 from broken_devices.mutant import Device, Session, around, mutant, on_hello
 from firmware_sim import device, info, memory, spec
-from firmware_sim.packet_error import Refusal
-from firmware_sim.session import State
+from firmware_sim.packet_error import PacketError
+from firmware_sim.session import BackPage
 
 
 def _announce(patch, **changes):
-    old = info.announce
-    patch.setattr(device, "announce", lambda *args: dataclasses.replace(old(*args), **changes))
+    old = info.make_announcement
+    patch.setattr(
+        device, "make_announcement", lambda *args: dataclasses.replace(old(*args), **changes)
+    )
 
 
 @mutant("5/info-fields", "9.2/returned")
@@ -95,7 +97,7 @@ def other_major_unanswered(patch):
 def longer_hello_refused(patch):
     def hello(old, self, packet):
         if len(packet) > 8:
-            raise Refusal(spec.CODE_LENGTH, 0, "")
+            raise PacketError(spec.CODE_LENGTH, 0, "")
         old(self, packet)
 
     around(patch, Device, "_hello", hello)
@@ -105,7 +107,7 @@ def longer_hello_refused(patch):
 def hello_fields_checked(patch):
     def hello(old, self, packet):
         if packet[1] or packet[7:8] > b"\0":
-            raise Refusal(spec.CODE_FIELD, 1, "")
+            raise PacketError(spec.CODE_FIELD, 1, "")
         old(self, packet)
 
     around(patch, Device, "_hello", hello)
@@ -121,7 +123,7 @@ def session_zero_taken(patch):
     def hello(old, self, packet):
         try:
             old(self, packet)
-        except Refusal as refusal:
+        except PacketError as refusal:
             if refusal.code != spec.CODE_FIELD:
                 raise
             self.session = Session(0)
@@ -133,7 +135,7 @@ def session_zero_taken(patch):
 @mutant("5/filling-dropped")
 def hello_shows_what_was_begun(patch):
     def hello(old, self, packet):
-        if self.session and self.session.state is State.FILLING:
+        if self.session and self.session.state is BackPage.FILLING:
             self.memory.swap()
         old(self, packet)
 

@@ -12,7 +12,7 @@ from firmware_sim import device, memory, op_decoder, operands, receiver
 from firmware_sim import session as sessions
 
 Device, Session, Receiver = device.Device, sessions.Session, receiver.Receiver
-Decoder, Operands, Page = op_decoder._Decoder, operands.Operands, memory.Page
+Decoder, Operands, Page = op_decoder._PacketDecoder, operands.Operands, memory.Page
 
 
 @dataclass(frozen=True)

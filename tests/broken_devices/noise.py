@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Receiver, around, mutant
 from firmware_sim import op_decoder, spec
-from firmware_sim.packet_error import Refusal
+from firmware_sim.packet_error import PacketError
 
 
 @mutant("3/too-long", "11/overrun", likely="crashed")
@@ -14,7 +14,7 @@ def restarts_on_long_noise(patch):
         if self._receiver.size > 200:
             self.power_cycle()
 
-    around(patch, Device, "_damage", damage)
+    around(patch, Device, "_count_damaged", damage)
 
 
 @mutant(
@@ -55,10 +55,10 @@ def dies_of_a_reserved_op(patch):
         if packet[3:4] == b"\xa0" and packet[4:5] == b"\x1f":
             self.dead = True
         if getattr(self, "dead", False):
-            raise Refusal(spec.CODE_OP, 0, "")
+            raise PacketError(spec.CODE_OP, 0, "")
         old(self, packet, page)
 
-    around(patch, op_decoder.Unpacker, "draw", draw)
+    around(patch, op_decoder.OpDecoder, "draw", draw)
 
 
 @mutant(
@@ -80,7 +80,7 @@ def half_a_packet_stays(patch):
     def begin(old, self):
         torn = getattr(self, "torn", False)
         old(self)
-        self._bad = torn
+        self._too_long = torn
         self.torn = False
 
     around(patch, Receiver, "_begin", begin)

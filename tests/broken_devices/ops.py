@@ -22,7 +22,7 @@ def y_and_z_swapped(patch):
         x, y, z = old(self)
         return x, z, y
 
-    around(patch, Operands, "place", place)
+    around(patch, Operands, "coordinates", place)
 
 
 @mutant("2/scan-order", "7/move", "7.1/octants", spreads=True)
@@ -35,7 +35,7 @@ def z_runs_fastest(patch):
     patch.setattr(Grid, "index", lambda self, x, y, z: z + self.nz * (y + self.ny * x))
     patch.setattr(
         Grid,
-        "place",
+        "coordinates",
         lambda self, i: (i // self.nz // self.ny, i // self.nz % self.ny, i % self.nz),
     )
 
@@ -57,7 +57,7 @@ def step_one_too_few(patch):
         crumbs = int.from_bytes(raw, "little") & (1 << 2 * count - 2) - 1
         old(self, octant, count - 1, crumbs.to_bytes(len(raw), "little")[: (count + 2) // 4])
 
-    around(patch, Decoder, "_walk", walk)
+    around(patch, Decoder, "_draw_chain", walk)
 
 
 @mutant(
@@ -69,9 +69,12 @@ def step_one_too_few(patch):
     likely="taken for rising",
 )
 def octant_signs(patch):
-    around(patch, Grid, "steps", lambda old, self, octant: old(self, octant ^ 7))
+    around(patch, Grid, "crumb_offsets", lambda old, self, octant: old(self, octant ^ 7))
     around(
-        patch, Grid, "leaves", lambda old, self, i, octant, moves: old(self, i, octant ^ 7, moves)
+        patch,
+        Grid,
+        "chain_leaves",
+        lambda old, self, i, octant, moves: old(self, i, octant ^ 7, moves),
     )
 
 
@@ -101,7 +104,7 @@ def chain_start_left_out(patch):
         if before is not None:
             self._page.put(first, bytes(before))
 
-    around(patch, Decoder, "_walk", walk)
+    around(patch, Decoder, "_draw_chain", walk)
 
 
 @mutant("7.1/chain-cursor", likely="stayed at the first")
@@ -111,18 +114,18 @@ def chain_cursor_stays(patch):
         old(self, octant, count, raw)
         self._cursor = first
 
-    around(patch, Decoder, "_walk", walk)
+    around(patch, Decoder, "_draw_chain", walk)
 
 
 @mutant("7.8/step-outside")
 def step_wraps_around(patch):
     def leaves(_, self, index, octant, moves):
-        steps = self.steps(octant)
+        steps = self.crumb_offsets(octant)
         end = index + moves[0] * steps[0]
         end += moves[1] * (steps[1] - steps[0]) + moves[2] * (steps[2] - steps[0])
         return not 0 <= end < self.volume
 
-    around(patch, Grid, "leaves", leaves)
+    around(patch, Grid, "chain_leaves", leaves)
 
 
 @mutant("7.2/counts", "7.8/past-the-end", spreads=True, likely="31 + k")
@@ -163,7 +166,7 @@ def literal_leaves_pen(patch):
         old(self, count, pixels)
         self._pen = pen
 
-    around(patch, Decoder, "_write", write)
+    around(patch, Decoder, "_write_pixels", write)
 
 
 @mutant(
@@ -186,7 +189,7 @@ def mono_high_bit_first(patch):
 @mutant("11/pixel", pixel_format="mono1")
 def mono_pen_of_two(patch):
     def pen(old, self, low):
-        value = self._in.take(1)
+        value = self._operands.take(1)
         self._pen = bytes((value[0] & 1,))
 
     on_op(patch, "pen", pen)
@@ -223,11 +226,11 @@ def pen_not_reset(patch):
         decoder._pen = getattr(self, "pen", decoder._pen)
         while (op := inner.op()) is not None:
             if self.ops[op] is None:
-                raise inner.refusal(spec.CODE_OP, "")
+                raise inner.error(spec.CODE_OP, "")
             self.ops[op](decoder, op & 31)
         self.pen = decoder._pen
 
-    around(patch, op_decoder.Unpacker, "draw", draw)
+    around(patch, op_decoder.OpDecoder, "draw", draw)
 
 
 @mutant("7/each-packet-anew", spreads=True, likely="cursor is not reset")
@@ -238,11 +241,11 @@ def cursor_not_reset(patch):
         decoder._cursor = getattr(page, "cursor", 0)
         while (op := inner.op()) is not None:
             if self.ops[op] is None:
-                raise inner.refusal(spec.CODE_OP, "")
+                raise inner.error(spec.CODE_OP, "")
             self.ops[op](decoder, op & 31)
         page.cursor = decoder._cursor
 
-    around(patch, op_decoder.Unpacker, "draw", draw)
+    around(patch, op_decoder.OpDecoder, "draw", draw)
 
     def clear(old, self):
         self.cursor = 0
@@ -253,7 +256,7 @@ def cursor_not_reset(patch):
 
 @mutant("11/padding")
 def end_padding_taken(patch):
-    on_op(patch, "end", lambda old, self, low: self._in.rest())
+    on_op(patch, "end", lambda old, self, low: self._operands.remaining())
 
 
 @mutant("11/padding", "11/difference-padding", "11/order-of-op")
@@ -263,7 +266,7 @@ def unused_bits_taken(patch):
         used = count * bits_ % 8
         return raw[:-1] + bytes((raw[-1] & (1 << used) - 1,)) if used else raw
 
-    around(patch, Operands, "small", small)
+    around(patch, Operands, "packed", small)
 
 
 @mutant(
@@ -279,7 +282,7 @@ def reserved_ops_skipped(patch):
         table[0x1F] = table[0x07] = lambda decoder, low: None
         return table
 
-    around(patch, op_decoder, "_ops", ops)
+    around(patch, op_decoder, "_op_table", ops)
 
 
 @mutant("7.8/past-the-end", "11/first-op-first")
@@ -289,7 +292,7 @@ def run_past_the_end_is_cut(patch):
             raise self._outside("")
         return min(count, self._grid.volume - self._cursor)
 
-    around(patch, Decoder, "_room", room)
+    around(patch, Decoder, "_check_room", room)
 
 
 @mutant("11/pixel-padding", "11/padding", "11/order-of-op", pixel_format="mono1")
@@ -309,8 +312,8 @@ def pen_begins_at_1(patch):
 @mutant("7/end", "3/cobs-groups")
 def end_needs_padding(patch):
     def end(old, self, low):
-        if len(self._in._packet) == self._in._at:
-            raise self._in.refusal(spec.CODE_TRUNCATED, "")
+        if len(self._operands._packet) == self._operands._at:
+            raise self._operands.error(spec.CODE_TRUNCATED, "")
         old(self, low)
 
     on_op(patch, "end", end)

@@ -21,7 +21,7 @@ from firmware_sim import crc, device, receiver, sender, spec
 def crc_not_checked(patch):
     def end(old, self):
         old(self)
-        whole = self.size >= spec.LIMIT_MIN_SEGMENT and not (self._left or self._bad)
+        whole = self.size >= spec.LIMIT_MIN_SEGMENT and not (self._left or self._too_long)
         if whole and self._length >= 7:
             self.packet = bytes(self._buffer[: self._length - 4])
             self.damaged = False
@@ -76,7 +76,7 @@ def damage_not_counted(patch):
         old(self)
         self.damaged -= 1
 
-    around(patch, Device, "_damage", damage)
+    around(patch, Device, "_count_damaged", damage)
 
 
 @mutant("9/last-at-first", "9/damage-answered", "12/noise", "12/mutated")
@@ -84,7 +84,7 @@ def damage_not_answered(patch):
     def damage(_, self):
         self.damaged += 1
 
-    around(patch, Device, "_damage", damage)
+    around(patch, Device, "_count_damaged", damage)
 
 
 @mutant("3/shortest-damage", "9/damage-answered", "3/resync", spreads=True)
@@ -93,7 +93,7 @@ def damage_ends_the_session(patch):
         old(self)
         self.session = None
 
-    around(patch, Device, "_damage", damage)
+    around(patch, Device, "_count_damaged", damage)
 
 
 @mutant("3/longest-packet", "3/cobs-groups", "7.6/colors", "9.2/returned", "11/overrun")
@@ -125,9 +125,9 @@ def answers_with_another_check_value(patch):
     def send(kind, flags, seq, frame, payload):
         packet = bytes((kind << 4 | flags, seq, frame)) + payload
         check = crc.crc32(packet) ^ (0 if kind != spec.TYPE_PAGE else 1)
-        return sender.encode(packet + check.to_bytes(4, "little"))
+        return sender.encode_segment(packet + check.to_bytes(4, "little"))
 
-    patch.setattr(device, "send", send)
+    patch.setattr(device, "encode_packet", send)
 
 
 @mutant("3/answers-delimited")
@@ -136,7 +136,7 @@ def debugging_text_between(patch):
         self._out += b"refused\r\n\0"
         old(self, *args)
 
-    around(patch, Device, "_refuse", refuse)
+    around(patch, Device, "_send_error", refuse)
 
 
 @mutant("4/reserved-types", "11/session-ends", "11/error-names-packet", "11/error-session")
@@ -146,7 +146,7 @@ def reserved_types_silent(patch):
             return
         old(self, packet)
 
-    around(patch, Device, "_answer", answer)
+    around(patch, Device, "_process", answer)
 
 
 @mutant("4/data-flags", "11/order-of-packet")
@@ -187,8 +187,8 @@ def pieces_are_packets(patch):
 
 @mutant("4/answers-length", max_payload=64, name="a")
 def page_too_long(patch):
-    old = device.pack
-    patch.setattr(device, "pack", lambda *args: old(*args[:-1], args[-1] + 20))
+    old = device.encode_page
+    patch.setattr(device, "encode_page", lambda *args: old(*args[:-1], args[-1] + 20))
 
 
 @mutant("4/answers-whole")
@@ -197,4 +197,4 @@ def unknown_answers(patch):
         self._send(12, 0, 0, 0, b"refused")
         old(self, *args)
 
-    around(patch, Device, "_refuse", refuse)
+    around(patch, Device, "_send_error", refuse)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from broken_devices.mutant import around, mutant
 from firmware_sim import op_decoder, range_coded_chains, range_decoder, spec
-from firmware_sim.packet_error import Refusal
+from firmware_sim.packet_error import PacketError
 
 
 @mutant("7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-too-many", "7.7/arc-cut", "7.7/arc-long")
@@ -15,11 +15,11 @@ def arc_models_learn_slower(patch):
 @mutant("7.7/arc-long", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut", "7.7/arc-too-many")
 def arc_forgets_turns(patch):
     def turn(old, self, bits_):
-        if self.way and not self.last:
-            self.way = 0
+        if self.direction and not self.last:
+            self.direction = 0
         old(self, bits_)
 
-    around(patch, range_coded_chains._Axis, "turn", turn)
+    around(patch, range_coded_chains._Axis, "move", turn)
 
 
 @mutant("7.7/arc-long", "7.7/arc-too-many", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-cut")
@@ -29,16 +29,18 @@ def arc_runs_too_long(patch):
 
 @mutant("7.7/arc-too-many")
 def arc_padding_taken(patch):
-    patch.setattr(range_decoder.Bits, "done", property(lambda self: self._at >= len(self._data)))
+    patch.setattr(
+        range_decoder.RangeDecoder, "exhausted", property(lambda self: self._at >= len(self._data))
+    )
 
     def step(old, *args):
         try:
             yield from old(*args)
-        except Refusal as refusal:
+        except PacketError as refusal:
             if refusal.code != spec.CODE_PADDING:
                 raise
 
-    around(patch, op_decoder, "arc", step)
+    around(patch, op_decoder, "decode_chains", step)
 
 
 @mutant("7.7/arc-dot", "7.7/arc-curves", "7.7/arc-pieces", "7.7/arc-behind-ops")
@@ -47,7 +49,7 @@ def arc_start_left_out(patch):
         for pen, voxels in old(*args):
             yield pen, voxels[1:]
 
-    around(patch, op_decoder, "arc", pieces)
+    around(patch, op_decoder, "decode_chains", pieces)
 
 
 @mutant("7.7/arc-empty")
@@ -55,10 +57,10 @@ def empty_arc_refused(patch):
     def pieces(old, operands_, *args):
         found = list(old(operands_, *args))
         if not found:
-            raise operands_.refusal(spec.CODE_TRUNCATED, "")
+            raise operands_.error(spec.CODE_TRUNCATED, "")
         return found
 
-    around(patch, op_decoder, "arc", pieces)
+    around(patch, op_decoder, "decode_chains", pieces)
 
 
 @mutant("7.7/arc-long")

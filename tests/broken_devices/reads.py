@@ -16,13 +16,13 @@ def _read(patch, change):
 
 @mutant("10/ranges", "10/back-page", likely="off by")
 def read_off_by_one(patch):
-    old = device.pack
+    old = device.encode_page
 
     def pack(page, pixel_format, start, count, room):
         shift = 1 if start + count < page.volume else 0
         return old(page, pixel_format, start + shift, count, room)
 
-    patch.setattr(device, "pack", pack)
+    patch.setattr(device, "encode_page", pack)
 
 
 @mutant("10/page-fields")
@@ -43,8 +43,8 @@ def page_without_its_tag(patch):
 
 @mutant("10/back-page")
 def back_reads_the_front(patch):
-    old = device.pack
-    patch.setattr(device, "pack", old)
+    old = device.encode_page
+    patch.setattr(device, "encode_page", old)
 
     def read(inner, self, packet, flags, seq, frame):
         memory_ = self.memory

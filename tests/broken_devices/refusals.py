@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from broken_devices.mutant import Device, Session, around, mutant, on_op
 from firmware_sim import spec
-from firmware_sim.packet_error import Refusal
+from firmware_sim.packet_error import PacketError
 
 
 def _refused(patch, change):
     def refuse(old, self, seq, frame, refusal):
         old(self, *change(self, seq, frame, refusal))
 
-    around(patch, Device, "_refuse", refuse)
+    around(patch, Device, "_send_error", refuse)
 
 
 @mutant(
@@ -44,7 +44,7 @@ def _refused(patch, change):
 def offset_from_the_payload(patch):
     def change(self, seq, frame, refusal):
         if refusal.offset >= 3:
-            refusal = Refusal(refusal.code, refusal.offset - 3, refusal.text)
+            refusal = PacketError(refusal.code, refusal.offset - 3, refusal.text)
         return seq, frame, refusal
 
     _refused(patch, change)
@@ -95,9 +95,9 @@ def refused_data_keeps_the_session(patch):
 )
 def refused_status_ends_the_session(patch):
     def dispatch(old, self, packet):
-        refused = sum(self.refused.values())
+        refused = sum(self.errors_by_code.values())
         old(self, packet)
-        if sum(self.refused.values()) > refused and packet[0] >> 4 != spec.TYPE_HELLO:
+        if sum(self.errors_by_code.values()) > refused and packet[0] >> 4 != spec.TYPE_HELLO:
             self.session = None
 
     around(patch, Device, "_dispatch", dispatch)
@@ -117,10 +117,10 @@ def frame_before_sequence(patch):
     def judge(old, self, seq, frame, flags):
         is_known = frame in {self._newest, (self._newest + 1) % 256} or self._is_duplicate(seq)
         if not is_known and self._ahead(seq) >= 32:
-            raise Refusal(spec.CODE_FRAME, 2, "")
+            raise PacketError(spec.CODE_FRAME, 2, "")
         return old(self, seq, frame, flags)
 
-    around(patch, Session, "judge", judge)
+    around(patch, Session, "classify", judge)
 
 
 @mutant("11/answers-text")
@@ -134,9 +134,9 @@ def text_in_latin1(patch):
 @mutant("11/overrun")
 def overrun_ends_the_session(patch):
     def store(old, self, data):
-        before = self.refused.get(spec.CODE_OVERRUN, 0)
+        before = self.errors_by_code.get(spec.CODE_OVERRUN, 0)
         old(self, data)
-        if self.refused.get(spec.CODE_OVERRUN, 0) > before:
+        if self.errors_by_code.get(spec.CODE_OVERRUN, 0) > before:
             self.disconnect()
             self.damaged += 0
 
@@ -145,10 +145,10 @@ def overrun_ends_the_session(patch):
 
 @mutant("11/overrun")
 def overrun_not_said(patch):
-    _old = Device._refuse
+    _old = Device._send_error
 
     def refuse(old, self, seq, frame, refusal):
         if refusal.code != spec.CODE_OVERRUN:
             old(self, seq, frame, refusal)
 
-    around(patch, Device, "_refuse", refuse)
+    around(patch, Device, "_send_error", refuse)

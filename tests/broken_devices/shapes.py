@@ -11,7 +11,7 @@ from firmware_sim import memory, op_decoder, shapes
 @mutant("7.3/lines", "7.3/line-ties", "7.3/shape-cursor", likely="rounded down")
 def line_ties_down(patch):
     def line(grid, start, target):
-        begin = grid.place(start)
+        begin = grid.coordinates(start)
         d = [b - a for a, b in zip(begin, target, strict=True)]
         n = max(map(abs, d))
         places = [
@@ -34,7 +34,7 @@ def box_without_its_end(patch):
     old = shapes.box
 
     def box(grid, start, target):
-        corners = list(zip(grid.place(start), target, strict=True))
+        corners = list(zip(grid.coordinates(start), target, strict=True))
         low = [min(pair) for pair in corners]
         high = [max(min(pair), max(pair) - 1) for pair in corners]
         return old(grid, grid.index(*low), tuple(high))
@@ -59,7 +59,7 @@ def dots_one_too_few(patch):
         axes = old(self, count)
         return tuple(axis[: max(1, count - 1)] for axis in axes)
 
-    around(patch, Operands, "places", places)
+    around(patch, Operands, "coordinate_lists", places)
 
 
 @mutant("7.4/levels", "7.4/children", "7.4/full-nodes", likely="x and z were swapped")
@@ -67,7 +67,7 @@ def children_reversed(patch):
     def children(level, mask):
         half = 1 << level >> 1
         return tuple(
-            half * shapes._place(c >> 2, c >> 1 & 1, c & 1) for c in range(8) if mask >> c & 1
+            half * shapes._brick_index(c >> 2, c >> 1 & 1, c & 1) for c in range(8) if mask >> c & 1
         )
 
     table = [[children(level, mask) for mask in range(256)] for level in range(5)]
@@ -86,11 +86,11 @@ def full_node_is_empty(patch):
 @mutant("7.4/brick-cursor", likely="moved to the brick")
 def brick_moves_the_cursor(patch):
     def brick(old, self, level):
-        at = self._in._at
-        x, y, z = (axis << level for axis in self._in.place())
-        self._in._at = at
+        at = self._operands._at
+        x, y, z = (axis << level for axis in self._operands.coordinates())
+        self._operands._at = at
         old(self, level)
-        if self._grid.holds(x, y, z):
+        if self._grid.contains(x, y, z):
             self._cursor = self._grid.index(x, y, z)
 
     on_op(patch, "brick", brick)
@@ -114,7 +114,7 @@ def palette_not_copied(patch):
         self._digest -= self._color_terms(slice(0, 768))
         self.palette[:] = memory.DEFAULT_PALETTE
 
-    around(patch, Page, "copy", copy)
+    around(patch, Page, "copy_from", copy)
 
 
 @mutant(

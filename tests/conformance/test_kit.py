@@ -8,7 +8,7 @@ import time
 import broken_devices
 import document
 import pytest
-from bench_top import BenchTop
+from virtual_time_device import VirtualTimeDevice
 
 from firmware_sim import crc
 from voxdisplay.conformance import CHECKS, ops, packets
@@ -23,7 +23,7 @@ from voxdisplay.wire import spec
 SMALL = {"grid": (3, 5, 7), "pixel_format": "index8", "refresh": 200_000, "max_payload": 256}
 DEVICES = {
     "at-once": {"refresh": 0},
-    "mono": {"grid": (17, 64, 40), "pixel_format": "mono1", "silent": 8},
+    "mono": {"grid": (17, 64, 40), "pixel_format": "mono1", "max_silent_acks": 8},
     "wide": {
         "grid": (300, 4, 3),
         "pixel_format": "rgb888",
@@ -44,7 +44,7 @@ BYSTANDERS = (
 
 
 def emulated_port(**config):
-    return BenchTop(**{**SMALL, "rx_buffer": 2048, "boot": 7} | config)
+    return VirtualTimeDevice(**{**SMALL, "rx_buffer": 2048, "boot": 7} | config)
 
 
 def examined(port, only=(), **how):

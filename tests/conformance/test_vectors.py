@@ -6,7 +6,7 @@ import document
 import numpy as np
 import pytest
 from drawing import decode_plainly
-from sides import DeviceSide, features_of, flags_of, state_of
+from vector_device import VectorDevice, features_of, flags_of, state_of
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT
@@ -35,15 +35,15 @@ def test_delimiting(vector):
     assert document.cobs_decode(encoded) == decoded
     assert packets.cobs.encode(decoded) == encoded
     assert packets.cobs.decode(encoded) == decoded
-    assert DeviceSide.cobs_encode(decoded) == encoded
-    assert DeviceSide.cobs_decode(encoded) == decoded
+    assert VectorDevice.cobs_encode(decoded) == encoded
+    assert VectorDevice.cobs_decode(encoded) == decoded
 
 
 @each("crc")
 def test_check_value(vector):
     data, crc = vector.hex("bytes"), vector.hex("crc")
     assert packets.zlib.crc32(data).to_bytes(4, "little") == crc
-    assert DeviceSide.crc(data).to_bytes(4, "little") == crc
+    assert VectorDevice.crc(data).to_bytes(4, "little") == crc
 
 
 PACKET_CLASSES = {cls.__name__.upper(): cls for cls in packets.TYPES.values()}
@@ -97,17 +97,17 @@ def test_packets_in_the_drivers_stream(vector, size):
 @each("packet")
 def test_packets_of_the_device(vector):
     assert document.on_wire(vector.hex("packet")[:-4]) == vector.hex("wire")
-    assert DeviceSide.segments(vector.hex("wire")) == [vector.hex("packet")[:-4]]
-    assert DeviceSide.wire(vector.hex("packet")[:-4]) == vector.hex("wire")
+    assert VectorDevice.segments(vector.hex("wire")) == [vector.hex("packet")[:-4]]
+    assert VectorDevice.wire(vector.hex("packet")[:-4]) == vector.hex("wire")
 
 
 @each("ops")
 def test_ops_on_the_device(vector):
-    device = DeviceSide(vector.grid, vector["format"], features=features_of(vector))
-    device.open()
+    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
+    device.open_session()
     answers = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
     assert [state_of(answer) for answer in answers] == ["ACK SHOWN"]
-    assert device.lit() == vector.voxels()
+    assert device.lit_voxels() == vector.voxels()
     assert int.from_bytes(answers[0][16:20], "little") == vector.integer("digest")
 
 
@@ -150,13 +150,13 @@ def test_ops_by_a_plain_reading(vector):
 
 @each("refused")
 def test_refused_ops(vector):
-    device = DeviceSide(vector.grid, vector["format"], features=features_of(vector))
-    device.open()
+    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
+    device.open_session()
     (answer,) = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
     assert answer[0] == 0xB0
     assert answer[3] == getattr(spec, f"CODE_{vector['code']}")
     assert int.from_bytes(answer[6:8], "little") == vector.integer("offset")
-    assert device.lit() == {}
+    assert device.lit_voxels() == {}
     (after,) = device.send(bytes((0x40, 9, 0)))
     assert after[3] == spec.CODE_NO_SESSION
 
@@ -164,7 +164,7 @@ def test_refused_ops(vector):
 @each("dialogue")
 def test_dialogues_with_the_device(vector):
     facts = dict(vector.lines)
-    device = DeviceSide(
+    device = VectorDevice(
         vector.grid,
         facts["format"],
         boot=int(facts["boot"]),
@@ -205,10 +205,10 @@ def test_coders_of_the_driver(vector):
     values[index] = [int.from_bytes(pixel, "little") for pixel in voxels.values()]
     coding = EncoderConfig(Grid(*vector.grid), pixel_format, 1024)
     for payloads in (encode_spans(values, coding), encode_chains(places, values[index], coding)):
-        device = DeviceSide(vector.grid, vector["format"])
-        device.open()
+        device = VectorDevice(vector.grid, vector["format"])
+        device.open_session()
         device.send(bytes((0x15, 0, 0)) + b"".join(payloads))
-        assert device.lit() == voxels
+        assert device.lit_voxels() == voxels
         (page,) = device.send(
             bytes.fromhex("50 05 00 00 00 00 00 00") + len(values).to_bytes(4, "little")
         )

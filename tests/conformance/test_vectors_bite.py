@@ -1,7 +1,7 @@
 """Every literal that either side has transcribed is held by some vector of protocol.md.
 
-`mutants` changes each by one, in a process of its own, and names those that no vector holds. They
-must stand here, with the reason.
+`spec_mutations` changes each by one, in a process of its own, and names those that no vector holds.
+They must stand here, with the reason.
 """
 
 import subprocess
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-MUTANTS = Path(__file__).parents[1] / "mutants.py"
+SPEC_MUTATIONS = Path(__file__).parents[1] / "spec_mutations.py"
 
 # No byte on the wire depends on these: the referee compares them with the document.
 RESERVED = {"FEATURE_ARC"}
@@ -53,7 +53,11 @@ AWAITED = {
 )
 def test_a_literal_that_is_wrong_by_one_fails_some_vector(side, spec, excused):
     done = subprocess.run(
-        [sys.executable, MUTANTS, spec], capture_output=True, text=True, check=False, timeout=600
+        [sys.executable, SPEC_MUTATIONS, spec],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     excused = excused | RESERVED | MADE_OF_OTHERS | BEHAVIOUR | CARRIER | TOLD_APART | LONGER

@@ -83,7 +83,7 @@ def test_the_fastest_rate_at_which_it_answers(uart):
     assert uart.server.line.rates[-1] == 3_000_000
     assert uart.server.line.rates[1] == baud.RATES[0], "the fastest was tried first"
     assert "answers at 3000000 Bd" in notes[0]
-    assert uart.device.refused == {}, "what came at other rates was no packet"
+    assert uart.device.errors_by_code == {}, "what came at other rates was no packet"
 
 
 def test_none_of_the_rates(uart, monkeypatch):

@@ -14,8 +14,8 @@ from usb_lab import until
 import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
-from firmware_sim.serve import listen
+from firmware_sim.device_on_line import DeviceOnLine
+from firmware_sim.serve import listen_tcp
 from firmware_sim.usb import open_usbip
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.device import UsbDevice
@@ -72,7 +72,7 @@ class Emulated:
     """A display that can be pulled out, and a way to it."""
 
     def __init__(self):
-        wire = Wire(Device(Config((17, 64, 40), refresh=0, pixel_format="index8")))
+        wire = DeviceOnLine(Device(Config((17, 64, 40), refresh=0, pixel_format="index8")))
         self.device = UsbDevice(DisplayFunction(wire))
 
     def idle(self):
@@ -92,15 +92,15 @@ def over_usbip():
     emulated = Emulated()
     device = emulated.device
     pulled = threading.Event()
-    until_due = device.function.until_due
+    next_event_s = device.function.next_event_s
 
-    def until_due_or_pulled():  # in the server's own thread
+    def next_event_or_pulled():  # in the server's own thread
         if pulled.is_set() and device.plugged:
             device.unplug()
-        due = until_due()
+        due = next_event_s()
         return 0.002 if due is None else min(due, 0.002)
 
-    device.function.until_due = until_due_or_pulled
+    device.function.next_event_s = next_event_or_pulled
 
     def plug():
         pulled.clear()
@@ -108,7 +108,7 @@ def over_usbip():
 
     emulated.pull, emulated.plug = pulled.set, plug
     stop, stopper = os.pipe()
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         server = Server(device)
         emulated.idle = lambda: not server._connections
         thread = threading.Thread(target=server.serve, args=(listener, stop))

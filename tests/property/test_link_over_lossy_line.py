@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from link_rig import Faults, Rig, frames, random_frame
 
-from firmware_sim.session import Session, Verdict
+from firmware_sim.session import DataAction, Session
 from voxdisplay.errors import TransportTimeout
 from voxdisplay.link import PacketRefused, PageReceived
 from voxdisplay.raster.pixel_format import PixelFormat
@@ -19,15 +19,15 @@ from voxdisplay.wire.spans import decode_spans
 @pytest.fixture(autouse=True, scope="module")
 def _no_device_is_sent_what_it_has():
     """9.3: "no packet is on its way twice", whatever the line does."""
-    judge = Session.judge
+    judge = Session.classify
 
     def watched(session, *packet):
         verdict = judge(session, *packet)
-        assert verdict is not Verdict.DUPLICATE
+        assert verdict is not DataAction.DUPLICATE
         return verdict
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Session, "judge", watched)
+        patch.setattr(Session, "classify", watched)
         yield
 
 
@@ -36,7 +36,7 @@ devices = st.fixed_dictionaries(
     {
         "refresh": st.sampled_from([0, 0, 30_000, 1_000_000, 2_000, 150]),
         "max_payload": st.sampled_from([64, 65, 100, 247, 300]),
-        "silent": st.sampled_from([0, 8]),
+        "max_silent_acks": st.sampled_from([0, 8]),
         "room": st.sampled_from([0, 1, 64, 1000, 20_000]),
         "pixel_format": st.sampled_from([format_.value for format_ in PixelFormat]),
         "delay_s": st.sampled_from([0.0, 0.0001, 0.01, 0.3, 1.0]),
@@ -114,7 +114,12 @@ def test_long_and_short_frames_on_a_slow_bad_line(seed, delay_s, byte_s, where):
     On a slow line ACKs come one by one: those from before something was sent again, behind it.
     """
     rig = Rig(
-        seed=seed, delay_s=delay_s, byte_s=byte_s, rx_buffer=5000, silent=seed % 9, timeout_s=60
+        seed=seed,
+        delay_s=delay_s,
+        byte_s=byte_s,
+        rx_buffer=5000,
+        max_silent_acks=seed % 9,
+        timeout_s=60,
     )
     if where != "up":
         rig.down.faults = Faults(seed, packet=0.05, flip=0.003)

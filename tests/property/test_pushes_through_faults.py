@@ -13,7 +13,7 @@ import voxdisplay as vd
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.faults import parse_faults
 from voxdisplay.errors import TransportClosed
 
@@ -42,7 +42,9 @@ class Line:
     def __init__(self, device, faults, seed):
         self.now = 0.0
         self.bench = Bench(device)
-        self.wire = Wire(device, parse_faults(faults) if faults else (), seed, self.monotonic)
+        self.wire = DeviceOnLine(
+            device, parse_faults(faults) if faults else (), seed, self.monotonic
+        )
 
     def monotonic(self):
         return self.now
@@ -51,7 +53,7 @@ class Line:
         try:
             deadline_s = self.now + timeout_s
             while not (data := self.wire.transmit()) and self.now < deadline_s:
-                next_s = self.wire.until_tick()
+                next_s = self.wire.next_event_s()
                 step_s = deadline_s - self.now
                 self.now += step_s if next_s is None else max(min(step_s, next_s), 1e-9)
         except ConnectionError as error:

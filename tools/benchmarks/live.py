@@ -151,7 +151,7 @@ def bench_tap(repeats: int) -> None:
             alone.append(_decode(Device(Config(GRID, refresh=0)), payloads))
             device = Device(Config(GRID, refresh=0))
             with Tap(device) as tap, _watching(tap) as counted:
-                device.on_swap = tap.notice
+                device.on_swap = tap.notify_swap
                 watched.append(_decode(device, payloads))
             seen.append(counted[0] / _SECONDS)
         for which, clock in enumerate(("CPU time", "time")):

@@ -6,12 +6,12 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator
 
-from firmware_sim.serve import listen
+from firmware_sim.serve import listen_tcp
 from firmware_sim.usb import open_usbip
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.descriptors import BULK, Descriptors, Endpoint, Interface
 from firmware_sim.usb.device import Setup, UsbDevice
-from firmware_sim.usb.function import HIGH_SPEED_PACKET, TRIPLE, ByteStream
+from firmware_sim.usb.function import HIGH_SPEED_PACKET, TRIPLE, PacketStream
 from firmware_sim.usb.host import Bus
 from firmware_sim.usb.usbip_server import serve_usbip
 from voxdisplay.transport.usb import UsbTransport
@@ -28,10 +28,10 @@ class PeerFunction:
         interface = Interface(0, TRIPLE, ends)
         self.descriptors = Descriptors(0x1209, 0x0001, "", "peer", "", (interface,))
         self._feed = feed
-        self._out = ByteStream(packet)
+        self._out = PacketStream(packet)
 
-    def takes(self, endpoint: int, size: int) -> bool:
-        """See `Function.takes`."""
+    def accepts(self, endpoint: int, size: int) -> bool:
+        """See `Function.accepts`."""
         del endpoint, size
         return True
 
@@ -40,10 +40,10 @@ class PeerFunction:
         del endpoint
         self._out.put(self._feed(packet))
 
-    def packet(self, endpoint: int) -> bytes | None:
-        """See `Function.packet`."""
+    def next_packet(self, endpoint: int) -> bytes | None:
+        """See `Function.next_packet`."""
         del endpoint
-        return self._out.next()
+        return self._out.next_packet()
 
     def request(self, setup: Setup, data: bytes) -> bytes | None:
         """See `Function.request`: there are none."""
@@ -53,8 +53,8 @@ class PeerFunction:
     def reset(self) -> None:
         """See `Function.reset`: nothing is under way."""
 
-    def until_due(self) -> None:
-        """See `Function.until_due`: nothing happens by itself."""
+    def next_event_s(self) -> None:
+        """See `Function.next_event_s`: nothing happens by itself."""
 
 
 @contextlib.contextmanager
@@ -70,7 +70,7 @@ def on_usbip(
     feed: Feed, in_another_process: Callable[[Callable[[], None]], int]
 ) -> Iterator[UsbTransport]:
     """Yield a port over USB/IP, with a peer in another process."""
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         port = f"usbip://127.0.0.1:{listener.getsockname()[1]}"
         stop, stopper = os.pipe()
 

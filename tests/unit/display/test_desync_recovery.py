@@ -94,7 +94,7 @@ def test_a_refused_packet_and_then_another():
     frame = random_frame(display)
     display.present(frame)
     assert_shows(pipe, frame)
-    assert pipe.device.refused == {spec.CODE_OP: 6}
+    assert pipe.device.errors_by_code == {spec.CODE_OP: 6}
 
 
 def test_a_code_that_nobody_knows():

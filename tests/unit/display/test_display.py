@@ -75,11 +75,11 @@ def test_progress_is_told():
 
 def test_a_frame_of_another_shape_or_format_is_refused_and_nothing_is_sent():
     display, pipe = open_display()
-    before = pipe.device.taken.copy()
+    before = pipe.device.taken_by_type.copy()
     for frame in (vd.Frame((3, 5, 7)), vd.Frame(GRID, "index8")):
         with pytest.raises(vd.LocalProtocolError, match="the frame is"):
             display.present(frame)
-    assert pipe.device.taken == before
+    assert pipe.device.taken_by_type == before
 
 
 def test_without_waiting_the_newest_frame_wins():

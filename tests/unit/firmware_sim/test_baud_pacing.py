@@ -7,13 +7,24 @@ import threading
 import time
 
 import pytest
-from simwire import ACK, CLEAR, COMMIT, INFO, PENDING, SHOWN, answers, data, hello, status
+from device_packets import (
+    ACK,
+    CLEAR,
+    COMMIT,
+    INFO,
+    PENDING,
+    SHOWN,
+    data,
+    hello,
+    parse_responses,
+    status,
+)
 
 from firmware_sim import serve
-from firmware_sim.baud_pacing import Pace, PacedWire, paced
+from firmware_sim.baud_pacing import PacedDevice, PacedDirection, with_baud
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.in_process import open_in_process
 from firmware_sim.readiness import wait_ready
 from firmware_sim.serve import serve_wire
@@ -40,11 +51,11 @@ def clock():
 @pytest.mark.parametrize("baud", [50, 9600, 115_200, 1_000_000, 12_000_000])
 def test_ten_bits_a_byte(clock, baud):
     """Looked at in any rhythm, bytes come at a tenth of the rate, in order, the last in time."""
-    pace = Pace(baud, clock)
+    pace = PacedDirection(baud, clock)
     sent = bytes(range(256)) * 8
     got, looks = b"", 0
     pace.put(sent)
-    while (pause := pace.until_due()) is not None:
+    while (pause := pace.next_event_s()) is not None:
         clock.sleep(pause + (0.0003 if looks % 3 else 0))
         looks += 1
         got += pace.get()
@@ -56,7 +67,7 @@ def test_ten_bits_a_byte(clock, baud):
 
 
 def test_no_byte_comes_early(clock):
-    pace = Pace(1000, clock)
+    pace = PacedDirection(1000, clock)
     pace.put(b"ab")
     clock.sleep(0.0099)
     assert pace.get() == b""
@@ -64,15 +75,15 @@ def test_no_byte_comes_early(clock):
     assert pace.get() == b"a"
     clock.sleep(0.009)
     assert pace.get() == b""
-    assert pace.until_due() == pytest.approx(0.001)
+    assert pace.next_event_s() == pytest.approx(0.001)
 
 
 def test_a_line_that_was_idle_begins_anew(clock):
-    pace = Pace(1000, clock)
+    pace = PacedDirection(1000, clock)
     pace.put(b"a")
     clock.sleep(5)
     assert pace.get() == b"a"
-    assert pace.until_due() is None
+    assert pace.next_event_s() is None
     pace.put(b"bc")
     assert pace.get() == b""
     clock.sleep(0.010)
@@ -80,7 +91,7 @@ def test_a_line_that_was_idle_begins_anew(clock):
 
 
 def test_what_is_handed_over_meanwhile_follows_at_once(clock):
-    pace = Pace(1000, clock)
+    pace = PacedDirection(1000, clock)
     pace.put(b"ab")
     clock.sleep(0.015)
     pace.put(b"cd")
@@ -89,28 +100,30 @@ def test_what_is_handed_over_meanwhile_follows_at_once(clock):
 
 
 def test_so_much_waits_and_no_more(clock):
-    pace = Pace(115_200, clock)
+    pace = PacedDirection(115_200, clock)
     pace.put(bytes(4095))
-    assert not pace.full
+    assert not pace.is_full
     pace.put(b"\0")
-    assert pace.full
+    assert pace.is_full
     pace.clear()
-    assert not pace.full
-    assert pace.until_due() is None
-    fast = Pace(12_000_000, clock)
+    assert not pace.is_full
+    assert pace.next_event_s() is None
+    fast = PacedDirection(12_000_000, clock)
     fast.put(bytes(59_999))
-    assert not fast.full
+    assert not fast.is_full
 
 
 def test_without_a_rate_a_wire_stays_as_it_is(clock):
-    wire = Wire(Device(Config((3, 5, 7))), clock=clock)
-    assert paced(wire, 0) is wire
-    assert paced(wire, 50).device is wire.device
+    wire = DeviceOnLine(Device(Config((3, 5, 7))), clock=clock)
+    assert with_baud(wire, 0) is wire
+    assert with_baud(wire, 50).device is wire.device
 
 
 def wire_on(clock, **settings):
     settings = {"refresh": 0, **settings}
-    return PacedWire(Wire(Device(Config((3, 5, 7), **settings)), clock=clock), 1000, clock)
+    return PacedDevice(
+        DeviceOnLine(Device(Config((3, 5, 7), **settings)), clock=clock), 1000, clock
+    )
 
 
 def test_an_answer_takes_the_line_both_ways(clock):
@@ -118,43 +131,47 @@ def test_an_answer_takes_the_line_both_ways(clock):
     wire.receive(hello())
     got = b""
     while not got.endswith(b"\0"):
-        clock.sleep(wire.until_tick())
+        clock.sleep(wire.next_event_s())
         got += wire.transmit()
-    assert answers(got)[0].kind == INFO
+    assert parse_responses(got)[0].kind == INFO
     assert clock.now - 1000 == pytest.approx((len(hello()) + len(got)) * 0.01, abs=0.001)
-    assert wire.until_tick() is None
+    assert wire.next_event_s() is None
 
 
 def test_a_tick_and_the_line_go_on_side_by_side(clock):
     wire = wire_on(clock, refresh=2000)
     wire.receive(hello() + data(0, 0, b"\xa0", CLEAR | COMMIT))
     got = b""
-    while (pause := wire.until_tick()) is not None:
+    while (pause := wire.next_event_s()) is not None:
         clock.sleep(pause)
         got += wire.transmit()
-    assert [(a.kind, a.flags) for a in answers(got)] == [(INFO, 0), (ACK, PENDING), (ACK, SHOWN)]
+    assert [(a.kind, a.flags) for a in parse_responses(got)] == [
+        (INFO, 0),
+        (ACK, PENDING),
+        (ACK, SHOWN),
+    ]
     assert wire.device.swaps == 1
 
 
 def test_a_line_that_is_full_takes_nothing_from_the_device(clock):
     device = Device(Config((3, 5, 7), refresh=0))
-    wire = PacedWire(Wire(device, clock=clock), 50_000, clock)
+    wire = PacedDevice(DeviceOnLine(device, clock=clock), 50_000, clock)
     asked, got = 2000, b""
     for _ in range(asked):
         wire.receive(status())
-    while (pause := wire.until_tick()) is not None:
+    while (pause := wire.next_event_s()) is not None:
         clock.sleep(pause)
         got += wire.transmit()
-    assert len(answers(got)) == asked
+    assert len(parse_responses(got)) == asked
 
 
 def test_a_line_that_is_cut_forgets_what_was_on_its_way(clock):
     wire = wire_on(clock)
     wire.receive(hello())
     clock.sleep(1)
-    assert wire.until_tick() is not None
+    assert wire.next_event_s() is not None
     wire.disconnect()
-    assert wire.until_tick() is None
+    assert wire.next_event_s() is None
     assert wire.transmit() == b""
 
 
@@ -164,7 +181,7 @@ def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch
     theirs.setblocking(False)
     for end in (ours, theirs):
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    wire = paced(Wire(Device(Config((3, 5, 7), refresh=0))), 100_000_000)
+    wire = with_baud(DeviceOnLine(Device(Config((3, 5, 7), refresh=0))), 100_000_000)
     looks = []
 
     def look(*arguments):
@@ -197,7 +214,7 @@ def test_a_line_that_is_full_takes_nothing_from_the_host():
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)
     ours.settimeout(0.2)
-    wire = paced(Wire(Device(Config((3, 5, 7), refresh=0))), 50)
+    wire = with_baud(DeviceOnLine(Device(Config((3, 5, 7), refresh=0))), 50)
     stop, stopper = os.pipe()
     pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
     pump.start()
@@ -225,12 +242,12 @@ def test_in_process_a_full_line_makes_the_writer_wait():
     got = b""
     while not got.endswith(b"\0"):
         got += port.read(WAIT)
-    assert answers(got)[0].kind == INFO
+    assert parse_responses(got)[0].kind == INFO
     port.write(data(0, 0, b"\xa0", CLEAR | COMMIT), WAIT)
     got = b""
     while not got.endswith(b"\0"):
         got += port.read(WAIT)
-    assert (answers(got)[0].kind, answers(got)[0].flags) == (ACK, SHOWN)
+    assert (parse_responses(got)[0].kind, parse_responses(got)[0].flags) == (ACK, SHOWN)
 
 
 def test_in_process_a_writer_that_waits_learns_of_the_end():

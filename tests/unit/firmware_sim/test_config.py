@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simwire import Rig, data
+from device_packets import DeviceUnderTest, data
 
 from firmware_sim.bench import Bench, Snapshot
 from firmware_sim.config import (
@@ -25,7 +25,7 @@ def test_defaults() -> None:
     config = Config()
     assert str(config.shape) == "128x128x128"
     assert (config.pixel_format, config.max_payload, config.boot) == ("rgb888", 1024, None)
-    assert (config.refresh, config.rx_buffer, config.silent) == (30_000, 16_384, 0)
+    assert (config.refresh, config.rx_buffer, config.max_silent_acks) == (30_000, 16_384, 0)
     assert config.feature_bits == 0b1_1010_1111
 
 
@@ -55,7 +55,7 @@ def test_the_features_are_those_that_the_format_allows() -> None:
         ({"max_payload": 65_536}, "from 64 to 65535"),
         ({"rx_buffer": 1100}, "from 1101 to"),
         ({"boot": 65_536}, "from 0 to 65535"),
-        ({"silent": 9}, "from 0 to 8"),
+        ({"max_silent_acks": 9}, "from 0 to 8"),
         ({"name": "é" * 128}, "bytes of the name is 256"),
         ({"name": "n" * 64, "max_payload": 64}, "max_payload of 99"),
     ],
@@ -112,10 +112,10 @@ def test_what_cannot_be_read_is_a_value_error(parse: Callable[[str], object], te
 def test_numpy_reads_a_dump(
     tmp_path: Path, name: str, dtype: str, channels: tuple[int, ...]
 ) -> None:
-    rig = Rig(3, 5, 7, pixel_format=name)
+    rig = DeviceUnderTest(3, 5, 7, pixel_format=name)
     size = FORMATS[name].size
     pixel = b"\x01" if name == "mono1" else b"\x11\x22\x33"[:size]
-    rig.show(0, 0, b"\x02\x02\x03\x04\x01" + pixel + b"\xa0")
+    rig.show_frame(0, 0, b"\x02\x02\x03\x04\x01" + pixel + b"\xa0")
     path = tmp_path / "front.npy"
     path.write_bytes(b"older")
     write_npy(path, Bench(rig.device).snapshot())
@@ -137,7 +137,7 @@ def test_the_header_is_aligned() -> None:
 
 
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
-    snapshot = Bench(Rig().device).snapshot()
+    snapshot = Bench(DeviceUnderTest().device).snapshot()
     with pytest.raises(OSError, match="none"):
         write_npy(tmp_path / "none" / "front.npy", snapshot)
     (tmp_path / "dir").mkdir()
@@ -147,10 +147,10 @@ def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
 
 
 def test_on_swap_is_called_at_each_swap() -> None:
-    rig = Rig()
+    rig = DeviceUnderTest()
     seen = []
     rig.device.on_swap = lambda: seen.append(rig.front[:1])
-    rig.show(0, 0, b"\xa0")
-    rig.ask(data(1, 1, b""))
-    rig.show(2, 1, b"")
+    rig.show_frame(0, 0, b"\xa0")
+    rig.request(data(1, 1, b""))
+    rig.show_frame(2, 1, b"")
     assert seen == [b"\xff", b"\0"]

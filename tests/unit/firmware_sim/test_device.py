@@ -4,10 +4,7 @@ import random
 import struct
 
 import pytest
-from document import on_wire
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from simwire import (
+from device_packets import (
     ACK,
     ASKED,
     BOOT,
@@ -32,16 +29,19 @@ from simwire import (
     SHOWN,
     STATUS,
     TYPE,
-    Rig,
-    answers,
-    block,
+    DeviceUnderTest,
+    block_with_pending_frame,
     data,
-    filling,
+    data_of_wire_size,
     hello,
     packet,
+    parse_responses,
     read,
     status,
 )
+from document import on_wire
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
@@ -53,8 +53,10 @@ from firmware_sim.memory import FORMATS
 
 def test_info_says_what_the_device_is() -> None:
     """The device MUST answer with INFO."""
-    rig = Rig(3, 300, 7, session=False, pixel_format="rgb565", refresh=29_970, serial="Ä1")
-    info = rig.ask(b"\0" + hello())
+    rig = DeviceUnderTest(
+        3, 300, 7, session=False, pixel_format="rgb565", refresh=29_970, serial="Ä1"
+    )
+    info = rig.request(b"\0" + hello())
     assert (info.kind, info.flags, info.seq, info.frame) == (INFO, 0, 0, 0)
     assert (info.major, info.minor, info.session, info.boot) == (1, 0, SESSION, BOOT)
     assert (info.nx, info.ny, info.nz, info.format, info.pages) == (3, 300, 7, 3, 2)
@@ -65,29 +67,29 @@ def test_info_says_what_the_device_is() -> None:
 
 def test_another_major_is_answered_and_opens_nothing() -> None:
     """MUST NOT open the session; what was open stays open."""
-    rig = Rig(session=False)
-    info = rig.ask(hello(session=9, major=2))
+    rig = DeviceUnderTest(session=False)
+    info = rig.request(hello(session=9, major=2))
     assert (info.kind, info.session, info.major) == (INFO, 9, 1)
-    assert rig.ask(status()).error == (NO_SESSION, 0)
-    rig.ask(hello())
-    rig.ask(data(0, 0, DOT))
-    assert rig.ask(hello(session=9, major=0)).session == 9
-    ack = rig.ask(status())
+    assert rig.request(status()).error == (NO_SESSION, 0)
+    rig.request(hello())
+    rig.request(data(0, 0, DOT))
+    assert rig.request(hello(session=9, major=0)).session == 9
+    ack = rig.request(status())
     assert (ack.session, ack.seq) == (SESSION, 1)
 
 
 def test_a_hello_of_a_later_minor_is_taken() -> None:
     """A device MUST ignore flags, seq, frame, reserved and bytes after offset 7 of a HELLO."""
-    rig = Rig(session=False)
+    rig = DeviceUnderTest(session=False)
     payload = struct.pack("<BHBB", 1, 77, 9, 200) + b"more"
-    assert rig.ask(packet(HELLO, 15, 3, 4, payload)).kind == INFO
-    assert rig.ask(status()).session == 77
+    assert rig.request(packet(HELLO, 15, 3, 4, payload)).kind == INFO
+    assert rig.request(status()).session == 77
 
 
 @pytest.mark.parametrize("size", range(5))
 def test_a_short_hello_is_refused(size: int) -> None:
-    rig = Rig(session=False)
-    error = rig.ask(packet(HELLO, 0, 3, 4, hello_payload()[:size]))
+    rig = DeviceUnderTest(session=False)
+    error = rig.request(packet(HELLO, 0, 3, 4, hello_payload()[:size]))
     assert error.error == (LENGTH, 0)
     assert (error.seq, error.frame, error.session) == (3, 4, 0)
 
@@ -98,22 +100,22 @@ def hello_payload() -> bytes:
 
 def test_session_zero_is_refused() -> None:
     """A session is a number of the host's choice, not 0."""
-    rig = Rig()
-    assert rig.ask(hello(session=0)).error == (FIELD, 4)
-    assert rig.ask(status()).session == SESSION
+    rig = DeviceUnderTest()
+    assert rig.request(hello(session=0)).error == (FIELD, 4)
+    assert rig.request(status()).session == SESSION
 
 
 def test_hello_begins_anew() -> None:
     """Any earlier session ends; the next number is 0; the front page stays, its id is forgotten."""
-    rig = Rig()
-    shown = rig.show(0, 0, DOT)
-    rig.ask(data(1, 1, DOT, COMMIT))
-    rig.ask(hello(session=5))
+    rig = DeviceUnderTest()
+    shown = rig.show_frame(0, 0, DOT)
+    rig.request(data(1, 1, DOT, COMMIT))
+    rig.request(hello(session=5))
     assert rig.tick() == []  # the frame that waited has been dropped
-    ack = rig.ask(status(8))
+    ack = rig.request(status(8))
     assert (ack.flags, ack.seq, ack.frame) == (ASKED, 0, 0)
     assert (ack.session, ack.received, ack.digest) == (5, 0, shown.digest)
-    ack = rig.ask(data(0, 0, DOT))
+    ack = rig.request(data(0, 0, DOT))
     assert (ack.flags, ack.seq, ack.last) == (0, 1, 0)
 
 
@@ -122,8 +124,8 @@ def test_hello_begins_anew() -> None:
 
 @pytest.mark.parametrize("kind", [k for k in range(16) if k != HELLO])
 def test_without_a_session_everything_is_refused(kind: int) -> None:
-    rig = Rig(session=False)
-    error = rig.ask(packet(kind, 15, 6, 7, b"x"))
+    rig = DeviceUnderTest(session=False)
+    error = rig.request(packet(kind, 15, 6, 7, b"x"))
     assert error.error == (NO_SESSION, 0)
     assert (error.seq, error.frame, error.session, error.flags) == (6, 7, 0, 0)
 
@@ -131,22 +133,22 @@ def test_without_a_session_everything_is_refused(kind: int) -> None:
 @pytest.mark.parametrize("kind", [0, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15])
 def test_types_that_are_not_a_hosts_are_refused(kind: int) -> None:
     """A refused packet of another type changes nothing."""
-    rig = Rig()
-    error = rig.ask(packet(kind, 15, 6, 7, b"x"))
+    rig = DeviceUnderTest()
+    error = rig.request(packet(kind, 15, 6, 7, b"x"))
     assert error.error == (TYPE, 0)
     assert (error.seq, error.frame, error.session) == (6, 7, SESSION)
-    assert rig.ask(status()).kind == ACK
+    assert rig.request(status()).kind == ACK
 
 
 def test_read_is_refused_if_not_announced() -> None:
-    rig = Rig(features=frozenset({"digest"}), session=False)
-    assert rig.ask(hello()).features == 1 << 8
-    assert rig.ask(read(0, 1)).error == (TYPE, 0)
+    rig = DeviceUnderTest(features=frozenset({"digest"}), session=False)
+    assert rig.request(hello()).features == 1 << 8
+    assert rig.request(read(0, 1)).error == (TYPE, 0)
 
 
 def test_without_the_feature_the_digest_is_0() -> None:
-    rig = Rig(features=frozenset())
-    ack = rig.show(0, 0, DOT)
+    rig = DeviceUnderTest(features=frozenset())
+    ack = rig.show_frame(0, 0, DOT)
     assert (ack.flags, ack.digest) == (SHOWN, 0)
     assert Bench(rig.device).snapshot().digest != 0
 
@@ -172,40 +174,40 @@ def test_status_and_read_are_checked_in_the_order_of_the_table(
     wire: bytes, error: tuple[int, int]
 ) -> None:
     """The device checks in the order of this table; a refused STATUS or READ changes nothing."""
-    rig = Rig()
-    assert rig.ask(wire).error == error
-    assert rig.ask(status()).kind == ACK
+    rig = DeviceUnderTest()
+    assert rig.request(wire).error == error
+    assert rig.request(status()).kind == ACK
 
 
 @pytest.mark.parametrize("flags", [2, 8, 10, 15])
 def test_reserved_flags_of_data_are_refused(flags: int) -> None:
-    rig = Rig()
-    assert rig.ask(data(40, 9, b"\xff", flags)).error == (FIELD, 0)
-    assert rig.ask(status()).error == (NO_SESSION, 0)
+    rig = DeviceUnderTest()
+    assert rig.request(data(40, 9, b"\xff", flags)).error == (FIELD, 0)
+    assert rig.request(status()).error == (NO_SESSION, 0)
 
 
 def test_checks_of_data_go_in_the_order_of_the_table() -> None:
-    rig = Rig()
-    assert rig.ask(data(32, 9, b"\xff", CLEAR)).error == (SEQUENCE, 1)
-    rig = Rig()
-    assert rig.ask(data(0, 9, b"\xff", CLEAR)).error == (FRAME, 2)
-    rig = Rig()
-    assert rig.ask(data(0, 0, b"\xff", CLEAR)).error == (OP, 3)
+    rig = DeviceUnderTest()
+    assert rig.request(data(32, 9, b"\xff", CLEAR)).error == (SEQUENCE, 1)
+    rig = DeviceUnderTest()
+    assert rig.request(data(0, 9, b"\xff", CLEAR)).error == (FRAME, 2)
+    rig = DeviceUnderTest()
+    assert rig.request(data(0, 0, b"\xff", CLEAR)).error == (OP, 3)
 
 
 def test_a_refused_data_ends_the_session() -> None:
     """What is not on display is dropped; until the next HELLO all is answered with NO_SESSION."""
-    rig = Rig()
-    before = rig.show(0, 0, DOT)
-    rig.ask(data(1, 1, DOT))
-    error = rig.ask(data(2, 1, b"\x80\xff"))
+    rig = DeviceUnderTest()
+    before = rig.show_frame(0, 0, DOT)
+    rig.request(data(1, 1, DOT))
+    error = rig.request(data(2, 1, b"\x80\xff"))
     assert error.error == (OP, 4)
     assert (error.seq, error.frame, error.session) == (2, 1, SESSION)
     for wire in (data(3, 1), status(), read(0, 1), packet(0)):
-        assert rig.ask(wire).error == (NO_SESSION, 0)
+        assert rig.request(wire).error == (NO_SESSION, 0)
     assert rig.tick() == []
-    rig.ask(hello())
-    assert rig.ask(status()).digest == before.digest
+    rig.request(hello())
+    assert rig.request(status()).digest == before.digest
 
 
 # Damage: sections 3 and 9.4
@@ -213,15 +215,15 @@ def test_a_refused_data_ends_the_session() -> None:
 
 def test_damage_is_counted_and_answered_in_a_session() -> None:
     """A damaged segment MUST NOT change anything but the count; ACK if a session is open."""
-    rig = Rig(session=False)
+    rig = DeviceUnderTest(session=False)
     bad = b"\x02" * 8 + b"\0"
-    assert rig.say(bad, bad) == []
-    rig.ask(hello())
-    ack = rig.ask(bad)
+    assert rig.send(bad, bad) == []
+    rig.request(hello())
+    ack = rig.request(bad)
     assert (ack.kind, ack.damaged, ack.last, ack.seq) == (ACK, 3, 255, 0)
-    assert rig.say(b"\x02" * 7 + b"\0") == []
+    assert rig.send(b"\x02" * 7 + b"\0") == []
     rig.device.damaged = 65_535
-    assert rig.ask(bad).damaged == 0
+    assert rig.request(bad).damaged == 0
 
 
 # READ and PAGE: section 10
@@ -229,7 +231,7 @@ def test_damage_is_counted_and_answered_in_a_session() -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_front_and_back_can_be_read(name: str) -> None:
-    rig = Rig(17, 64, 40, pixel_format=name, max_payload=64, rx_buffer=512)
+    rig = DeviceUnderTest(17, 64, 40, pixel_format=name, max_payload=64, rx_buffer=512)
     size = FORMATS[name].size
     rng = random.Random(name)
     front, back = rig.device.memory.front, rig.device.memory.back
@@ -242,31 +244,31 @@ def test_front_and_back_can_be_read(name: str) -> None:
         assert picture == page.pixels
 
 
-def read_all(rig: Rig, volume: int, back: int) -> bytes:
+def read_all(rig: DeviceUnderTest, volume: int, back: int) -> bytes:
     """Read a page and draw it on the back page of another device, piece by piece."""
     config = rig.device.config
     at = 0
     picture = b""
     while at < volume:
-        page = rig.ask(read(at, volume - at, tag=at % 256, back=back))
+        page = rig.request(read(at, volume - at, tag=at % 256, back=back))
         assert (page.kind, page.flags, page.seq) == (PAGE, back, at % 256)
         assert (page.start, page.reserved) == (at, 0)
         assert 1 <= page.count <= volume - at
-        other = Rig(page.count, 1, 1, pixel_format=config.pixel_format)
-        assert other.ask(data(0, 0, page.payload[9:])).kind == ACK
+        other = DeviceUnderTest(page.count, 1, 1, pixel_format=config.pixel_format)
+        assert other.request(data(0, 0, page.payload[9:])).kind == ACK
         picture += other.back
         at += page.count
     return picture
 
 
 def test_the_frame_of_a_page_is_that_of_an_ack() -> None:
-    rig = Rig()
-    assert rig.ask(read(0, 105)).frame == 0
-    rig.show(0, 0, DOT)
-    rig.show(1, 1, DOT)
-    assert rig.ask(read(0, 105, back=1)).frame == 1
-    rig.ask(hello())
-    assert rig.ask(read(0, 105)).frame == 0
+    rig = DeviceUnderTest()
+    assert rig.request(read(0, 105)).frame == 0
+    rig.show_frame(0, 0, DOT)
+    rig.show_frame(1, 1, DOT)
+    assert rig.request(read(0, 105, back=1)).frame == 1
+    rig.request(hello())
+    assert rig.request(read(0, 105)).frame == 0
 
 
 # A device that lies
@@ -287,37 +289,40 @@ def test_the_frame_of_a_page_is_that_of_an_ack() -> None:
 )
 def test_info_announces_what_the_device_does_not_do(lie: str, field: str, said: int) -> None:
     sides = (3, 5, 65_535 if field == "nz" else 7)
-    rig = Rig(*sides, session=False, pixel_format="index8", lies=frozenset({lie}))
-    info = rig.ask(hello())
+    rig = DeviceUnderTest(*sides, session=False, pixel_format="index8", lies=frozenset({lie}))
+    info = rig.request(hello())
     assert getattr(info, field) == said
 
 
 def test_a_lie_is_kept_or_comes_out() -> None:
     """What lies beyond the device is refused, lost or not done."""
-    assert Rig(lies=frozenset({"grid"})).ask(data(0, 0, b"\2\3\0\0\xa0")).error == (OUTSIDE, 3)
-    rig = Rig(lies=frozenset({"credit"}), rx_buffer=1200)
-    assert rig.ask(status()).credit == 2400
-    block(rig)
-    assert rig.say(filling(2, 600), filling(3, 600))[0].error == (OVERRUN, 0)
-    rig = Rig(lies=frozenset({"features"}))
-    assert rig.ask(read(0, 1)).error == (TYPE, 0)
-    assert rig.show(0, 0, DOT).digest == 0
-    assert rig.ask(data(1, 1, b"\x04\0\0\0")).error == (OP, 3)
-    rig = Rig(lies=frozenset({"payload"}), max_payload=64)
-    assert rig.ask(data(0, 0, bytes(65))).damaged == 1
-    rig = Rig(lies=frozenset({"boot"}))
-    assert rig.ask(status()).boot == BOOT
-    rig = Rig(lies=frozenset({"format"}), pixel_format="mono1")
-    assert rig.ask(data(0, 0, b"\1\2")).error == (11, 3)
+    assert DeviceUnderTest(lies=frozenset({"grid"})).request(data(0, 0, b"\2\3\0\0\xa0")).error == (
+        OUTSIDE,
+        3,
+    )
+    rig = DeviceUnderTest(lies=frozenset({"credit"}), rx_buffer=1200)
+    assert rig.request(status()).credit == 2400
+    block_with_pending_frame(rig)
+    assert rig.send(data_of_wire_size(2, 600), data_of_wire_size(3, 600))[0].error == (OVERRUN, 0)
+    rig = DeviceUnderTest(lies=frozenset({"features"}))
+    assert rig.request(read(0, 1)).error == (TYPE, 0)
+    assert rig.show_frame(0, 0, DOT).digest == 0
+    assert rig.request(data(1, 1, b"\x04\0\0\0")).error == (OP, 3)
+    rig = DeviceUnderTest(lies=frozenset({"payload"}), max_payload=64)
+    assert rig.request(data(0, 0, bytes(65))).damaged == 1
+    rig = DeviceUnderTest(lies=frozenset({"boot"}))
+    assert rig.request(status()).boot == BOOT
+    rig = DeviceUnderTest(lies=frozenset({"format"}), pixel_format="mono1")
+    assert rig.request(data(0, 0, b"\1\2")).error == (11, 3)
 
 
 # The device as a whole
 
 
 def test_power_cycle_and_snapshot() -> None:
-    rig = Rig(pixel_format="rgb565")
+    rig = DeviceUnderTest(pixel_format="rgb565")
     bench = Bench(rig.device)
-    rig.show(0, 0, DOT)
+    rig.show_frame(0, 0, DOT)
     picture = bench.snapshot()
     assert (picture.frame, picture.grid, picture.pixel_format) == (0, (3, 5, 7), "rgb565")
     assert picture.pixels == b"\xff\xff" + bytes(208)
@@ -327,8 +332,8 @@ def test_power_cycle_and_snapshot() -> None:
     bench.power_cycle()
     assert not any(bench.snapshot().pixels)
     assert bench.snapshot().frame is None
-    assert rig.ask(status()).error == (NO_SESSION, 0)
-    assert rig.ask(hello()).boot == BOOT + 1
+    assert rig.request(status()).error == (NO_SESSION, 0)
+    assert rig.request(hello()).boot == BOOT + 1
     assert bench.counters().refused == {"NO_SESSION": 1}
 
 
@@ -338,11 +343,11 @@ def test_the_boot_id_is_random() -> None:
 
 
 def test_disconnect_ends_the_session() -> None:
-    rig = Rig()
-    block(rig)
+    rig = DeviceUnderTest()
+    block_with_pending_frame(rig)
     rig.device.disconnect()
     assert rig.tick() == []
-    assert rig.ask(status()).error == (NO_SESSION, 0)
+    assert rig.request(status()).error == (NO_SESSION, 0)
 
 
 WORDS = [
@@ -368,7 +373,7 @@ def test_any_cutting_of_the_stream_gives_the_same_answers(
     words: list[bytes], sizes: list[int]
 ) -> None:
     stream = hello() + b"".join(words)
-    whole, pieces, bytewise = (Rig(session=False) for _ in range(3))
+    whole, pieces, bytewise = (DeviceUnderTest(session=False) for _ in range(3))
     whole.device.receive(stream)
     at = turn = 0
     while at < len(stream):
@@ -381,23 +386,23 @@ def test_any_cutting_of_the_stream_gives_the_same_answers(
         told = whole.device.transmit()
         assert pieces.device.transmit() == told
         assert bytewise.device.transmit() == told
-        answers(told)
+        parse_responses(told)
         for rig in (whole, pieces, bytewise):
             rig.device.tick()
 
 
 def test_random_bytes_do_no_harm() -> None:
     """A receiver MUST get through any bytes whatever."""
-    rig = Rig(17, 64, 40)
+    rig = DeviceUnderTest(17, 64, 40)
     rng = random.Random(3)
     for _ in range(1000):
-        rig.say(rng.randbytes(1000))
-    assert rig.say(b"\0" + hello())[-1].kind == INFO
-    assert rig.ask(status()).kind == ACK
+        rig.send(rng.randbytes(1000))
+    assert rig.send(b"\0" + hello())[-1].kind == INFO
+    assert rig.request(status()).kind == ACK
 
 
 def test_mutated_packets_do_no_harm() -> None:
-    rig = Rig(17, 64, 40, refresh=1)
+    rig = DeviceUnderTest(17, 64, 40, refresh=1)
     rng = random.Random(4)
     bodies = [
         bytes((DATA << 4 | 5, 0, 0)) + bytes.fromhex("4A033C0704E401 31010B 82 DF8001"),
@@ -409,7 +414,7 @@ def test_mutated_packets_do_no_harm() -> None:
     seen = set()
     for turn in range(10_000):
         if turn % 4 == 0:
-            rig.say(b"\0" + hello())
+            rig.send(b"\0" + hello())
         body = bytearray(rng.choice(bodies))
         for _ in range(rng.randrange(1, 4)):
             what = rng.randrange(3)
@@ -420,9 +425,9 @@ def test_mutated_packets_do_no_harm() -> None:
                 del body[at]
             else:
                 body.insert(at, rng.randrange(256))
-        for answer in rig.say(on_wire(bytes(body))) + rig.tick():
+        for answer in rig.send(on_wire(bytes(body))) + rig.tick():
             assert answer.kind in (ACK, INFO, PAGE, ERROR)
             if answer.kind == ERROR:
                 seen.add(answer.code)
     assert seen >= set(range(1, 13)) - {11}
-    assert rig.ask(b"\0" + hello()).kind == INFO
+    assert rig.request(b"\0" + hello()).kind == INFO

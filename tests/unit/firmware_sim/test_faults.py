@@ -5,9 +5,7 @@ import random
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from simwire import (
+from device_packets import (
     ACK,
     ASKED,
     BOOT,
@@ -18,17 +16,19 @@ from simwire import (
     PENDING,
     SHOWN,
     Clock,
-    answers,
     data,
     hello,
+    parse_responses,
     status,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.fault_types import Event
-from firmware_sim.faults import DIRECTIONS, KINDS, Line, Spec, parse_faults
+from firmware_sim.faults import DIRECTIONS, KINDS, FaultSpec, FaultyLine, parse_faults
 
 NO_SESSION = 1
 BOTH = ("down", "up")
@@ -38,19 +38,22 @@ BOTH = ("down", "up")
 
 
 def test_faults_are_read() -> None:
-    assert parse_faults("flip=1e-5,drop:0.5") == (Spec("flip", BOTH, 1e-5), Spec("drop", BOTH, 0.5))
+    assert parse_faults("flip=1e-5,drop:0.5") == (
+        FaultSpec("flip", BOTH, 1e-5),
+        FaultSpec("drop", BOTH, 0.5),
+    )
     assert parse_faults("down.flip=1, up.lose:0") == (
-        Spec("flip", ("down",), 1.0),
-        Spec("lose", ("up",), 0.0),
+        FaultSpec("flip", ("down",), 1.0),
+        FaultSpec("lose", ("up",), 0.0),
     )
     assert parse_faults("stall=0.2@0.01,delay:1@1") == (
-        Spec("stall", BOTH, 0.01, 0.2),
-        Spec("delay", BOTH, 1.0, 1.0),
+        FaultSpec("stall", BOTH, 0.01, 0.2),
+        FaultSpec("delay", BOTH, 1.0, 1.0),
     )
     assert parse_faults("reboot@5000,unplug=0.5,up.unplug@1") == (
-        Spec("reboot", ("down",), after=5000),
-        Spec("unplug", ("down",), 0.5),
-        Spec("unplug", ("up",), after=1),
+        FaultSpec("reboot", ("down",), after=5000),
+        FaultSpec("unplug", ("down",), 0.5),
+        FaultSpec("unplug", ("up",), after=1),
     )
     assert parse_faults("") == ()
 
@@ -90,7 +93,7 @@ def test_unknown_faults_are_refused(text: str, message: str) -> None:
 # Where and when they strike
 
 
-def carried(line: Line) -> list[bytes | Event]:
+def carried(line: FaultyLine) -> list[bytes | Event]:
     """Take all that comes."""
     come = []
     while line.due < math.inf:
@@ -99,7 +102,7 @@ def carried(line: Line) -> list[bytes | Event]:
 
 
 def carry(text: str, stream: bytes, seed: int = 7, direction: str = "down") -> bytes:
-    line = Line(parse_faults(text), seed, direction)
+    line = FaultyLine(parse_faults(text), seed, direction)
     line.send(0, stream)
     return b"".join(what for what in carried(line) if isinstance(what, bytes))
 
@@ -127,7 +130,7 @@ def test_every_kind_is_tried_here() -> None:
     assert {spec.kind for spec in parse_faults(ALL)} == KINDS.keys()
 
 
-def cut(line: Line, stream: bytes, sizes: list[int]) -> None:
+def cut(line: FaultyLine, stream: bytes, sizes: list[int]) -> None:
     at = turn = 0
     while at < len(stream):
         size = sizes[turn % len(sizes)]
@@ -135,7 +138,7 @@ def cut(line: Line, stream: bytes, sizes: list[int]) -> None:
         at, turn = at + size, turn + 1
 
 
-def history(line: Line) -> list[tuple[float, bytes | Event]]:
+def history(line: FaultyLine) -> list[tuple[float, bytes | Event]]:
     """All that comes, with its time; bytes that come together are one."""
     told = []
     while line.due < math.inf:
@@ -146,7 +149,7 @@ def history(line: Line) -> list[tuple[float, bytes | Event]]:
 
 @pytest.mark.parametrize("text", [*ONE_OF_EACH, ALL, "drop=0.1,flip=0.01", "flip=1", "reorder=1"])
 def test_faults_do_not_depend_on_the_cutting(text: str) -> None:
-    whole, pieces, bytewise = (Line(parse_faults(text), 7, "down") for _ in range(3))
+    whole, pieces, bytewise = (FaultyLine(parse_faults(text), 7, "down") for _ in range(3))
     whole.send(0, STREAM)
     cut(pieces, STREAM, [13, 1, 200, 41, 6])
     cut(bytewise, STREAM, [1])
@@ -168,7 +171,7 @@ def test_no_combination_depends_on_the_cutting(
     text: str, words: list[bytes], sizes: list[int], seed: int
 ) -> None:
     stream = b"".join(words)
-    whole, pieces = (Line(parse_faults(text), seed, "down") for _ in range(2))
+    whole, pieces = (FaultyLine(parse_faults(text), seed, "down") for _ in range(2))
     if stream:
         whole.send(0, stream)
     cut(pieces, stream, sizes)
@@ -229,7 +232,7 @@ def test_a_packet_is_exchanged_with_the_next() -> None:
 
 
 def test_what_is_held_back_is_bounded() -> None:
-    line = Line(parse_faults("reorder=1"), 1, "down")
+    line = FaultyLine(parse_faults("reorder=1"), 1, "down")
     sent = 0
     for _ in range(100):
         line.send(0, b"x" * 1000)
@@ -240,7 +243,7 @@ def test_what_is_held_back_is_bounded() -> None:
 
 
 def test_a_line_stands_still() -> None:
-    line = Line(parse_faults("stall=0.5@1"), 1, "down")
+    line = FaultyLine(parse_faults("stall=0.5@1"), 1, "down")
     line.send(10, b"ab")
     line.send(10.25, b"c")
     assert [line.take(at) for at in (10, 10.25)] == [b"", b""]
@@ -250,7 +253,7 @@ def test_a_line_stands_still() -> None:
 
 
 def test_packets_are_late_and_keep_their_order() -> None:
-    line = Line(parse_faults("delay=0.5@1"), 1, "down")
+    line = FaultyLine(parse_faults("delay=0.5@1"), 1, "down")
     line.send(10, b"ab")
     line.send(10.25, b"c\0d")
     line.send(12, b"e\0")
@@ -258,13 +261,13 @@ def test_packets_are_late_and_keep_their_order() -> None:
 
 
 def test_what_happens_keeps_its_place_between_late_bytes() -> None:
-    line = Line(parse_faults("reboot@3,delay=5@1"), 1, "down")
+    line = FaultyLine(parse_faults("reboot@3,delay=5@1"), 1, "down")
     line.send(0, b"abcd")
     assert history(line) == [(5, b"abc"), (5, Event.REBOOT), (5, b"d")]
 
 
 def test_short_pieces_come_one_by_one() -> None:
-    line = Line(parse_faults("short=0.2"), 1, "down")
+    line = FaultyLine(parse_faults("short=0.2"), 1, "down")
     line.send(0, STREAM)
     told = carried(line)
     pieces = [what for what in told if isinstance(what, bytes)]
@@ -274,22 +277,22 @@ def test_short_pieces_come_one_by_one() -> None:
 
 
 def test_something_happens_behind_a_byte_once_or_at_a_rate() -> None:
-    line = Line(parse_faults("reboot@3"), 1, "down")
+    line = FaultyLine(parse_faults("reboot@3"), 1, "down")
     line.send(0, b"ab")
     line.send(0, b"cdefghi")
     assert carried(line) == [b"abc", Event.REBOOT, b"defghi"]
-    line = Line(parse_faults("reboot=1"), 1, "down")
+    line = FaultyLine(parse_faults("reboot=1"), 1, "down")
     line.send(0, b"ab")
     assert carried(line) == [b"a", Event.REBOOT, b"b", Event.REBOOT]
 
 
 def test_a_new_connection_has_nothing_of_the_old_one() -> None:
     text = "reorder=1,lose=0.5,delay=9@0.5,stall=9@0.5"
-    line = Line(parse_faults(text), 1, "down")
+    line = FaultyLine(parse_faults(text), 1, "down")
     line.send(0, b"abc\0def")
     line.connect()
     assert (line.backlog, line.due) == (0, math.inf)
-    line = Line(parse_faults("reorder=1"), 1, "down")
+    line = FaultyLine(parse_faults("reorder=1"), 1, "down")
     line.send(0, b"abc\0de")
     line.connect()
     line.send(0, b"f\0g\0")
@@ -299,10 +302,10 @@ def test_a_new_connection_has_nothing_of_the_old_one() -> None:
 # What a device makes of them
 
 
-def wire_of(text: str, **settings: object) -> tuple[Wire, Clock]:
+def wire_of(text: str, **settings: object) -> tuple[DeviceOnLine, Clock]:
     clock = Clock()
     config = Config((3, 5, 7), **{"refresh": 10_000, "boot": BOOT, **settings})
-    return Wire(Device(config), parse_faults(text), 3, clock), clock
+    return DeviceOnLine(Device(config), parse_faults(text), 3, clock), clock
 
 
 def test_a_device_that_starts_again() -> None:
@@ -312,7 +315,7 @@ def test_a_device_that_starts_again() -> None:
     wire.receive(first)
     assert any(wire.device.memory.front.pixels)
     wire.receive(status() + status(2) + hello())
-    info, ack, error, again = answers(wire.transmit())
+    info, ack, error, again = parse_responses(wire.transmit())
     assert (info.kind, info.boot) == (INFO, BOOT)
     assert ack.flags == SHOWN
     assert error.error == (NO_SESSION, 0)
@@ -324,7 +327,7 @@ def test_a_device_may_start_again_while_a_frame_waits() -> None:
     first = hello() + data(0, 0, DOT, CLEAR | COMMIT)
     wire, _ = wire_of(f"reboot@{len(first)}")
     wire.receive(first)
-    assert wire.until_tick() is None
+    assert wire.next_event_s() is None
     assert wire.device.boot == BOOT + 1
 
 
@@ -333,12 +336,12 @@ def test_an_unplugged_device_says_nothing_more() -> None:
     wire.receive(hello())
     with pytest.raises(ConnectionError, match="unplugged"):
         wire.receive(hello())
-    for call in (wire.transmit, wire.advance, wire.takes, wire.until_tick):
+    for call in (wire.transmit, wire.advance, wire.accepts_data, wire.next_event_s):
         with pytest.raises(ConnectionError, match="unplugged"):
             call()
     wire.disconnect()
     wire.receive(hello())
-    assert answers(wire.transmit())[0].kind == INFO
+    assert parse_responses(wire.transmit())[0].kind == INFO
 
 
 def test_what_comes_from_the_device_may_end() -> None:
@@ -355,8 +358,8 @@ def test_short_reads() -> None:
     pieces = []
     while piece := wire.transmit():
         pieces.append(piece)
-        assert wire.until_tick() is None
-    assert answers(b"".join(pieces))[0].kind == INFO
+        assert wire.next_event_s() is None
+    assert parse_responses(b"".join(pieces))[0].kind == INFO
     assert len(pieces) > 5
 
 
@@ -367,9 +370,9 @@ def test_what_is_late_comes_in_the_order_of_its_time() -> None:
         clock.now = 1000 + 0.1 * number
         wire.receive(packet)
     assert wire.transmit() == b""
-    assert wire.until_tick() == pytest.approx(0.05)
+    assert wire.next_event_s() == pytest.approx(0.05)
     clock.now = 1009
-    told = answers(wire.transmit())
+    told = parse_responses(wire.transmit())
     assert [a.kind for a in told] == [INFO, ACK, ACK, ACK]
     # At 0.35 the frame, at 0.4 the tick, at 0.45 the question.
     assert [a.flags for a in told[1:]] == [PENDING, SHOWN, SHOWN | ASKED]
@@ -379,20 +382,20 @@ def test_answers_may_be_late() -> None:
     wire, clock = wire_of("up.delay=0.25@1")
     wire.receive(hello())
     assert wire.transmit() == b""
-    assert wire.until_tick() == pytest.approx(0.25)
+    assert wire.next_event_s() == pytest.approx(0.25)
     clock.now += 0.25
-    assert answers(wire.transmit())[0].kind == INFO
-    assert wire.until_tick() is None
+    assert parse_responses(wire.transmit())[0].kind == INFO
+    assert wire.next_event_s() is None
 
 
 def test_a_line_that_stands_still_takes_no_more_when_it_is_full() -> None:
     wire, clock = wire_of("down.delay=2@1")
     wire.receive(bytes(65_535))
-    assert wire.takes()
+    assert wire.accepts_data()
     wire.receive(b"\0")
-    assert not wire.takes()
+    assert not wire.accepts_data()
     clock.now += 2
-    assert wire.takes()
+    assert wire.accepts_data()
 
 
 def test_a_host_that_does_not_read_makes_the_device_stop() -> None:
@@ -404,7 +407,7 @@ def test_a_host_that_does_not_read_makes_the_device_stop() -> None:
     told = b""
     while piece := wire.transmit():
         told += piece
-    assert answers(told)[-1].kind == ACK
+    assert parse_responses(told)[-1].kind == ACK
     assert len(told) < 65_536 * 3
 
 

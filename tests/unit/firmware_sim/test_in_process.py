@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from simwire import (
+from device_packets import (
     ACK,
     CLEAR,
     COMMIT,
@@ -11,18 +11,18 @@ from simwire import (
     INFO,
     PENDING,
     SHOWN,
-    Answer,
     Clock,
-    answers,
+    Response,
     data,
     hello,
+    parse_responses,
     status,
 )
 
 from firmware_sim import in_process, serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.serve import (
     InProcessPort,
     open_in_process,
@@ -33,34 +33,36 @@ WAIT = 20  # seconds after which a test has failed; none takes so long
 
 def test_ticks_do_not_drift() -> None:
     clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=30_000)), clock=clock)
+    wire = DeviceOnLine(Device(Config((3, 5, 7), refresh=30_000)), clock=clock)
     wire.receive(hello())
-    assert wire.until_tick() is None
+    assert wire.next_event_s() is None
     for number in range(90):
         clock.now = 1000 + number / 30 + 0.001 * (number % 30)
         wire.receive(data(number, number, DOT, CLEAR | COMMIT))
-        assert wire.until_tick() == pytest.approx(1000 + (number + 1) / 30 - clock.now)
+        assert wire.next_event_s() == pytest.approx(1000 + (number + 1) / 30 - clock.now)
     clock.now = 1003.1
-    assert wire.until_tick() is None
-    shown = [a.frame for a in answers(wire.transmit()) if a.kind == ACK and not a.flags & PENDING]
+    assert wire.next_event_s() is None
+    shown = [
+        a.frame for a in parse_responses(wire.transmit()) if a.kind == ACK and not a.flags & PENDING
+    ]
     assert shown == list(range(90))
 
 
 def test_a_tick_that_comes_while_it_is_asked_for_is_not_slept_through() -> None:
     clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=1_000_000)), clock=clock)
+    wire = DeviceOnLine(Device(Config((3, 5, 7), refresh=1_000_000)), clock=clock)
     wire.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
-    assert answers(wire.transmit())[-1].flags & PENDING
+    assert parse_responses(wire.transmit())[-1].flags & PENDING
     clock.now += 0.002
-    assert wire.until_tick() == 0
-    assert wire.until_tick() is None, "who does not carry it need not be told again"
-    (ack,) = answers(wire.transmit())
+    assert wire.next_event_s() == 0
+    assert wire.next_event_s() is None, "who does not carry it need not be told again"
+    (ack,) = parse_responses(wire.transmit())
     assert not ack.flags & PENDING
 
 
 def test_several_ticks_pass_at_once() -> None:
     clock = Clock()
-    wire = Wire(Device(Config((3, 5, 7), refresh=10_000)), clock=clock)
+    wire = DeviceOnLine(Device(Config((3, 5, 7), refresh=10_000)), clock=clock)
     wire.receive(hello() + b"".join(data(n, n, DOT, CLEAR | COMMIT) for n in range(4)))
     clock.now += 0.25
     wire.advance()
@@ -70,12 +72,12 @@ def test_several_ticks_pass_at_once() -> None:
     assert wire.device.session.shown == 3
     wire.receive(data(4, 4, DOT, CLEAR | COMMIT))
     wire.disconnect()
-    assert wire.until_tick() is None
+    assert wire.next_event_s() is None
 
 
-def exchange(port: InProcessPort, wire: bytes) -> list[Answer]:
+def exchange(port: InProcessPort, wire: bytes) -> list[Response]:
     port.write(wire, 1)
-    return answers(port.read(1))
+    return parse_responses(port.read(1))
 
 
 def test_a_port_in_process() -> None:
@@ -85,7 +87,7 @@ def test_a_port_in_process() -> None:
     assert info.payload[29:36] == b"\x06a cube"
     *_, ack = exchange(port, data(0, 0, DOT, CLEAR | COMMIT))
     if ack.flags == PENDING:
-        (ack,) = answers(port.read(WAIT))
+        (ack,) = parse_responses(port.read(WAIT))
     assert ack.flags == SHOWN
     assert port.read(0) == b""
     assert port.read(0.001) == b""
@@ -113,7 +115,7 @@ def test_who_reads_is_woken_by_who_writes() -> None:
     reader.start()
     port.write(hello(), 1)
     reader.join(WAIT)
-    assert answers(got[0])[0].kind == INFO
+    assert parse_responses(got[0])[0].kind == INFO
 
 
 def test_who_reads_is_woken_by_close() -> None:
@@ -197,7 +199,7 @@ def test_who_waits_for_a_line_goes_on_when_it_moves() -> None:
     port = open_in_process("sim:?size=3x5x7&refresh=0&fault=down.delay:0.05@1")
     port.write(bytes(70_000), 0)
     port.write(hello(), WAIT)
-    assert answers(port.read(WAIT))[0].kind == INFO
+    assert parse_responses(port.read(WAIT))[0].kind == INFO
 
 
 def test_who_waits_for_a_line_is_woken_by_close() -> None:
@@ -211,7 +213,7 @@ def test_who_waits_for_a_line_is_woken_by_close() -> None:
 def test_an_unplugged_device_is_gone() -> None:
     port = open_in_process("sim:?size=3x5x7&fault=unplug@20")
     port.write(hello(), 0)
-    assert answers(port.read(0))[0].kind == INFO
+    assert parse_responses(port.read(0))[0].kind == INFO
     with pytest.raises(ConnectionError, match="unplugged"):
         port.write(hello(), 0)
     with pytest.raises(ConnectionError, match="unplugged"):

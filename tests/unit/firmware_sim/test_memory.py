@@ -4,12 +4,12 @@ import random
 from array import array
 
 import pytest
+from emulator_page import default_color, digest, mix
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simpage import default_color, digest, mix
 
 from firmware_sim import spec
-from firmware_sim.digest import terms
+from firmware_sim.digest import mix_sum
 from firmware_sim.grid import Grid
 from firmware_sim.memory import DEFAULT_PALETTE, FORMATS, Memory, Page
 
@@ -26,14 +26,14 @@ def test_terms_are_those_of_the_document(size: int) -> None:
             for index, at in zip(indices, range(0, len(pixels), size), strict=True)
             if (value := int.from_bytes(pixels[at : at + size], "little"))
         )
-        assert terms(indices, pixels, size) == expected % 2**32
+        assert mix_sum(indices, pixels, size) == expected % 2**32
 
 
 def test_the_largest_index_and_value_stay_in_their_lanes() -> None:
     top = spec.LIMIT_MAX_VOXELS - 1
     pixels = b"\xff" * 3 * 1024
     expected = sum(mix(top - k, 0xFFFFFF) for k in range(1024)) % 2**32
-    assert terms(range(top, top - 1024, -1), pixels, 3) == expected
+    assert mix_sum(range(top, top - 1024, -1), pixels, 3) == expected
 
 
 @given(st.data())
@@ -55,7 +55,7 @@ def test_the_digest_is_kept_at_every_write(data: st.DataObject) -> None:
             first = data.draw(st.integers(0, 255))
             shades = st.sampled_from((default_color(first), b"abc", b"\xff\0\0"))
             colors = b"".join(data.draw(st.lists(shades, min_size=1, max_size=256 - first)))
-            page.color(first, colors)
+            page.set_colors(first, colors)
             palette[3 * first : 3 * first + len(colors)] = colors
         else:
             count = data.draw(st.integers(1, 3)) if what == "fill" else 1
@@ -86,9 +86,9 @@ def test_the_default_palette() -> None:
     """Floor(255 * value + 1/2)."""
     assert b"".join(map(default_color, range(256))) == DEFAULT_PALETTE
     page = Page(8, 1)
-    page.color(7, b"\x01\x02\x03" + DEFAULT_PALETTE[24:27])
+    page.set_colors(7, b"\x01\x02\x03" + DEFAULT_PALETTE[24:27])
     assert page.digest == mix(8 + 7, 0x1030201)
-    page.color(0, DEFAULT_PALETTE)
+    page.set_colors(0, DEFAULT_PALETTE)
     assert page.digest == 0
 
 
@@ -96,19 +96,19 @@ def test_pages_are_cleared_copied_and_exchanged() -> None:
     memory = Memory(Grid(3, 5, 7), FORMATS["rgb565"])
     memory.back.put(4, b"\x11\x22")
     memory.swap()
-    memory.begin(dark=False)
+    memory.begin_frame(dark=False)
     assert memory.back.pixels == memory.front.pixels
     assert memory.back.digest == memory.front.digest == mix(4, 0x2211)
     memory.back.put(5, b"\x11\x22")
     assert memory.front.digest == mix(4, 0x2211)
-    memory.back.color(1, b"abc")
+    memory.back.set_colors(1, b"abc")
     memory.swap()
-    memory.begin(dark=False)
+    memory.begin_frame(dark=False)
     assert memory.back.palette == memory.front.palette != DEFAULT_PALETTE
     assert memory.back.digest == memory.front.digest
     for dark in (False, True):  # of a frame that is given up nothing stays
         memory.back.put(9, b"\x33\x44")
-        memory.begin(dark=dark)
+        memory.begin_frame(dark=dark)
         assert memory.back.digest == (0 if dark else memory.front.digest)
     assert not any(memory.back.pixels)
     assert memory.back.palette == DEFAULT_PALETTE

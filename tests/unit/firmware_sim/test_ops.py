@@ -4,16 +4,16 @@ import random
 from itertools import product
 
 import pytest
+from emulator_page import GRIDS, digest, draw_ops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_ops import VoxelwiseDecoder, random_ops
-from simpage import GRIDS, digest, unpack
 
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, Page
-from firmware_sim.packet_error import Refusal
-from firmware_sim.page_encoder import pack
+from firmware_sim.packet_error import PacketError
+from firmware_sim.page_encoder import encode_page
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -25,7 +25,7 @@ def test_ops_draw_what_the_plainest_decoder_draws(name: str, sides: tuple[int, i
         plain = VoxelwiseDecoder(sides, name)
         ops = random_ops(rng, plain, name)
         page = Page(grid.volume, FORMATS[name].size)
-        unpack(ops, grid, name, page)
+        draw_ops(ops, grid, name, page)
         assert page.pixels == plain.pixels()
         assert page.palette == plain.palette
         assert page.digest == digest(page.pixels, page.pixel_size, page.palette)
@@ -35,7 +35,7 @@ def test_a_chain_of_256_steps() -> None:
     plain = VoxelwiseDecoder((300, 4, 3), "rgb888")
     plain.chain(0, [0] * 256)
     page = Page(3600, 3)
-    unpack(b"\x20\xff" + bytes(64), Grid(300, 4, 3), "rgb888", page)
+    draw_ops(b"\x20\xff" + bytes(64), Grid(300, 4, 3), "rgb888", page)
     assert page.pixels == plain.pixels()
 
 
@@ -128,8 +128,8 @@ def test_the_first_fault_is_refused(name: str, ops: str, code: int, offset: int)
     """The device checks in the order of this table, ops from first to last."""
     grid, pixel_format = Grid(3, 5, 7), FORMATS[name]
     page = Page(grid.volume, pixel_format.size)
-    with pytest.raises(Refusal) as refusal:
-        unpack(bytes.fromhex(ops), grid, name, page)
+    with pytest.raises(PacketError) as refusal:
+        draw_ops(bytes.fromhex(ops), grid, name, page)
     assert (refusal.value.code, refusal.value.offset) == (code, offset)
     assert len(refusal.value.text.encode()) <= 59
     assert len(page.pixels) == grid.volume * pixel_format.size
@@ -154,9 +154,9 @@ def test_ops_of_features_are_reserved_if_not_announced(feature: str, ops: str) -
     config = Config(grid.sides, "index8", features=frozenset({feature}))
     others = Config(grid.sides, "index8").feature_bits & ~config.feature_bits
     page = Page(grid.volume, 1)
-    unpack(bytes.fromhex(ops), grid, "index8", page, config.feature_bits)
-    with pytest.raises(Refusal) as refusal:
-        unpack(bytes.fromhex("a0" + ops), grid, "index8", page, others)
+    draw_ops(bytes.fromhex(ops), grid, "index8", page, config.feature_bits)
+    with pytest.raises(PacketError) as refusal:
+        draw_ops(bytes.fromhex("a0" + ops), grid, "index8", page, others)
     assert (refusal.value.code, refusal.value.offset) == (OP, 4)
 
 
@@ -171,7 +171,7 @@ def test_a_line_goes_up_from_the_middle_and_back_over_the_same_voxels() -> None:
         for start, end in ((p, q), (q, p)):
             page = Page(plain.volume, 1)
             ops = bytes((2, *start, 3, *end))
-            unpack(ops, Grid(*sides), "mono1", page)
+            draw_ops(ops, Grid(*sides), "mono1", page)
             pictures.append(page.pixels)
         plain.cursor = plain.index(p)
         plain.line(q)
@@ -186,7 +186,7 @@ def test_a_box_may_be_flat_or_thin_on_every_axis() -> None:
             plain.cursor = plain.index(p)
             plain.box(q)
             page = Page(plain.volume, 1)
-            unpack(bytes((2, *p, 4, *q)), Grid(*sides), "index8", page)
+            draw_ops(bytes((2, *p, 4, *q)), Grid(*sides), "index8", page)
             assert page.pixels == plain.pixels()
 
 
@@ -195,7 +195,7 @@ def test_a_full_brick_and_all_its_masks_are_the_same() -> None:
     pictures = []
     for masks in (b"\0", b"\xff" + bytes(8), b"\xff" * 9 + bytes(64), b"\xff" * 585):
         page = Page(Grid(*sides).volume, 3)
-        unpack(b"\x64\0\0\1" + masks, Grid(*sides), "rgb888", page)
+        draw_ops(b"\x64\0\0\1" + masks, Grid(*sides), "rgb888", page)
         assert page.digest == digest(page.pixels, 3)
         pictures.append(page.pixels)
     assert pictures[1:] == pictures[:1] * 3
@@ -210,8 +210,8 @@ def test_no_ops_write_outside_the_page(ops: bytes, name: str, sides: tuple[int, 
     page = Page(grid.volume, pixel_format.size)
     refusal = None
     try:
-        unpack(ops, grid, name, page)
-    except Refusal as raised:
+        draw_ops(ops, grid, name, page)
+    except PacketError as raised:
         refusal = raised
     assert refusal is None or OP <= refusal.code <= OUTSIDE
     assert refusal is None or 3 <= refusal.offset < 3 + len(ops)
@@ -249,13 +249,13 @@ def test_a_page_unpacks_to_what_was_packed(name: str, data: st.DataObject) -> No
     room = data.draw(st.integers(55, 300))
     start = data.draw(st.integers(0, volume - 1))
     count = data.draw(st.integers(1, volume - start))
-    covered, ops = pack(page, pixel_format, start, count, room)
+    covered, ops = encode_page(page, pixel_format, start, count, room)
     assert 1 <= covered <= count
     assert len(ops) <= room
     assert covered == count or len(ops) > room - 12
     back = Page(covered, size)
     if covered <= 256 * 256:
-        unpack(ops, Grid(covered, 1, 1), name, back, features=0)
+        draw_ops(ops, Grid(covered, 1, 1), name, back, features=0)
     assert back.pixels == pixels[start * size : (start + covered) * size]
 
 
@@ -278,4 +278,7 @@ def test_pages_are_small(name: str, pixels: bytes, ops: str) -> None:
     size = FORMATS[name].size
     page = Page(len(pixels) // size, size)
     page.put(0, pixels)
-    assert pack(page, FORMATS[name], 0, page.volume, 1015) == (page.volume, bytes.fromhex(ops))
+    assert encode_page(page, FORMATS[name], 0, page.volume, 1015) == (
+        page.volume,
+        bytes.fromhex(ops),
+    )

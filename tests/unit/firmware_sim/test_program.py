@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simwire import (
+from device_packets import (
     CLEAR,
     COMMIT,
     DOT,
     SHOWN,
-    answers,
     data,
     hello,
+    parse_responses,
     receive,
 )
 
@@ -28,7 +28,7 @@ from firmware_sim import __main__ as program
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.serve import (
-    listen,
+    listen_tcp,
 )
 
 WAIT = 20  # seconds after which a test has failed; none takes so long
@@ -64,7 +64,7 @@ def test_the_program_on_a_pty(tmp_path: Path) -> None:
         host = os.open(link, os.O_RDWR | os.O_NOCTTY)
         os.write(host, b"\0" + hello() + data(0, 0, DOT, CLEAR | COMMIT))
         got = b""
-        while not got or answers(got)[-1].flags != SHOWN:
+        while not got or parse_responses(got)[-1].flags != SHOWN:
             got += os.read(host, 1)
             while not got.endswith(b"\0"):
                 got += os.read(host, 1)
@@ -152,7 +152,7 @@ def test_the_program_in_this_process(
 ) -> None:
     if "[::1]:0" in arguments:
         try:
-            listen("::1", 0).close()
+            listen_tcp("::1", 0).close()
         except OSError:
             pytest.skip("no IPv6 here")
     announce = program._announce

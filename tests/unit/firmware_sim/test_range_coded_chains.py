@@ -12,9 +12,9 @@ from firmware_sim import spec
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, Page
-from firmware_sim.op_decoder import Unpacker
-from firmware_sim.packet_error import Refusal
-from firmware_sim.range_decoder import Bits
+from firmware_sim.op_decoder import OpDecoder
+from firmware_sim.packet_error import PacketError
+from firmware_sim.range_decoder import RangeDecoder
 
 GRIDS = [(3, 5, 7), (17, 64, 40), (300, 4, 3), (1, 1, 1), (256, 2, 2)]
 TRUNCATED, PADDING, OUTSIDE = 9, 10, 12
@@ -190,7 +190,7 @@ def curve(rng: random.Random, sides: tuple[int, int, int], name: str) -> list[Pi
 def unpack(ops: bytes, sides: tuple[int, int, int], name: str) -> Page:
     config = Config(sides, name)
     page = Page(config.shape.volume, config.pixels.size)
-    Unpacker(config.shape, config.pixels, config.feature_bits).draw(b"\x11\0\0" + ops, page)
+    OpDecoder(config.shape, config.pixels, config.feature_bits).draw(b"\x11\0\0" + ops, page)
     return page
 
 
@@ -207,7 +207,7 @@ def test_what_a_host_codes_is_drawn(name: str, sides: tuple[int, int, int]) -> N
         expected = Page(page.volume, page.pixel_size)
         expected.put(0, drawn(pieces, sides, name, pen))
         assert (page.pixels, page.digest) == (expected.pixels, expected.digest)
-        with pytest.raises(Refusal) as refusal:
+        with pytest.raises(PacketError) as refusal:
             unpack(ops + b"\0", sides, name)
         assert (refusal.value.code, refusal.value.offset) == (PADDING, 3 + len(before))
 
@@ -227,9 +227,9 @@ def test_the_longest_number() -> None:
     coder = Coder()
     for value in (65_534, 0, 32_766, 32_767, 1):
         coder.number(value)
-    bits = Bits(coder.end(), AssertionError)
+    bits = RangeDecoder(coder.end(), AssertionError)
     assert [bits.number() for _ in range(5)] == [65_534, 0, 32_766, 32_767, 1]
-    assert bits.done
+    assert bits.exhausted
 
 
 def test_long_runs_are_remembered_as_255() -> None:
@@ -253,7 +253,7 @@ def test_what_is_cut_off_is_refused() -> None:
     for _ in range(10):
         ops = code(curve(rng, sides, "rgb565"), sides, "rgb565")
         for size in range(max(0, len(ops) - 20), len(ops)):
-            with pytest.raises(Refusal) as refusal:
+            with pytest.raises(PacketError) as refusal:
                 unpack(b"\x58" + ops[:size], sides, "rgb565")
             assert refusal.value.offset == 3
             seen.add(refusal.value.code)
@@ -268,7 +268,7 @@ def test_what_is_cut_off_is_refused() -> None:
 )
 def test_off_the_grid_is_refused(start: Step, step: Step | None) -> None:
     ops = code([Piece([step] if step else [], start)], (3, 5, 7), "index8")
-    with pytest.raises(Refusal) as refusal:
+    with pytest.raises(PacketError) as refusal:
         unpack(b"\xa0\x58" + ops, (3, 5, 7), "index8")
     assert (refusal.value.code, refusal.value.offset) == (OUTSIDE, 4)
 
@@ -280,11 +280,11 @@ def test_no_bytes_write_outside_the_page(
 ) -> None:
     config = Config(sides, name)
     page = Page(config.shape.volume, config.pixels.size)
-    unpacker = Unpacker(Grid(*sides), config.pixels, 1 << spec.FEATURE_ARC)
+    unpacker = OpDecoder(Grid(*sides), config.pixels, 1 << spec.FEATURE_ARC)
     code = None
     try:
         unpacker.draw(b"\x11\0\0\x58" + ops, page)
-    except Refusal as refusal:
+    except PacketError as refusal:
         code = refusal.code
     assert code in (None, TRUNCATED, PADDING, OUTSIDE)
     assert len(page.pixels) == config.shape.volume * config.pixels.size

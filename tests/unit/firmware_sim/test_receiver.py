@@ -3,13 +3,13 @@
 import random
 
 import pytest
+from device_packets import packet
 from document import cobs_decode, cobs_encode, on_wire
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simwire import packet
 
 from firmware_sim.receiver import Receiver
-from firmware_sim.sender import encode, send, wire_size
+from firmware_sim.sender import encode_packet, encode_segment, max_wire_bytes
 
 LONGEST = 300
 
@@ -32,16 +32,16 @@ def segments(pieces: list[bytes], longest: int = LONGEST) -> list[bytes | None]:
 @given(st.binary(min_size=1, max_size=1200))
 @settings(deadline=None)
 def test_cobs_is_that_of_the_document(raw: bytes) -> None:
-    wire = encode(raw)
+    wire = encode_segment(raw)
     assert wire == cobs_encode(raw) + b"\0"
     assert wire.index(0) == len(wire) - 1
     assert cobs_decode(wire[:-1]) == raw
-    assert len(wire) <= wire_size(len(raw))
+    assert len(wire) <= max_wire_bytes(len(raw))
 
 
 @pytest.mark.parametrize("size", [1, 253, 254, 255, 507, 508, 509, 1031])
 def test_the_wire_size_is_that_of_bytes_without_zeros(size: int) -> None:
-    assert len(encode(b"\x11" * size)) == wire_size(size)
+    assert len(encode_segment(b"\x11" * size)) == max_wire_bytes(size)
 
 
 @given(st.binary(min_size=3, max_size=LONGEST - 4))
@@ -133,4 +133,4 @@ def test_a_long_random_stream_is_got_through() -> None:
 
 
 def test_send_is_a_packet() -> None:
-    assert send(8, 5, 1, 2, b"\0abc") == packet(8, 5, 1, 2, b"\0abc")
+    assert encode_packet(8, 5, 1, 2, b"\0abc") == packet(8, 5, 1, 2, b"\0abc")

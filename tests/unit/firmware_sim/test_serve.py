@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from simwire import (
+from device_packets import (
     ACK,
     CLEAR,
     COMMIT,
     DOT,
     INFO,
     SHOWN,
-    answers,
     data,
     hello,
+    parse_responses,
     receive,
     status,
 )
@@ -25,14 +25,14 @@ from simwire import (
 from firmware_sim import serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.faults import parse_faults
 from firmware_sim.serve import (
-    linked,
-    listen,
+    listen_tcp,
     open_pty,
     serve_tcp,
     serve_wire,
+    symbolic_link,
 )
 
 WAIT = 20  # seconds after which a test has failed; none takes so long
@@ -60,8 +60,8 @@ def running(target: Callable[..., object], *args: object) -> Iterator[Callable[[
         os.close(stopper)
 
 
-def small(**settings: object) -> Wire:
-    return Wire(Device(Config((3, 5, 7), **{"refresh": 1_000_000, **settings})))
+def small(**settings: object) -> DeviceOnLine:
+    return DeviceOnLine(Device(Config((3, 5, 7), **{"refresh": 1_000_000, **settings})))
 
 
 @pytest.fixture
@@ -123,7 +123,7 @@ def test_a_pump_ends_when_the_device_is_unplugged(
 ) -> None:
     ours, theirs = pair
     wire = small()
-    wire = Wire(wire.device, parse_faults("unplug@3"))
+    wire = DeviceOnLine(wire.device, parse_faults("unplug@3"))
     stop, stopper = os.pipe()
     ours.sendall(hello())
     assert serve_wire(wire, theirs.fileno(), stop) is False
@@ -135,7 +135,7 @@ def test_a_pump_takes_nothing_from_a_line_that_stands_still(
     pair: tuple[socket.socket, socket.socket],
 ) -> None:
     ours, theirs = pair
-    wire = Wire(small().device, parse_faults("down.delay=1e99@1"))
+    wire = DeviceOnLine(small().device, parse_faults("down.delay=1e99@1"))
     sent = 0
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     with running(serve_wire, wire, theirs.fileno()) as finish:
@@ -152,15 +152,15 @@ def test_a_pump_takes_nothing_from_a_line_that_stands_still(
 
 
 def test_tcp_serves_again_after_an_unplug() -> None:
-    with listen("127.0.0.1", 0) as listener:
-        wire = Wire(small().device, parse_faults("unplug@20"))
+    with listen_tcp("127.0.0.1", 0) as listener:
+        wire = DeviceOnLine(small().device, parse_faults("unplug@20"))
         with running(serve_tcp, wire, listener):
             for _ in range(2):
                 with connect(listener) as host:
                     host.sendall(hello())
                     assert receive(host, 1)[0].kind == INFO
                     host.sendall(hello())
-                    if wire.device.taken[3] < 2:
+                    if wire.device.taken_by_type[3] < 2:
                         assert host.recv(100) == b""
 
 
@@ -191,7 +191,7 @@ def test_hosts_may_come_and_go_on_a_pty() -> None:
             got = b""
             while not got.endswith(b"\0"):
                 got += os.read(host, 4096)
-            (info,) = answers(got)
+            (info,) = parse_responses(got)
             assert info.session == session
             os.close(host)
 
@@ -199,16 +199,16 @@ def test_hosts_may_come_and_go_on_a_pty() -> None:
 def test_a_link_is_replaced_and_removed(tmp_path: Path) -> None:
     link = tmp_path / "port"
     link.symlink_to("/nowhere")
-    with linked(link, "/dev/null"):
+    with symbolic_link(link, "/dev/null"):
         assert link.readlink() == Path("/dev/null")
     assert list(tmp_path.iterdir()) == []
-    with linked(link, "/dev/null"):
+    with symbolic_link(link, "/dev/null"):
         link.unlink()
         link.symlink_to("/another")
     assert link.readlink() == Path("/another")
     link.unlink()
     link.write_text("a file")
-    with pytest.raises(FileExistsError, match="no link"), linked(link, "/dev/null"):
+    with pytest.raises(FileExistsError, match="no link"), symbolic_link(link, "/dev/null"):
         pass
     assert link.read_text() == "a file"
 
@@ -219,7 +219,7 @@ def connect(listener: socket.socket) -> socket.socket:
 
 def test_tcp_serves_one_connection_at_a_time() -> None:
     """One connection at a time; what was not taken is dropped with it, and the session ends."""
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         wire = small(refresh=1)
         with running(serve_tcp, wire, listener) as finish:
             with connect(listener) as first:
@@ -238,6 +238,6 @@ def test_tcp_serves_one_connection_at_a_time() -> None:
 
 def test_nobody_else_may_listen_unasked() -> None:
     with pytest.raises(PermissionError, match="--allow-remote"):
-        listen("0.0.0.0", 0)  # noqa: S104
-    with listen("0.0.0.0", 0, remote=True):  # noqa: S104
+        listen_tcp("0.0.0.0", 0)  # noqa: S104
+    with listen_tcp("0.0.0.0", 0, remote=True):  # noqa: S104
         pass

@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
-from simwire import CLEAR, COMMIT, DOT, data, hello
+from device_packets import CLEAR, COMMIT, DOT, data, hello
 
 from firmware_sim import __main__ as program
 from firmware_sim import viewer as viewers
@@ -38,7 +38,7 @@ def device(**config: object) -> Device:
 @contextlib.contextmanager
 def tapped(device: Device) -> Iterator[Tap]:
     with Tap(device) as tap:
-        device.on_swap = tap.notice
+        device.on_swap = tap.notify_swap
         yield tap
 
 
@@ -75,7 +75,7 @@ def test_the_header_is_as_it_is_written() -> None:
     with tapped(watched) as tap, watch(tap) as watcher:
         watcher.sendall(NOTHING)
         header, page = take(watcher, 3 * 5 * 7 * 2)
-    packets, refused = sum(watched.taken.values()), sum(watched.refused.values())
+    packets, refused = sum(watched.taken_by_type.values()), sum(watched.errors_by_code.values())
     assert (packets, refused, watched.damaged) == (2, 1, 1)
     assert header == (b"VXT1", 0x1234, 0xFFFF, 3, 5, 7, 3, 0, 0, packets, refused, 1, 0)
     assert page == bytes(3 * 5 * 7 * 2)
@@ -174,8 +174,8 @@ def test_of_two_hundred_that_do_not_read_one_is_sent_a_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The others stand in the system's queue, and cost the device nothing."""
-    looks, look = [], Tap._look
-    monkeypatch.setattr(Tap, "_look", lambda tap: looks.append(tap) or look(tap))
+    looks, look = [], Tap._capture
+    monkeypatch.setattr(Tap, "_capture", lambda tap: looks.append(tap) or look(tap))
     big = Device(Config((128, 128, 128), refresh=0))
     big.receive(hello())
     with tapped(big) as tap, contextlib.ExitStack() as stack:
@@ -203,7 +203,7 @@ def test_a_bell_that_rings_already_is_not_waited_for() -> None:
 
     with tapped(device()) as tap:
         ringer, tap._ringer = tap._ringer, Full()
-        tap._ring()
+        tap._wake()
         tap._ringer = ringer
 
 
@@ -218,7 +218,7 @@ def test_no_picture_is_torn() -> None:
         lambda: Bench(watched).power_cycle(),
     )
     for act in acts:
-        with watched.showing:
+        with watched.page_lock:
             thread = threading.Thread(target=lambda act=act: done.append(act()))
             thread.start()
             thread.join(0.02)
@@ -235,7 +235,7 @@ def test_a_bell_without_a_swap_is_no_harm() -> None:
         watcher.sendall(struct.pack("<HI", 0x1234, 0))
         for number in range(20):
             until(lambda: tap._waiting)
-            tap.notice()
+            tap.notify_swap()
             if number == 19:
                 watched.receive(data(0, 0, DOT, CLEAR | COMMIT))
         assert take(watcher)[0][7] == 1

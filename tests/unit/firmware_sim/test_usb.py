@@ -8,12 +8,24 @@ import document
 import pytest
 import usb.core
 import usb.util
-from simwire import ACK, CLEAR, COMMIT, DOT, INFO, PENDING, SHOWN, answers, data, hello, status
+from device_packets import (
+    ACK,
+    CLEAR,
+    COMMIT,
+    DOT,
+    INFO,
+    PENDING,
+    SHOWN,
+    data,
+    hello,
+    parse_responses,
+    status,
+)
 from usb_gadget import NUMBER, GadgetDevice
 
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
+from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.usb import open_in_process
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.descriptors import read_configuration
@@ -26,7 +38,7 @@ from firmware_sim.usb.device import (
     Urb,
     UsbDevice,
 )
-from firmware_sim.usb.function import ByteStream, DisplayFunction, SerialFunction
+from firmware_sim.usb.function import DisplayFunction, PacketStream, SerialFunction
 from firmware_sim.usb.host import SET_CONFIGURATION, Bus
 
 OUT, IN = 0x01, 0x81
@@ -35,7 +47,7 @@ OUT, IN = 0x01, 0x81
 def made(function=DisplayFunction, packet=512, **config):
     """A configured device, and its wire."""
     config = {"grid": (3, 5, 7), "refresh": 0, "serial": "A1"} | config
-    wire = Wire(Device(Config(**config)), clock=lambda: 0.0)
+    wire = DeviceOnLine(Device(Config(**config)), clock=lambda: 0.0)
     device = UsbDevice(function(wire, packet))
     assert control(device, SET_CONFIGURATION).status == DONE
     return device, wire
@@ -69,7 +81,7 @@ def into(device, length=4096):
 
 def test_the_interface_is_the_documents():
     device, _ = made()
-    told = control(device, setup(0x80, 6, 0x0200, length=255)).got
+    told = control(device, setup(0x80, 6, 0x0200, length=255)).received
     wanted = {
         name: document.literals()[f"USB_{name}"] for name in ("CLASS", "SUBCLASS", "PROTOCOL")
     }
@@ -83,11 +95,11 @@ def test_the_interface_is_the_documents():
 
 def test_its_ids_are_the_test_pair_and_its_texts_those_of_info():
     device, _ = made(name="a cube", serial="")
-    told = bytes(control(device, setup(0x80, 6, 0x0100, length=18)).got)
+    told = bytes(control(device, setup(0x80, 6, 0x0100, length=18)).received)
     assert told == bytes.fromhex("12 01 00 02 00 00 00 40 09 12 01 00 00 01 01 02 00 01")
-    product = control(device, setup(0x80, 6, 0x0302, 0x0409, 255)).got
+    product = control(device, setup(0x80, 6, 0x0302, 0x0409, 255)).received
     assert product[2:].decode("utf-16-le") == "a cube"
-    assert control(device, setup(0x80, 6, 0x0300, 0, 255)).got == b"\x04\x03\x09\x04"
+    assert control(device, setup(0x80, 6, 0x0300, 0, 255)).received == b"\x04\x03\x09\x04"
 
 
 @pytest.mark.parametrize("value", [0x0101, 0x0201, 0x0304, 0x0600, 0x0F00])
@@ -115,10 +127,10 @@ def test_an_endpoint_before_any_interface_is_kept_as_something_else():
 
 def test_configurations():
     device, _ = made()
-    assert control(device, setup(0x80, 8, length=1)).got == b"\x01"
+    assert control(device, setup(0x80, 8, length=1)).received == b"\x01"
     assert control(device, setup(0x00, 9, 2)).status == EPIPE
     assert control(device, setup(0x00, 9, 0)).status == DONE
-    assert control(device, setup(0x80, 8, length=1)).got == b"\x00"
+    assert control(device, setup(0x80, 8, length=1)).received == b"\x00"
     assert out(device, b"x").status == EPIPE
     assert control(device, setup(0x81, 10, length=1)).status == EPIPE
     assert control(device, setup(0x01, 11)).status == EPIPE
@@ -126,7 +138,7 @@ def test_configurations():
 
 def test_interfaces_have_one_setting():
     device, _ = made()
-    assert control(device, setup(0x81, 10, length=1)).got == b"\x00"
+    assert control(device, setup(0x81, 10, length=1)).received == b"\x00"
     assert control(device, setup(0x01, 11, 0)).status == DONE
     assert control(device, setup(0x01, 11, 1)).status == EPIPE
 
@@ -134,9 +146,9 @@ def test_interfaces_have_one_setting():
 def test_halts():
     device, _ = made()
     assert control(device, setup(0x02, 3, 0, IN)).status == DONE
-    assert control(device, setup(0x82, 0, 0, IN, 2)).got == b"\x01\x00"
-    assert control(device, setup(0x82, 0, 0, OUT, 2)).got == b"\x00\x00"
-    assert control(device, setup(0x80, 0, length=2)).got == b"\x00\x00"
+    assert control(device, setup(0x82, 0, 0, IN, 2)).received == b"\x01\x00"
+    assert control(device, setup(0x82, 0, 0, OUT, 2)).received == b"\x00\x00"
+    assert control(device, setup(0x80, 0, length=2)).received == b"\x00\x00"
     assert into(device).status == EPIPE
     assert control(device, setup(0x02, 1, 0, IN)).status == DONE
     assert into(device).status is None
@@ -160,7 +172,7 @@ def test_a_packet_of_the_protocol_goes_in_and_its_answer_comes_out():
     assert waits.status is None
     assert out(device, b"\0" + hello()).status == DONE
     assert waits.status == DONE
-    (info,) = answers(waits.got)
+    (info,) = parse_responses(waits.received)
     assert (info.kind, info.nx) == (INFO, 3)
 
 
@@ -170,21 +182,21 @@ def test_long_answers_are_cut_into_packets_and_ended(packet):
     device, wire = made(packet=packet)
     wire._up.send(0.0, bytes(range(256)) * (packet // 64))
     function = device.function
-    while (piece := function.packet(IN)) is not None:
+    while (piece := function.next_packet(IN)) is not None:
         function_sees.append(len(piece))
     assert function_sees == [packet] * 4 + [0]
 
 
 def test_the_stream_ends_a_full_packet_once():
-    stream = ByteStream(4)
-    assert stream.next() is None
+    stream = PacketStream(4)
+    assert stream.next_packet() is None
     stream.put(b"12345678")
     stream.put(b"")
-    assert [stream.next() for _ in range(4)] == [b"1234", b"5678", b"", None]
+    assert [stream.next_packet() for _ in range(4)] == [b"1234", b"5678", b"", None]
     stream.put(b"1234")
-    assert stream.next() == b"1234"
+    assert stream.next_packet() == b"1234"
     stream.put(b"5")
-    assert [stream.next(), stream.next()] == [b"5", None]
+    assert [stream.next_packet(), stream.next_packet()] == [b"5", None]
 
 
 def test_what_does_not_fit_into_the_read_is_lost():
@@ -197,7 +209,7 @@ def test_what_does_not_fit_into_the_read_is_lost():
 def test_a_device_that_waits_for_its_tick_holds_the_host_back():
     """Section 6, point 6, on USB: no credit is overrun, the packets are NAKed."""
     clock = [0.0]
-    wire = Wire(
+    wire = DeviceOnLine(
         Device(Config((3, 5, 7), refresh=1000, max_payload=64, rx_buffer=600)),
         clock=lambda: clock[0],
     )
@@ -208,23 +220,23 @@ def test_a_device_that_waits_for_its_tick_holds_the_host_back():
     waits = out(device, status() * 150)
     assert waits.status is None
     assert 0 < waits.actual < len(waits.data)
-    assert device.until_due() == pytest.approx(1.0)
+    assert device.next_event_s() == pytest.approx(1.0)
     clock[0] = 2.0
     reads = [into(device)]
     while waits.status is None or reads[-1].status == DONE:
         device.advance()
         reads.append(into(device))
-    said = answers(b"".join(urb.got for urb in reads))
+    said = parse_responses(b"".join(urb.received for urb in reads))
     kinds = [(a.kind, a.flags & (PENDING | SHOWN)) for a in said]
     assert waits.status == DONE
-    assert wire.device.refused == {}
+    assert wire.device.errors_by_code == {}
     assert (ACK, PENDING) in kinds
     assert kinds[-1] == (ACK, SHOWN)
 
 
 def test_a_packet_longer_than_the_whole_ring_is_not_waited_for():
     device, _ = made(max_payload=64, rx_buffer=150)
-    assert device.function.takes(OUT, 512)
+    assert device.function.accepts(OUT, 512)
 
 
 def test_given_up():
@@ -264,7 +276,7 @@ def test_unplugged_after_so_many_packets():
 
 def test_a_serial_port():
     device, wire = made(SerialFunction)
-    told = bytes(control(device, setup(0x80, 6, 0x0200, length=255)).got)
+    told = bytes(control(device, setup(0x80, 6, 0x0200, length=255)).received)
     _, ((calls, (notify,)), (line, ends)) = read_configuration(told)
     triples = [
         (i.bInterfaceClass, i.bInterfaceSubClass, i.bInterfaceProtocol) for i in (calls, line)
@@ -275,20 +287,20 @@ def test_a_serial_port():
     )
     assert (notify.bEndpointAddress, notify.bmAttributes) == (0x82, 3)
     assert [e.bEndpointAddress for e in ends] == [OUT, IN]
-    assert control(device, setup(0x80, 6, 0x0100, length=18)).got[4] == 2
+    assert control(device, setup(0x80, 6, 0x0100, length=18)).received[4] == 2
 
     notified = Urb(0x82, length=16)
     device.submit(notified)
     rate = struct.pack("<IBBB", 9600, 0, 0, 8)
     assert control(device, setup(0x21, 0x20, 0, 0, 7), rate).status == DONE
-    assert control(device, setup(0xA1, 0x21, 0, 0, 7)).got == rate
+    assert control(device, setup(0xA1, 0x21, 0, 0, 7)).received == rate
     assert control(device, setup(0x21, 0x20, 0, 0, 3), b"123").status == EPIPE
     assert control(device, setup(0x21, 0x23)).status == DONE
     assert control(device, setup(0x21, 0x77)).status == EPIPE
 
     assert control(device, setup(0x21, 0x22, 3)).status == DONE
     out(device, hello())
-    assert answers(into(device).got)[0].kind == INFO
+    assert parse_responses(into(device).received)[0].kind == INFO
     assert wire.device.session
     assert control(device, setup(0x21, 0x22, 0)).status == DONE
     assert wire.device.session is None
@@ -315,7 +327,7 @@ def test_through_pyusb(backend):
     (interface,) = device.get_active_configuration()
     write, read = interface
     assert write.write(b"\0" + hello()) == 15
-    assert answers(bytes(read.read(4096)))[0].kind == INFO
+    assert parse_responses(bytes(read.read(4096)))[0].kind == INFO
     with pytest.raises(usb.core.USBTimeoutError):
         read.read(4096, timeout=1)
     device.reset()
@@ -331,7 +343,7 @@ def test_nobody_waits_for_ever_without_a_timeout(backend):
     reader.start()
     device.write(OUT, hello())
     reader.join(20)
-    assert answers(bytes(got[0]))[0].kind == INFO
+    assert parse_responses(bytes(got[0]))[0].kind == INFO
 
 
 def test_a_tick_wakes_who_waits():
@@ -340,7 +352,7 @@ def test_a_tick_wakes_who_waits():
     device.write(OUT, hello() + data(0, 0, DOT, CLEAR | COMMIT))
     heard = []
     while not any(a.kind == ACK and a.flags & SHOWN for a in heard):
-        heard += answers(bytes(device.read(IN, 4096, 20_000)))
+        heard += parse_responses(bytes(device.read(IN, 4096, 20_000)))
 
 
 def test_what_is_not_there(backend):

@@ -11,13 +11,13 @@ import threading
 import pytest
 import usb.core
 import usb.util
-from simwire import INFO, answers, hello
+from device_packets import INFO, hello, parse_responses
 from usb_gadget import IN, NUMBER, OUT, PACKET, GadgetDevice, pattern
 
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.device_on_line import Wire
-from firmware_sim.serve import listen
+from firmware_sim.device_on_line import DeviceOnLine
+from firmware_sim.serve import listen_tcp
 from firmware_sim.usb import open_usbip, usbip, usbip_server
 from firmware_sim.usb.device import Urb, UsbDevice
 from firmware_sim.usb.function import DisplayFunction
@@ -45,8 +45,8 @@ def messages(out):
     """Take the messages that were sent, with their data."""
     taken = []
     while out:
-        message = usbip.parse(bytes(out[:48]))
-        size = len(out) if isinstance(message, usbip.Returned) and message.seqnum >= 100 else 48
+        message = usbip.parse_message(bytes(out[:48]))
+        size = len(out) if isinstance(message, usbip.SubmitReply) and message.seqnum >= 100 else 48
         size = 48 + message.actual if size > 48 else 48
         taken.append((message, bytes(out[48:size])))
         del out[:size]
@@ -81,12 +81,12 @@ def host(server):
             "00000002 00000008 00010001 00000000 00000000 00000007" + " 00000000" * 6,
         ),
         (
-            usbip.Returned(7, -32, 12),
+            usbip.SubmitReply(7, -32, 12),
             """00000003 00000007 00000000 00000000 00000000
             ffffffe0 0000000c 00000000 ffffffff 00000000 00000000 00000000""",
         ),
         (
-            usbip.Unlinked(8, -104),
+            usbip.UnlinkReply(8, -104),
             "00000004 00000008 00000000 00000000 00000000 ffffff98" + " 00000000" * 6,
         ),
     ],
@@ -94,12 +94,12 @@ def host(server):
 def test_messages_are_the_documents(message, raw):
     """Field by field from the kernel's Documentation/usb/usbip_protocol.rst."""
     assert message.pack() == bytes.fromhex(raw)
-    assert usbip.parse(bytes.fromhex(raw)) == message
+    assert usbip.parse_message(bytes.fromhex(raw)) == message
 
 
 def test_there_is_no_other_message():
     with pytest.raises(ValueError, match="no USB/IP message 5"):
-        usbip.parse(struct.pack(">5I28x", 5, 0, 0, 0, 0))
+        usbip.parse_message(struct.pack(">5I28x", 5, 0, 0, 0, 0))
 
 
 def test_the_list(server):
@@ -112,7 +112,7 @@ def test_the_list(server):
     assert about[1].rstrip(b"\0") == b"1-1"
     assert about[2:] == (1, 1, 3, 0x1209, 1, 0x100, 0, 0, 0, 0, 1, 2)
     assert out[12 + usbip.DEVICE.size :] == bytes.fromhex("ff000000 ff565800")
-    assert connection.over
+    assert connection.closing
 
 
 def test_an_empty_list(server):
@@ -129,7 +129,7 @@ def test_one_host_has_the_device(server, host):
     assert not second.out
     second.receive(IMPORT[20:])
     assert second.out == bytes.fromhex("0111 0003 00000002")
-    assert second.over
+    assert second.closing
 
 
 def test_another_device_than_there_is(server):
@@ -142,7 +142,7 @@ def test_another_device_than_there_is(server):
 def test_other_versions_and_operations_are_not_talked_to(server, raw):
     connection = Connection(server)
     connection.receive(bytes.fromhex(raw))
-    assert connection.over
+    assert connection.closing
     assert not connection.out
 
 
@@ -151,14 +151,14 @@ def test_transfers(server, host):
     assert not host.out
     server.device.do("send", 700, False)
     host.complete()
-    assert messages(host.out) == [(usbip.Returned(100, 0, 700), pattern(700))]
+    assert messages(host.out) == [(usbip.SubmitReply(100, 0, 700), pattern(700))]
     raw = submit(2, OUT, pattern(600))
     host.receive(raw[:100])
     host.receive(raw[100:])
-    assert messages(host.out) == [(usbip.Returned(2, 0, 600), b"")]
+    assert messages(host.out) == [(usbip.SubmitReply(2, 0, 600), b"")]
     assert server.device.do("taken")[0] == [512, 88]
     host.receive(submit(100, 0, read=9, setup=bytes((0xC0, 2, 0, 0, 0, 0, 9, 0))))
-    assert messages(host.out) == [(usbip.Returned(100, 0, 9), pattern(9))]
+    assert messages(host.out) == [(usbip.SubmitReply(100, 0, 9), pattern(9))]
 
 
 def test_stalls_and_what_there_is_not(server, host):
@@ -172,7 +172,7 @@ def test_stalls_and_what_there_is_not(server, host):
 
 def test_what_is_given_up_with_nothing_moved(server, host):
     host.receive(submit(100, IN, read=512) + usbip.Unlink(3, 0x10001, 100).pack())
-    assert messages(host.out) == [(usbip.Unlinked(3, -104), b"")]
+    assert messages(host.out) == [(usbip.UnlinkReply(3, -104), b"")]
     server.device.do("send", 5, False)
     host.complete()
     assert not host.out
@@ -182,42 +182,42 @@ def test_what_is_given_up_with_a_part_moved_ends_as_a_short_one(server, host):
     server.device.do("send", 512, False)
     host.receive(submit(100, IN, read=4096) + usbip.Unlink(3, 0x10001, 100).pack())
     assert messages(host.out) == [
-        (usbip.Returned(100, 0, 512), pattern(512)),
-        (usbip.Unlinked(3, 0), b""),
+        (usbip.SubmitReply(100, 0, 512), pattern(512)),
+        (usbip.UnlinkReply(3, 0), b""),
     ]
 
 
 def test_what_is_given_up_too_late(host):
     host.receive(submit(2, OUT, b"x") + usbip.Unlink(3, 0x10001, 2).pack())
-    assert messages(host.out) == [(usbip.Returned(2, 0, 1), b""), (usbip.Unlinked(3, 0), b"")]
+    assert messages(host.out) == [(usbip.SubmitReply(2, 0, 1), b""), (usbip.UnlinkReply(3, 0), b"")]
 
 
 @pytest.mark.parametrize(
     "raw",
     [
-        usbip.Returned(1, 0, 0).pack(),
+        usbip.SubmitReply(1, 0, 0).pack(),
         bytes(48),
         submit(2, OUT)[:24] + struct.pack(">i", -1) + submit(2, OUT)[28:],
-        submit(2, IN, read=usbip_server.MOST_BYTES + 1),
+        submit(2, IN, read=usbip_server.MAX_PENDING_BYTES + 1),
     ],
 )
 def test_who_breaks_the_protocol_is_cut_off(host, raw):
     host.receive(raw + submit(9, OUT, b"x"))
-    assert host.over
+    assert host.closing
 
 
 def test_who_asks_for_too_much_is_cut_off(host):
     for number in range(16):
         host.receive(submit(100 + number, IN, read=1 << 20))
-    assert not host.over
+    assert not host.closing
     host.receive(submit(200, IN, read=1))
-    assert host.over
+    assert host.closing
 
 
 @contextlib.contextmanager
 def serving(device):
     stop, stopper = os.pipe()
-    with listen("127.0.0.1", 0) as listener:
+    with listen_tcp("127.0.0.1", 0) as listener:
         thread = threading.Thread(target=serve_usbip, args=(device, listener, stop))
         thread.start()
         try:
@@ -235,12 +235,12 @@ def found(backend):
 
 
 def test_a_display():
-    device = UsbDevice(DisplayFunction(Wire(Device(Config((3, 5, 7), serial="A1")))))
+    device = UsbDevice(DisplayFunction(DeviceOnLine(Device(Config((3, 5, 7), serial="A1")))))
     with serving(device) as (host, port):
         display = found(open_usbip(f"usbip://{host}:{port}/"))
         assert (display.address, display.serial_number) == (1, "A1")
         display.write(0x01, b"\0" + hello())
-        assert answers(bytes(display.read(0x81, 4096)))[0].kind == INFO
+        assert parse_responses(bytes(display.read(0x81, 4096)))[0].kind == INFO
         usb.util.dispose_resources(display)
 
 
@@ -264,7 +264,7 @@ def usbip_backend(address):
 def test_threads_transfer_at_the_same_time():
     device = GadgetDevice()
     device.function.echoes = True
-    device.function.until_due = lambda: 0.005
+    device.function.next_event_s = lambda: 0.005
     with serving(device) as address:
         gadget = found(usbip_backend(address))
         usb.util.claim_interface(gadget, NUMBER)
@@ -362,10 +362,10 @@ def test_sockets_that_are_not_ready_or_broken(server):
     assert not server._connections
 
 
-def test_go_on_after_a_clog(host, monkeypatch):
-    monkeypatch.setattr(usbip_server, "CLOGGED", 60)
+def test_processing_resumes_after_a_clog(host, monkeypatch):
+    monkeypatch.setattr(usbip_server, "MAX_UNREAD_BYTES", 60)
     host.receive(submit(2, OUT, b"x") * 5)
     assert len(host.out) == 96
     host.out.clear()
-    host.go_on()
+    host.process()
     assert len(host.out) == 96

@@ -75,8 +75,8 @@ def test_it_refuses(status, number):
     [
         bytes(48),
         usbip.Unlink(1, 1, 1).pack(),
-        usbip.Returned(77, 0, 0).pack(),
-        usbip.Returned(1, 0, 1 << 20).pack(),
+        usbip.SubmitReply(77, 0, 0).pack(),
+        usbip.SubmitReply(1, 0, 1 << 20).pack(),
     ],
 )
 def test_nonsense_loses_the_device(answer):
@@ -89,8 +89,8 @@ def test_nonsense_loses_the_device(answer):
 
 
 def test_an_unlink_that_is_never_answered_loses_the_device(monkeypatch):
-    monkeypatch.setattr(usbip_host, "_ANSWER_S", 0.1)
-    answer = usbip.Returned(1, 0, 0).pack()
+    monkeypatch.setattr(usbip_host, "_REPLY_TIMEOUT_S", 0.1)
+    answer = usbip.SubmitReply(1, 0, 0).pack()
     with bad_server((*GOOD_IMPORT, answer, None, None, None)) as host:
         connection = host._import(b"1-1")
         urb = Urb(IN, length=8)
@@ -100,19 +100,19 @@ def test_an_unlink_that_is_never_answered_loses_the_device(monkeypatch):
 
 
 def test_data_in_pieces_and_a_late_word_of_what_is_done():
-    configured = usbip.Returned(1, 0, 0).pack()
-    answer = usbip.Unlinked(99, -104).pack() + usbip.Returned(2, 0, 4).pack() + b"da"
-    rest = b"ta" + usbip.Unlinked(3, 0).pack()
+    configured = usbip.SubmitReply(1, 0, 0).pack()
+    answer = usbip.UnlinkReply(99, -104).pack() + usbip.SubmitReply(2, 0, 4).pack() + b"da"
+    rest = b"ta" + usbip.UnlinkReply(3, 0).pack()
     with bad_server((*GOOD_IMPORT, configured, None, answer, None, rest)) as host:
         connection = host._import(b"1-1")
         urb = Urb(IN, length=8)
         connection.transfer(urb, 0.05)
-        assert (urb.status, urb.got) == (0, b"data")
+        assert (urb.status, urb.received) == (0, b"data")
         connection.close()
 
 
 def test_a_server_that_went_away_while_we_send():
-    with bad_server((*GOOD_IMPORT, usbip.Returned(1, 0, 0).pack())) as host:
+    with bad_server((*GOOD_IMPORT, usbip.SubmitReply(1, 0, 0).pack())) as host:
         connection = host._import(b"1-1")
         connection._socket.shutdown(socket.SHUT_WR)
         urb = Urb(OUT, b"x")
@@ -124,7 +124,7 @@ def test_a_server_that_went_away_while_we_send():
 def test_a_server_that_crashes_while_we_wait():
     at_once = struct.pack("ii", 1, 0)  # how a connection is reset, not ended
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        connection = usbip_host._Imported(socket.create_connection(listener.getsockname()), 1)
+        connection = usbip_host._ImportedDevice(socket.create_connection(listener.getsockname()), 1)
         server, _ = listener.accept()
 
         def crash():

@@ -301,15 +301,15 @@ def test_a_device_that_takes_its_bytes_too_slowly():
     function = backend.host.device.function
     next_s = [0.0]
 
-    def takes(endpoint, size):
+    def accepts(endpoint, size):
         del endpoint, size
         if time.monotonic() < next_s[0]:
             return False
         next_s[0] = time.monotonic() + 0.002
         return True
 
-    function.takes = takes
-    function.until_due = lambda: max(0.0, next_s[0] - time.monotonic())
+    function.accepts = accepts
+    function.next_event_s = lambda: max(0.0, next_s[0] - time.monotonic())
     transport = UsbTransport("usb:x", backend=backend)
     with pytest.raises(TransportTimeout, match=r"took only [0-9]+ of 1048576 bytes in time"):
         transport.write(bytes(1 << 20), 0.1)

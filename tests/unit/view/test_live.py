@@ -116,15 +116,15 @@ def test_the_page_stays_small():
 def test_a_tap_is_read():
     device = Device(Config(GRID, "rgb565", refresh=0, boot=9))
     with Tap(device) as tap:
-        device.on_swap = tap.notice
+        device.on_swap = tap.notify_swap
         source = TapSource(*parse_address(tap.address), "title")
         _, snapshot = source.next()
         assert (snapshot.grid, snapshot.format, snapshot.digest) == (GRID, vd.PixelFormat.RGB565, 0)
         device.memory.back.put(17, b"\x34\x12")
-        with device.showing:
+        with device.page_lock:
             device.memory.swap()
             device.swaps += 1
-        tap.notice()
+        tap.notify_swap()
         (boot, swaps), snapshot = source.next()
         assert (boot, swaps, snapshot.number, snapshot.title) == (9, 1, 1, "title")
         assert np.flatnonzero(snapshot.page).tolist() == [17]

@@ -6,7 +6,7 @@ from drawing import page_after, values_of
 
 from firmware_sim.memory import FORMATS as DEVICE_FORMATS
 from firmware_sim.memory import Page
-from firmware_sim.page_encoder import pack
+from firmware_sim.page_encoder import encode_page
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
@@ -139,7 +139,7 @@ def test_what_the_device_packs_is_read(format_, density, room):
     page, device_format = device_page(values, format_), DEVICE_FORMATS[format_.value]
     at = 0
     while at < len(values):
-        count, ops = pack(page, device_format, at, len(values) - at, room)
+        count, ops = encode_page(page, device_format, at, len(values) - at, room)
         assert decode_spans(ops, count, format_).tolist() == values[at : at + count].tolist()
         at += count
 

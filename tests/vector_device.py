@@ -14,7 +14,7 @@ from voxdisplay.wire import spec
 HELLO = bytes.fromhex("30 00 00 01 17 5A 00 00")
 
 
-class DeviceSide:
+class VectorDevice:
     """An emulated device on a bench, spoken to by hand-made packets."""
 
     def __init__(self, grid, pixel_format, *, refresh=0, **config):
@@ -32,7 +32,7 @@ class DeviceSide:
         """Give a packet, written without its check value, to the device."""
         return self.send_raw(document.on_wire(packet))
 
-    def open(self):
+    def open_session(self):
         (info,) = self.send(HELLO)
         assert info[0] == 0x90
 
@@ -40,7 +40,7 @@ class DeviceSide:
         self.device.tick()
         return document.off_wire(self.device.transmit())
 
-    def lit(self):
+    def lit_voxels(self):
         """The front page's voxels that are not dark, with their pixels."""
         snapshot = self.bench.snapshot()
         nx, ny, _ = snapshot.grid
@@ -54,7 +54,7 @@ class DeviceSide:
 
     @staticmethod
     def cobs_encode(data):
-        return sender.encode(data)[:-1]
+        return sender.encode_segment(data)[:-1]
 
     @staticmethod
     def cobs_decode(segment):
@@ -85,7 +85,7 @@ class DeviceSide:
 
     @staticmethod
     def wire(body):
-        return sender.send(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:])
+        return sender.encode_packet(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:])
 
 
 EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "READ", "DIGEST"}

@@ -1,7 +1,7 @@
 """Changes each literal of one side's ``spec.py`` by one and runs the vectors of protocol.md.
 
-    python mutants.py voxdisplay.wire.spec
-    python mutants.py firmware_sim.spec
+    python spec_mutations.py voxdisplay.wire.spec
+    python spec_mutations.py firmware_sim.spec
 
 prints the names of the literals that no vector holds. The side's modules are imported afresh for
 each literal, so that every copy of it has changed.
@@ -20,7 +20,7 @@ DEPEND = (
     "voxdisplay.raster.pixel_format",
     "voxdisplay.link",
     "firmware_sim",
-    "sides",
+    "vector_device",
     "drawing",
 )
 

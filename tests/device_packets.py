@@ -50,7 +50,7 @@ def read(start: int, count: int, tag: int = 0, back: int = 0) -> bytes:
 
 
 @dataclass
-class Answer:
+class Response:
     kind: int
     flags: int
     seq: int
@@ -84,40 +84,40 @@ class Answer:
         return self.code, self.offset
 
 
-def answers(wire: bytes) -> list[Answer]:
+def parse_responses(wire: bytes) -> list[Response]:
     """Take apart what a device sent; every byte of it must be of a good packet."""
     return [
-        Answer(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:]) for body in off_wire(wire)
+        Response(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:]) for body in off_wire(wire)
     ]
 
 
-class Rig:
+class DeviceUnderTest:
     """A device and someone who talks to it."""
 
     def __init__(self, *grid: int, session: bool = True, **config: object) -> None:
         config = {"refresh": 1, "boot": BOOT, **config}
         self.device = Device(Config(grid=grid or (3, 5, 7), **config))
         if session:
-            (info,) = self.say(hello())
+            (info,) = self.send(hello())
             assert info.kind == INFO
 
-    def say(self, *packets: bytes) -> list[Answer]:
+    def send(self, *packets: bytes) -> list[Response]:
         """Send packets; return the answers."""
         self.device.receive(b"".join(packets))
-        return answers(self.device.transmit())
+        return parse_responses(self.device.transmit())
 
-    def ask(self, wire: bytes) -> Answer:
+    def request(self, wire: bytes) -> Response:
         """Send one packet; return its only answer."""
-        (answer,) = self.say(wire)
+        (answer,) = self.send(wire)
         return answer
 
-    def tick(self) -> list[Answer]:
+    def tick(self) -> list[Response]:
         self.device.tick()
-        return answers(self.device.transmit())
+        return parse_responses(self.device.transmit())
 
-    def show(self, seq: int, frame: int, ops: bytes, flags: int = CLEAR) -> Answer:
+    def show_frame(self, seq: int, frame: int, ops: bytes, flags: int = CLEAR) -> Response:
         """Send a frame of one packet and let it be shown."""
-        self.ask(data(seq, frame, ops, flags | COMMIT))
+        self.request(data(seq, frame, ops, flags | COMMIT))
         (ack,) = self.tick()
         return ack
 
@@ -130,26 +130,26 @@ class Rig:
         return bytes(self.device.memory.back.pixels)
 
 
-def block(rig: Rig) -> int:
+def block_with_pending_frame(rig: DeviceUnderTest) -> int:
     """Let a packet wait; return how much of the credit it takes."""
-    rig.ask(data(0, 0, DOT, CLEAR | COMMIT))
+    rig.request(data(0, 0, DOT, CLEAR | COMMIT))
     wire = data(1, 1, DOT)
-    assert rig.say(wire) == []
+    assert rig.send(wire) == []
     return len(wire)
 
 
-def filling(seq: int, size: int) -> bytes:
+def data_of_wire_size(seq: int, size: int) -> bytes:
     """Return a DATA packet of so many bytes on the wire."""
     wire = data(seq, 1, bytes(size - 9))  # END and what pads it
     assert len(wire) == size
     return wire
 
 
-def receive(connection: socket.socket, count: int) -> list[Answer]:
+def receive(connection: socket.socket, count: int) -> list[Response]:
     """Take so many packets from a device."""
     got = b""
     while got.count(b"\0") < count:
         piece = connection.recv(65_536)
         assert piece
         got += piece
-    return answers(got)
+    return parse_responses(got)

@@ -6,7 +6,7 @@ from fractions import Fraction
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import DEFAULT_PALETTE, FORMATS, Page
-from firmware_sim.op_decoder import Unpacker
+from firmware_sim.op_decoder import OpDecoder
 
 CLEAR = b"\x11\0\0"  # the header of a DATA packet
 GRIDS = [(3, 5, 7), (17, 64, 40), (300, 4, 3), (1, 1, 1), (256, 2, 2)]
@@ -38,7 +38,7 @@ def default_color(i: int) -> bytes:
     return bytes(math.floor(255 * value + Fraction(1, 2)) for value in values)
 
 
-def unpack(ops: bytes, grid: Grid, name: str, page: Page, features: int | None = None) -> None:
+def draw_ops(ops: bytes, grid: Grid, name: str, page: Page, features: int | None = None) -> None:
     """Draw ops as a device with all features does, if not told otherwise."""
     bits = Config(grid.sides, name).feature_bits if features is None else features
-    Unpacker(grid, FORMATS[name], bits).draw(CLEAR + ops, page)
+    OpDecoder(grid, FORMATS[name], bits).draw(CLEAR + ops, page)
