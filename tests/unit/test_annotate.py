@@ -1,4 +1,4 @@
-"""tools/annotate.py: a good capture breaks nothing, and one that was tampered with says where."""
+"""``voxdisplay annotate``: a good capture has no violation, a tampered one names its own."""
 
 import json
 import subprocess
@@ -14,8 +14,8 @@ DIGEST_AT = 16
 
 
 def annotate(file, *options):
-    command = [sys.executable, ROOT / "tools" / "annotate.py", file, *options]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "voxdisplay", "annotate", file, *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +63,14 @@ def test_every_packet_and_op_is_explained(tmp_path, captured):
         assert word in said.stdout
     assert "is on display: 7 voxels lit" in said.stdout
     assert "the pixels are those of the frame on display" in said.stdout
-    assert "nothing breaks protocol.md" in said.stdout
+    assert "nothing violates protocol.md" in said.stdout
 
 
 def test_for_scripts(tmp_path, captured):
-    rows = [
-        json.loads(line) for line in explained(tmp_path, captured, "--json").stdout.split("\n")[:-1]
-    ]
+    result = json.loads(explained(tmp_path, captured, "--json").stdout)
+    rows = result["segments"]
+    assert result["violations"] == 0
+    assert result["packets"] == len(rows)
     assert {row["to"] for row in rows} == {"host", "device"}
     assert all(note["section"] is None for row in rows for note in row["notes"])
     assert sum(row["wire_bytes"] for row in rows if row["to"] == "device") > 30
@@ -90,7 +91,7 @@ def test_a_bad_line_breaks_nothing(tmp_path):
     subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
     said = annotate(file)
     assert said.returncode == 0, said.stdout
-    assert "sent again" in said.stdout
+    assert "retransmitted" in said.stdout
     assert "damaged segment" in said.stdout
 
 
@@ -105,7 +106,7 @@ def flip(at):
 @pytest.mark.parametrize(
     ("kind", "change", "section", "text"),
     [
-        (1, set_byte(1, 3), "9.1", "out of turn"),
+        (1, set_byte(1, 3), "9.1", "out of order"),
         (1, set_byte(2, 5), "6", "frame 5 follows"),
         (1, set_byte(3, 0x07), "11", "must be refused: OP"),
         (3, lambda body: body.__setitem__(slice(4, 6), bytes(2)), "5", "session 0"),
@@ -115,15 +116,15 @@ def flip(at):
         (10, flip(13), "10", "shown was"),
     ],
 )
-def test_what_breaks_the_document_is_said(tmp_path, captured, kind, change, section, text):
-    said = explained(tmp_path, tampered(captured, kind, change), "--quiet")
+def test_a_violation_names_its_section(tmp_path, captured, kind, change, section, text):
+    said = explained(tmp_path, tampered(captured, kind, change), "--violations")
     assert said.returncode == 1, said.stdout
     assert f"section {section}:" in said.stdout
     assert text in said.stdout
 
 
 def test_a_digest_is_computed_again(tmp_path, captured):
-    said = explained(tmp_path, tampered(only_shown(captured), 8, flip(DIGEST_AT)), "--quiet")
+    said = explained(tmp_path, tampered(only_shown(captured), 8, flip(DIGEST_AT)), "--violations")
     assert "section 8: the digest is" in said.stdout
 
 
@@ -149,16 +150,48 @@ def test_credit_is_counted(tmp_path, captured):
     def small(body):
         body[20:24] = (70).to_bytes(4, "little")
 
-    said = explained(tmp_path, tampered(captured, 9, small), "--quiet")
+    said = explained(tmp_path, tampered(captured, 9, small), "--violations")
     assert "section 9.2: credit is exceeded" in said.stdout
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}", '{"voxdisplay_capture": 9}', "[1]", '{"voxdisplay_capture": 1}\n{"s": 0}']
+    "text",
+    [
+        "",
+        "{}",
+        "[1]",
+        "7",
+        "[" * 100_000,
+        '{"voxdisplay_capture": 9}',
+        '{"voxdisplay_capture": 1}\n{"s": 0}',
+        '{"voxdisplay_capture": 1}\n{"s": "1", "to": ["host"], "hex": "00"}',
+        "\xff\xfe",
+    ],
 )
 def test_what_is_no_capture(tmp_path, text):
     file = tmp_path / "no.jsonl"
-    file.write_text(text)
+    file.write_text(text, encoding="latin-1")
     said = annotate(file)
-    assert said.returncode == (0 if not text else 2)
+    assert said.returncode == 2
+    assert "no.jsonl" in said.stderr
+    assert "fault of this program" not in said.stderr
     assert "Traceback" not in said.stderr
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    for path in (tmp_path / "none.jsonl", tmp_path):
+        said = annotate(path)
+        assert said.returncode == 2
+        assert str(path) in said.stderr
+
+
+def test_text_of_a_device_does_not_steer_the_terminal(tmp_path, captured):
+    """The name in INFO: a length and its bytes behind the fixed fields."""
+
+    def named(body):
+        at = bytes(body).index(b"voxdisplay emulator")
+        body[at : at + 4] = b"\x1b[2J"
+
+    said = explained(tmp_path, tampered(captured, 9, named))
+    assert "\x1b" not in said.stdout
+    assert "[2Jisplay emulator" in said.stdout

@@ -52,6 +52,10 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
         "conformance": TableEntry(
             "conformance", "conformance", "Check a device against protocol.md."
         ),
+        "annotate": TableEntry("annotate", "annotate", "Explain a capture of push --capture."),
+        "bench": TableEntry("bench", "bench", "Measure this machine and a port."),
+        "protocol": TableEntry("documents", "protocol", "Print the path of protocol.md."),
+        "schema": TableEntry("documents", "schema", "Print the path of the scene schema."),
     },
 }
 ENTRIES: Final = {name: entry for group in COMMANDS.values() for name, entry in group.items()}

@@ -1,25 +1,22 @@
-"""What protocol.md demands of both ends of a line, checked on a capture of the host's end.
+"""Checks of protocol.md's rules for both ends of a line, on packets seen from the host's end.
 
-A `Monitor` sees packets in the order in which the host wrote and read them, and says of each what
-it does and which rules it breaks. What the host sent may have been lost: only what the device has
-said since is certain. It keeps a model of the device's pages, so that a digest or a PAGE that is
-wrong is found. Knows no file.
+What the host sent may have been lost: only what the device has acknowledged since is certain. A
+model of the device's pages finds wrong digests and wrong PAGEs. Knows no file.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from annotate_ops import Note, Reader, op_name
-
+from voxdisplay.annotation.capture_file import DEVICE, HOST
+from voxdisplay.annotation.op_notes import AnnotatingDecoder, Remark, op_name
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.announced_device import AnnouncedDevice
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
-HOST, DEVICE = "host", "device"
-_FROM_HOST = {spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ}
+_HOST_TYPES = {spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ}
 _PAGE_OPS = {spec.OP_END, spec.OP_PEN, spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT}
 
 
@@ -36,67 +33,76 @@ class _Frame:
 
 @dataclass
 class _Session:
-    """What has been said since a HELLO."""
+    """State of a session since its HELLO."""
 
     number: int
-    next: int = 0
-    ahead: int = 0  # the next number that was never sent
+    next: int = 0  # as acknowledged
+    next_unsent: int = 0  # not modulo 256
     sent: dict[int, bytes] = field(default_factory=dict)
-    ends: dict[tuple[str, int], int] = field(default_factory=dict)  # what `last` may name
+    ends: dict[tuple[str, int], int] = field(default_factory=dict)  # stream position, by `last`
     credit_until: int = 0
     frames: list[_Frame] = field(default_factory=list)
-    asked: list[int] = field(default_factory=list)
+    polls: list[int] = field(default_factory=list)
     reads: dict[int, tuple[int, int, bool]] = field(default_factory=dict)
     newest: int = -1  # frame number, not modulo 256
     shown: int = -1
 
 
-class Monitor:
-    """Both ends of one line."""
+class LineMonitor:
+    """Monitor of both directions of one line, packet by packet."""
 
     def __init__(self) -> None:
         self.device: AnnouncedDevice | None = None
         self._session: _Session | None = None
-        self._greeting: int | None = None
+        self._hello_session: int | None = None
         self._delimited = {HOST: False, DEVICE: False}
         self._position = 0  # bytes that the host has sent
-        self._hellos: list[int] = []  # where each HELLO of the greeting ended
+        self._hello_ends: list[int] = []  # stream positions, of the HELLOs of one session
         self._front: Page | None = None  # None: nobody knows
-        self._notes: list[Note] = []
-
-    # -- what comes
+        self._remarks: list[Remark] = []
 
     def delimiter(self, to: str) -> None:
-        """Take a 00 that ends nothing."""
+        """Handle a 00 that ends an empty segment, in the direction of its receiver."""
         self._delimited[to] = True
 
-    def noise(self, to: str, data: bytes) -> list[Note]:
-        """Take what is no packet."""
+    def noise(self, to: str, data: bytes) -> list[Remark]:
+        """Handle a segment that is no packet; return remarks on it."""
         self._delimited[to] = True
         if to == DEVICE:
             self._position += len(data) + 1
-            return [Note("the host sends what is no packet", "3")]
+            return [Remark("the host sends what is no packet", "3")]
         return []
 
-    def packet(self, to: str, body: bytes, size: int) -> list[Note]:
-        """Take a packet of so many bytes on the wire; give what is to be said of it."""
-        self._notes = []
+    def packet(self, to: str, body: bytes, size: int) -> list[Remark]:
+        """Handle a packet; return remarks on it.
+
+        Parameters
+        ----------
+        to : str
+            Receiver: `HOST` or `DEVICE`.
+        body : bytes
+            Header and payload.
+        size : int
+            Bytes on the wire.
+
+        """
+        self._remarks = []
         if to == DEVICE:
             self._position += size
-            self._sent(body)
+            self._host_packet(body)
             self._delimited[to] = True
         else:
-            self._heard(body)
-        return self._notes
+            self._device_packet(body)
+        return self._remarks
 
     def _note(self, text: str, section: str = "") -> None:
-        self._notes.append(Note(text, section))
+        self._remarks.append(Remark(text, section))
 
-    # -- what the host sends
+    # -- packets of the host
 
-    def _sent(self, body: bytes) -> None:
+    def _host_packet(self, body: bytes) -> None:
         kind, flags, seq, frame = body[0] >> 4, body[0] & 15, body[1], body[2]
-        if kind not in _FROM_HOST:
+        if kind not in _HOST_TYPES:
             self._note(f"a host sends no packet of type {kind}", "4")
             return
         if kind == spec.TYPE_HELLO:
@@ -129,17 +135,17 @@ class Monitor:
             self._note("session 0", "5")
         if not self._delimited[DEVICE]:
             self._note("no 00 was sent before the first packet", "3")
-        if self._greeting != number:
-            self._greeting, self._hellos = number, []
+        if self._hello_session != number:
+            self._hello_session, self._hello_ends = number, []
         self._session = None
-        self._hellos.append(self._position)
+        self._hello_ends.append(self._position)
 
     def _status(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
         if flags or frame or len(body) > packets.HEADER_BYTES:
             self._note("a STATUS with reserved bits, or a payload", "9")
-        session.asked.append(seq)
-        if len(session.asked) > spec.LIMIT_MAX_STATUS:
-            self._note(f"{len(session.asked)} STATUS without answer", "9.3")
+        session.polls.append(seq)
+        if len(session.polls) > spec.LIMIT_MAX_STATUS:
+            self._note(f"{len(session.polls)} STATUS without answer", "9.3")
         session.ends["tag", seq] = self._position
 
     def _read(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
@@ -157,29 +163,32 @@ class Monitor:
     @property
     def _device(self) -> AnnouncedDevice:
         if self.device is None:
-            raise AssertionError("asked only in a session")
+            raise AssertionError("used only in a session")
         return self.device
 
     def _data(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
         if flags & ~(spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT):
             self._note(f"reserved flags {flags:X}", "6")
-        if (seq - session.next) % 256 >= spec.LIMIT_WINDOW and seq == session.ahead % 256:
+        if (seq - session.next) % 256 >= spec.LIMIT_WINDOW and seq == session.next_unsent % 256:
             self._note(f"number {seq} is outside the window from {session.next}", "9.1")
-        again = session.sent.get(seq) if (session.ahead - 1 - seq) % 256 < 224 else None
+        again = session.sent.get(seq) if (session.next_unsent - 1 - seq) % 256 < 224 else None
         session.ends["data", seq] = self._position
-        if seq != session.ahead % 256:
+        if seq != session.next_unsent % 256:
             if again != body:
-                self._note(f"number {seq} is sent again, with other bytes, or out of turn", "9.1")
+                self._note(f"number {seq} is sent out of order, or again with other bytes", "9.1")
             else:
-                self._note("sent again")
+                self._note("retransmitted")
             return
-        session.ahead += 1
+        session.next_unsent += 1
         session.sent[seq] = body
-        self._enter(session, body, flags, seq, frame)
+        self._add_to_frame(session, body, flags, seq, frame)
 
-    def _enter(self, session: _Session, body: bytes, flags: int, seq: int, frame: int) -> None:
+    def _add_to_frame(
+        self, session: _Session, body: bytes, flags: int, seq: int, frame: int
+    ) -> None:
         clear, commit = bool(flags & spec.DATA_FLAG_CLEAR), bool(flags & spec.DATA_FLAG_COMMIT)
-        if not session.frames or session.newest % 256 != frame or self._is_over(session):
+        is_whole = bool(session.frames) and session.frames[-1].commit is not None
+        if not session.frames or session.newest % 256 != frame or is_whole:
             if frame != (session.newest + 1) % 256:
                 self._note(f"frame {frame} follows frame {session.newest % 256}", "6")
             session.newest += 1
@@ -194,32 +203,28 @@ class Monitor:
         for index, value in self._ops(payload).items():
             before, by = current.written.setdefault(index, (value, seq))
             if before != value and by != seq:
-                place = self._device.voxel_at(index)
-                self._note(f"voxel {place} has another pixel in packet {by}", "6")
+                voxel = self._device.voxel_at(index)
+                self._note(f"voxel {voxel} has another pixel in packet {by}", "6")
                 break
             current.written[index] = (value, seq)
 
-    @staticmethod
-    def _is_over(session: _Session) -> bool:
-        return session.frames[-1].commit is not None
-
     def _ops(self, payload: bytes) -> dict[int, int]:
-        """Note what ops do; give what they write."""
-        reader = Reader(self._device)
+        """Remark on each op; return the pixels that they write, by index."""
+        decoder = AnnotatingDecoder(self._device)
         try:
-            reader.draw(payload)
+            decoder.draw(payload)
         except Refused as refused:
-            self._notes += reader.notes
+            self._remarks += decoder.remarks
             code = packets.CODE_NAMES[refused.code]
             at = refused.at + packets.HEADER_BYTES
             self._note(f"{at:>5}  {op_name(payload[refused.at])} must be refused: {code}", "11")
         else:
-            self._notes += reader.notes
-        return reader.written
+            self._remarks += decoder.remarks
+        return decoder.written
 
-    # -- what the device says
+    # -- packets of the device
 
-    def _heard(self, body: bytes) -> None:
+    def _device_packet(self, body: bytes) -> None:
         answer = packets.Response(body)
         if answer.kind not in packets.LAYOUTS:
             self._note(f"a device sends no packet of type {answer.kind}", "4")
@@ -243,27 +248,29 @@ class Monitor:
             self._note("the device has restarted")
             self._front = None
         self.device = device
-        if info.session != self._greeting:
-            self._note("not of the session that was asked for: a host drops it")
+        if info.session != self._hello_session:
+            self._note("not of the session of the last HELLO: a host drops it")
             return
         if self._session is None:
-            # It may answer any of them: the first leaves least room.
-            self._session = _Session(info.session, credit_until=self._hellos[0] + device.rx_buffer)
+            # It may answer any of the HELLOs: the first leaves least credit.
+            self._session = _Session(
+                info.session, credit_until=self._hello_ends[0] + device.rx_buffer
+            )
 
     def _ack(self, session: _Session, ack: packets.Response) -> None:
         if ack.session != session.number or ack.boot != self._device.boot:
-            self._note("of another session or start of the device: a host begins again")
+            self._note("of another session or boot of the device: a host opens a new session")
             return
-        if (ack.next - session.next) % 256 > (session.ahead - session.next) % 256:
+        if (ack.next - session.next) % 256 > (session.next_unsent - session.next) % 256:
             self._note(f"next is {ack.next}, which was never sent", "9")
             return
         session.next = ack.next
         self._credit(session, ack)
         if ack.flags & spec.ACK_FLAG_ASKED:
-            if ack.last not in session.asked:
-                self._note(f"answers a STATUS {ack.last} that nobody asked", "9")
+            if ack.last not in session.polls:
+                self._note(f"answers a STATUS {ack.last} that was never sent", "9")
             else:
-                del session.asked[: session.asked.index(ack.last) + 1]
+                del session.polls[: session.polls.index(ack.last) + 1]
         if ack.flags & spec.ACK_FLAG_SHOWN:
             self._shown(session, ack)
         elif ack.frame:
@@ -278,7 +285,7 @@ class Monitor:
             seq = (ack.next + 1 + bit) % 256
             if (
                 ack.received >> bit & 1
-                and (seq - ack.next) % 256 > (session.ahead - ack.next) % 256
+                and (seq - ack.next) % 256 > (session.next_unsent - ack.next) % 256
             ):
                 self._note(f"received has number {seq}, which was never sent", "9")
 
@@ -292,9 +299,9 @@ class Monitor:
         else:
             self._swap(session, shown)
         if self._front is not None and self._device.has("DIGEST"):
-            meant = self._front.digest(self._device)
-            if ack.digest != meant:
-                self._note(f"the digest is {ack.digest:08X}h, that of the frame {meant:08X}h", "8")
+            digest = self._front.digest(self._device)
+            if ack.digest != digest:
+                self._note(f"the digest is {ack.digest:08X}h, that of the frame {digest:08X}h", "8")
 
     def _swap(self, session: _Session, shown: _Frame) -> None:
         """Draw the frame on the model of the device's pages."""
@@ -316,43 +323,46 @@ class Monitor:
         session.frames = [f for f in session.frames if f.number > shown.number]
 
     def _page(self, session: _Session, answer: packets.Response) -> None:
-        asked = session.reads.get(answer.seq)
-        if asked is None:
-            self._note(f"answers a READ {answer.seq} that nobody asked", "10")
+        request = session.reads.get(answer.seq)
+        if request is None:
+            self._note(f"answers a READ {answer.seq} that was never sent", "10")
             return
-        start, count, back = asked
+        start, count, back = request
         if answer.start != start or not 1 <= answer.count <= count:
-            self._note(f"covers {answer.count} voxels from {answer.start}, asked was another", "10")
+            self._note(
+                f"covers {answer.count} voxels from {answer.start}, the READ was of another range",
+                "10",
+            )
             return
         got = self._pixels(answer)
         if got is None or back or self._front is None:
             return
-        for place, value in enumerate(got):
-            meant = self._front.pixels.get(start + place, 0)
-            if value != meant:
-                where = self._device.voxel_at(start + place)
-                self._note(f"voxel {where} is {value:X}h, shown was {meant:X}h", "10")
+        for offset, value in enumerate(got):
+            shown = self._front.pixels.get(start + offset, 0)
+            if value != shown:
+                voxel = self._device.voxel_at(start + offset)
+                self._note(f"voxel {voxel} is {value:X}h, shown was {shown:X}h", "10")
                 return
         self._note("the pixels are those of the frame on display")
 
     def _pixels(self, answer: packets.Response) -> list[int] | None:
-        """Read the ops of a PAGE: they draw from index 0 of a page that is long enough."""
-        reader = Reader(self._device)
+        """Return the pixels of a PAGE: its ops draw from index 0 of a page that is long enough."""
+        decoder = AnnotatingDecoder(self._device)
         try:
-            reader.draw(answer.tail)
+            decoder.draw(answer.tail)
         except Refused as refused:
             self._note(f"its ops must be refused: {packets.CODE_NAMES[refused.code]}", "10")
             return None
-        if reader.used - _PAGE_OPS:
+        if decoder.used - _PAGE_OPS:
             self._note("ops that a PAGE may not have", "10")
-        if reader.cursor != answer.count:
-            self._note(f"its ops cover {reader.cursor} voxels, not {answer.count}", "10")
+        if decoder.cursor != answer.count:
+            self._note(f"its ops cover {decoder.cursor} voxels, not {answer.count}", "10")
             return None
-        return [reader.page.pixels.get(index, 0) for index in range(answer.count)]
+        return [decoder.page.pixels.get(index, 0) for index in range(answer.count)]
 
     def _error(self, session: _Session, error: packets.Response) -> None:
         if error.code == spec.CODE_NO_SESSION:
-            self._note("the device has lost the session: a host begins again")
+            self._note("the device has lost the session: a host opens a new one")
             self._session = None
         elif error.seq in session.sent and error.code != spec.CODE_OVERRUN:
             packet = session.sent[error.seq]

@@ -1,6 +1,6 @@
-"""What each op of a payload does, in a line: told by the plain decoder while it draws.
+"""One line per op of a payload, noted by the reference decoder while it draws.
 
-Knows no packet but by its payload, and no rule but those of section 7.
+Knows packets by their payloads alone, and no rule but those of section 7 of protocol.md.
 """
 
 from __future__ import annotations
@@ -33,24 +33,43 @@ _OPS = {
 
 
 @dataclass(frozen=True)
-class Note:
-    """Something to say of a packet; with a section of protocol.md, if it breaks that."""
+class Remark:
+    """A remark on a packet.
+
+    Attributes
+    ----------
+    text : str
+    section : str
+        Section of protocol.md that the packet violates; empty if it violates none.
+
+    """
 
     text: str
     section: str = ""
 
 
 def op_name(op: int) -> str:
-    """Give the name of an op byte."""
+    """Return the name of an op byte."""
     return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
 
 
-class Reader(ReferenceDecoder):
-    """The plain decoder, which notes each op as it draws."""
+class AnnotatingDecoder(ReferenceDecoder):
+    """Reference decoder that notes each op as it draws.
+
+    Attributes
+    ----------
+    remarks : list of Remark
+        One for each op.
+    written : dict of int to int
+        Pixel values by scan-order index.
+    used : set of int
+        Op bytes that occurred, without their operands' bits.
+
+    """
 
     def __init__(self, device: AnnouncedDevice) -> None:
-        super().__init__(device, _Watched(self))
-        self.notes: list[Note] = []
+        super().__init__(device, _RecordingPage(self))
+        self.remarks: list[Remark] = []
         self.written: dict[int, int] = {}
         self.used: set[int] = set()
         self._drawn = 0
@@ -59,9 +78,10 @@ class Reader(ReferenceDecoder):
         at, pen, self._drawn = self._op_at, self.pen, 0
         super()._op(op)
         self.used.add(op if op in _OPS else op & 0xE0)
-        self.notes.append(Note(f"{at + packets.HEADER_BYTES:>5}  {self._said_of(op, at, pen)}"))
+        text = f"{at + packets.HEADER_BYTES:>5}  {self._describe_op(op, at, pen)}"
+        self.remarks.append(Remark(text))
 
-    def _said_of(self, op: int, at: int, pen: int) -> str:
+    def _describe_op(self, op: int, at: int, pen: int) -> str:
         operands = self._payload[at + 1 : self._at]
         words = [f"{op_name(op):6}"]
         if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op != spec.OP_ARC:
@@ -77,28 +97,28 @@ class Reader(ReferenceDecoder):
         if self.pen != pen and op != spec.OP_PEN:
             words.append(f"pen {self.pen:X}h,")
         if op != spec.OP_END:
-            words.append(f"cursor {self._cursor_place()}")
+            words.append(f"cursor {self._cursor_text()}")
         return " ".join(words)
 
-    def _cursor_place(self) -> str:
+    def _cursor_text(self) -> str:
         if self.cursor >= self.device.voxel_count:
-            return "behind the end"
+            return "past the end"
         return "({}, {}, {})".format(*self.device.voxel_at(self.cursor))
 
-    def count(self, index: int, value: int) -> None:
-        """Note a voxel that is written."""
+    def record_write(self, index: int, value: int) -> None:
+        """Record a voxel that is written."""
         self.written[index] = value
         self._drawn += 1
 
 
-class _Watched(Page):
-    """A page that tells its reader what is written."""
+class _RecordingPage(Page):
+    """A page that reports each write to its decoder."""
 
-    def __init__(self, reader: Reader) -> None:
+    def __init__(self, decoder: AnnotatingDecoder) -> None:
         super().__init__()
-        self._reader = reader
+        self._decoder = decoder
 
     def write(self, index: int, value: int) -> None:
         """See `Page.write`."""
         super().write(index, value)
-        self._reader.count(index, value)
+        self._decoder.record_write(index, value)

@@ -1,0 +1,60 @@
+"""``voxdisplay protocol`` and ``schema``: paths of the documents installed with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import click
+
+from voxdisplay.cli.output import print_stdout
+
+_PACKAGE: Final = Path(__file__).resolve().parents[1]
+SCHEMA: Final = _PACKAGE / "scene.schema.json"
+
+
+def protocol_path() -> Path:
+    """Return the path of protocol.md.
+
+    A wheel installs it in the package; in a checkout it lies beside the package.
+
+    Raises
+    ------
+    click.ClickException
+        If the installation lacks it.
+
+    """
+    return _existing(_PACKAGE / "protocol.md", _PACKAGE.parent / "protocol.md")
+
+
+def _existing(*places: Path) -> Path:
+    for path in places:
+        if path.is_file():
+            return path
+    raise click.ClickException(
+        f"{places[0]} is missing: this installation is not complete; install voxdisplay again"
+    )
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay protocol
+      less "$(voxdisplay protocol)"
+    """
+)
+def protocol() -> None:
+    """Print the path of protocol.md, the description of the wire for whoever builds a device."""
+    print_stdout(str(protocol_path()))
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay schema
+      cp "$(voxdisplay schema)" scene.schema.json
+    """
+)
+def schema() -> None:
+    """Print the path of the JSON Schema of scene files, for editors and validators."""
+    print_stdout(str(_existing(SCHEMA)))
