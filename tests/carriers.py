@@ -1,6 +1,6 @@
-"""Every kind of byte pipe with a test at its other end: what the transport kit runs over.
+"""Pairs of a transport and its peer, one for every kind of byte pipe: for the transport kit.
 
-A carrier is a context manager that gives the driver's transport and the peer, a plain descriptor.
+A carrier is a context manager that yields the driver's transport and the peer, a plain descriptor.
 Another kind is another entry of `CARRIERS`.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import select
 import socket
 import threading
 import time
@@ -17,6 +16,7 @@ import tty
 from serial import rfc2217
 from usb_carriers import USB_CARRIERS
 
+from firmware_sim.readiness import wait_ready
 from voxdisplay.transport import open_transport
 from voxdisplay.transport.plugin import PluginTransport
 
@@ -34,7 +34,7 @@ class Peer:
         """Read exactly so many bytes."""
         data = bytearray()
         while len(data) < count:
-            ready, _, _ = select.select([self.descriptor], [], [], WAIT_S)
+            ready, _ = wait_ready([self.descriptor], timeout_s=WAIT_S)
             assert ready, f"{len(data)} of {count} bytes came"
             piece = os.read(self.descriptor, count - len(data))
             assert piece, f"closed after {len(data)} of {count} bytes"
@@ -44,7 +44,7 @@ class Peer:
     def write(self, data):
         view = memoryview(data)
         while view:
-            _, ready, _ = select.select([], [self.descriptor], [], WAIT_S)
+            _, ready = wait_ready([], [self.descriptor], WAIT_S)
             assert ready, f"{len(view)} of {len(data)} bytes were not taken"
             view = view[os.write(self.descriptor, view) :]
 
@@ -55,7 +55,7 @@ class Peer:
 
 
 class SocketPipe:
-    """What an entry point of another package may give: read, write and close, and OSErrors."""
+    """Pipe as an entry point of another package returns it: read, write, close, and OSErrors."""
 
     def __init__(self, ours):
         self._socket = ours
@@ -117,7 +117,7 @@ def listening(scheme):
 
 
 class Rfc2217Line:
-    """The serial line that a server of RFC 2217 has in its hands: notes what is set."""
+    """Serial line behind a server of RFC 2217; records the settings."""
 
     bytesize, parity, stopbits = 8, "N", 1
     cts = dsr = cd = True
@@ -141,7 +141,7 @@ class Rfc2217Line:
 
 
 class _Locked:
-    """A connection that several may write to, as `PortManager` wants it."""
+    """Connection with a lock around `write`, as `PortManager` needs it."""
 
     def __init__(self, connection):
         self._connection, self._lock = connection, threading.Lock()
@@ -167,7 +167,7 @@ class Rfc2217Server:
         self._thread.start()
 
     def _run(self):
-        ready, _, _ = select.select([self._listener, self._stop], [], [])
+        ready, _ = wait_ready([self._listener, self._stop])
         if self._stop in ready:
             return
         connection, _ = self._listener.accept()
@@ -180,7 +180,7 @@ class Rfc2217Server:
         waiting = b""
         while True:
             wants = [self._stop, self._inner] + ([] if waiting else [connection])
-            ready, room, _ = select.select(wants, [self._inner] if waiting else [], [])
+            ready, room = wait_ready(wants, [self._inner] if waiting else [])
             if self._stop in ready:
                 return
             if room:
@@ -231,7 +231,7 @@ CARRIERS = {
 
 
 def eventually(condition, what="it"):
-    """Wait until something is so; fail if it never is."""
+    """Wait until a condition holds; fail if it never does."""
     deadline_s = time.monotonic() + WAIT_S
     while not condition():
         assert time.monotonic() < deadline_s, f"{what} never happened"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import select
+import selectors
 import signal
 import sys
 import time
@@ -28,6 +28,9 @@ _IDLE_WAIT_S, _SPIN_WAIT_S = 0.25, 0.05
 _KEY_STEP, _SPIN_STEP, _KEY_ZOOM = 0.1, 0.03, 1.1
 # Re-reading takes a fifth of the time at most, and happens once a second at most.
 _MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR = 1.0, 5.0
+
+# Takes descriptors above 1023, unlike select, and waits on /dev/tty, unlike epoll and kqueue.
+_SELECTOR = getattr(selectors, "PollSelector", selectors.SelectSelector)
 
 _ENTER_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[2J"
 _LEAVE_SCREEN = "\x1b[0m\x1b[?25h\x1b[?1049l"
@@ -132,6 +135,8 @@ def run(view: TerminalView) -> None:
 def _event_loop(view: TerminalView, keyboard: int) -> None:
     full = has_true_color()
     drawn: object = None
+    keys_ready = _SELECTOR()
+    keys_ready.register(keyboard, selectors.EVENT_READ)
     while not view.done:
         size = os.get_terminal_size(sys.stdout.fileno())
         shown = size, view.camera, id(view._lit)  # noqa: SLF001
@@ -140,7 +145,7 @@ def _event_loop(view: TerminalView, keyboard: int) -> None:
             _write(_BEGIN_UPDATE + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END_UPDATE)
             drawn = shown
         wait_s = _SPIN_WAIT_S if view.spins else _IDLE_WAIT_S
-        if select.select([keyboard], [], [], wait_s)[0]:
+        if keys_ready.select(wait_s):
             keys = os.read(keyboard, 1024)
             if not keys:
                 return  # the terminal is gone

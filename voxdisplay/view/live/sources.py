@@ -7,7 +7,7 @@ only while somebody looks. Knows no browser.
 from __future__ import annotations
 
 import contextlib
-import select
+import selectors
 import socket
 import struct
 import threading
@@ -126,8 +126,13 @@ class TapSource:
 
     def check_alive(self) -> None:
         """See `Source.check_alive`. A tap sends nothing unasked: readable means closed."""
-        readable, _, _ = select.select([self._socket], [], [], 0)
-        if readable:
+        try:
+            with selectors.DefaultSelector() as selector:
+                selector.register(self._socket, selectors.EVENT_READ)
+                closed = bool(selector.select(0))
+        except (OSError, ValueError) as error:  # ValueError: it was closed here
+            raise TransportClosed(f"{self._name} is gone: {error}") from error
+        if closed:
             raise TransportClosed(f"{self._name} is gone")
 
     def _receive(self, size: int) -> bytearray:
