@@ -24,7 +24,9 @@ _FINDERS: Final = (
 )
 # A list that fails while a device comes or goes is right a moment later.
 _ATTEMPTS: Final = 3
-_DEVICES: Final = ("ttyUSB*", "ttyACM*", "cu.usb*")  # in /dev, where pyserial cannot list them
+# USB serial devices of Linux and macOS, for when pyserial cannot list them.
+_DEVICES: Final = ("ttyUSB*", "ttyACM*", "cu.usb*")
+_DEV: Final = Path("/dev")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ def _devices_by_name() -> list[FoundPort]:
     if sys.platform == "win32":
         return []
     try:
-        paths = [path for pattern in _DEVICES for path in Path("/dev").glob(pattern)]
+        paths = [path for pattern in _DEVICES for path in _DEV.glob(pattern)]
     except OSError:
         return []
     return [FoundPort(str(path), "no details: the system's list is incomplete") for path in paths]
