@@ -1,16 +1,17 @@
-"""What is to be shown: a display list in the order of drawing, and its raster.
+"""One picture of a display: display list in drawing order, and its raster.
 
-A frame knows the display's grid and pixel format. It turns curves into voxels and colours into
-pixels, and says what was lost in that. It knows nothing of packets on their way, and leaves it to
-``wire.choice`` how it is coded.
+A frame turns curves into voxels and colours into pixels of the display's grid and format. It must
+not know packets in flight, and leaves the encoding to `wire.encoding_selection`.
 """
 
 from __future__ import annotations
 
-import io
+import os
+import reprlib
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from voxdisplay import voxelization
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
-from voxdisplay.errors import MissingExtra
 from voxdisplay.raster.color import Color, as_colors, interpolate_colors
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
@@ -36,19 +36,21 @@ from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import OpBlocks
 
+Fit = Literal["contain", "none"]
+
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """What became of a drawn item.
+    """Result of drawing one object.
 
     Attributes
     ----------
     voxels : int
-        How many it has, inside the grid or not.
+        Number of its voxels, inside the grid or not.
     clipped : int
-        How many of them are outside, and not shown.
+        Number of those outside, which are not shown.
     exact_color : bool
-        Whether the display can show its colours as they are.
+        True if the display can show its colours as they are.
     undefined : tuple of SingularPoint
         Parameters at which a curve has no value and is drawn with the limits of both sides.
     jumps : tuple of float
@@ -63,8 +65,18 @@ class Drawing:
     jumps: tuple[float, ...] = ()
 
 
+@runtime_checkable
+class Drawable(Protocol):
+    """An object that draws itself on a frame, such as a scene."""
+
+    def draw_on(self, frame: Frame, *, fit: Fit = "contain") -> Drawing:
+        """Draw on a frame; `fit` is that of `Frame.draw`."""
+
+
 class Frame:
-    """One complete picture.
+    """One complete picture: see the methods `draw`, `set`, `array`, `save` and `show`.
+
+    Frames are equal if a display shows the same for them: grid, format, pixels and palette.
 
     Parameters
     ----------
@@ -92,7 +104,7 @@ class Frame:
         palette: NDArray[np.uint8] | None = None,
         own_palette: bool = False,
     ) -> None:
-        self.grid = Grid(*grid)
+        self.grid = _as_grid(grid)
         self.format = PixelFormat(format)
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
         self._shared = False  # with a copy
@@ -106,8 +118,31 @@ class Frame:
         if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
             self._palette = Palette(palette, grows=palette is None)
 
+    def __repr__(self) -> str:
+        lit = len(self.lit()[0])
+        palette = ", own palette" if self.has_own_palette else ""
+        return f"<Frame {self.grid} {self.format.value}, {lit} voxels lit{palette}>"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frame):
+            return NotImplemented
+        if (self.grid, self.format) != (other.grid, other.format):
+            return False
+        mine, others = self.palette, other.palette
+        if mine is not None and others is not None and not np.array_equal(mine, others):
+            return False
+        return self._raster is other._raster or np.array_equal(self._raster, other._raster)
+
+    __hash__ = None  # type: ignore[assignment]  # it can be drawn on
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return `array`, for numpy; always a copy."""
+        if copy is False:
+            raise ValueError("the array of a frame is a copy: np.array(frame, copy=False) is not")
+        return self.array() if dtype is None else self.array().astype(dtype, copy=False)
+
     def copy(self) -> Frame:
-        """Give another frame of the same picture; quick, until one of the two is drawn on."""
+        """Return another frame of the same picture; quick, until one of the two is drawn on."""
         self._visible(dark=True)  # once for both
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
@@ -128,33 +163,53 @@ class Frame:
 
     def draw(
         self,
-        what: Curve | voxelization.Sequence | ArrayLike,
-        color: Color = "white",
+        drawable: Curve | voxelization.Sequence | Drawable | ArrayLike,
+        color: Color | None = None,
+        *,
+        fit: Fit = "contain",
     ) -> Drawing:
-        """Draw a curve, a sequence or voxels over what is there.
+        """Draw a curve, a sequence, voxels or a scene over what is there.
 
         Parameters
         ----------
-        what : Curve, Sequence, or (N, 3) integer array
+        drawable : Curve, Sequence, (N, 3) integer array, or Scene
             Voxels of an array have columns x, y, z. What lies outside the grid is clipped.
-        color : str, list of str, or (k, 3) uint8 array
-            A colour, or several spread along the curve. See `voxdisplay.raster.color`.
+        color : str, (r, g, b), list of these, or (k, 3) integer array, optional
+            A colour, or several spread along the curve: see `voxdisplay.raster.color.as_colors`.
+            White by default. A scene has colours of its own.
+        fit : {"contain", "none"}
+            For a scene that was composed for a grid of another size: scale and centre it, or keep
+            its numbers.
 
         Returns
         -------
         Drawing
-            What became of it.
+            Voxel counts, and whether the colours are exact.
+
+        Raises
+        ------
+        TypeError
+            If `drawable` or `color` is of another kind.
+        ValueError
+            If an array has another shape or type, or a colour is none.
+        CurveError, SceneError
+            If a curve cannot be evaluated or drawn.
 
         """
-        if isinstance(what, Curve):
-            what = voxelization.voxelize(what)
-        if isinstance(what, voxelization.Sequence):
-            drawing = self._add(what.voxels, as_colors(color), _corner_rows(what))
-            return replace(drawing, undefined=what.undefined, jumps=what.jumps)
-        return self._add(_as_voxels(what), as_colors(color), _NO_INDICES)
+        if isinstance(drawable, Drawable) and not isinstance(drawable, type):
+            if color is not None:
+                raise TypeError("color: a scene has colours of its own; leave it out")
+            return drawable.draw_on(self, fit=fit)
+        colors = as_colors("white" if color is None else color)
+        if isinstance(drawable, Curve):
+            drawable = voxelization.voxelize(drawable)
+        if isinstance(drawable, voxelization.Sequence):
+            drawing = self._add(drawable.voxels, colors, _corner_rows(drawable))
+            return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
+        return self._add(_as_voxels(drawable), colors, _NO_INDICES)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
-        """Draw many curves, in order: the same as `draw` on each, but found together."""
+        """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
         curves, colors = zip(*items, strict=True) if (items := list(items)) else ((), ())
         sequences = voxelization.voxelize_many(curves)
         return [self.draw(*pair) for pair in zip(sequences, colors, strict=True)]
@@ -229,19 +284,57 @@ class Frame:
         """Whether the palette is not the default one."""
         return self._palette is not None and len(self._palette.entries_differing(DEFAULT)) > 0
 
+    @property
+    def _raster_zyx(self) -> Pixels:
+        return self._raster.reshape(self.format.shape(self.grid.array_shape))
+
     def array(self) -> Pixels:
-        """Give the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
-        return self._raster.reshape(self.format.shape(self.grid.array_shape)).copy()
+        """Return the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
+        return self._raster_zyx.copy()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a picture of the frame.
+
+        Parameters
+        ----------
+        path : str or path
+            Its suffix says what is written: .png; .gif or .mp4, a film of one turn; .html, a page
+            to turn it in a browser.
+
+        Raises
+        ------
+        ValueError
+            If it has another suffix.
+        MissingExtra
+            If a library is not installed.
+        OSError
+            If the file cannot be written.
+
+        """
+        from voxdisplay.view.rich_display import save_page  # noqa: PLC0415 - needs an extra
+
+        save_page(path, self._raster_zyx, self.grid, self.format, self.palette)
+
+    def show(self) -> None:
+        """Show a picture of the frame: in a notebook's output, else in the picture viewer.
+
+        Raises
+        ------
+        MissingExtra
+            If Pillow is not installed.
+        VoxDisplayError
+            If there is no screen, or no picture viewer.
+
+        """
+        from voxdisplay.view.rich_display import show_page  # noqa: PLC0415 - needs an extra
+
+        show_page(self._raster_zyx, self.grid, self.format, self.palette)
 
     def _repr_png_(self) -> bytes | None:
-        """Give notebooks a picture, if Pillow is installed."""
-        try:
-            from voxdisplay.view.picture import render_page  # noqa: PLC0415 - an extra
-        except MissingExtra:
-            return None
-        file = io.BytesIO()
-        render_page(self.array(), self.grid, self.format).save(file, format="PNG")
-        return file.getvalue()
+        """Return a picture for notebooks; None without Pillow."""
+        from voxdisplay.view.rich_display import page_png  # noqa: PLC0415 - needs an extra
+
+        return page_png(self._raster_zyx, self.grid, self.format, self.palette)
 
     def rgb(self) -> NDArray[np.uint8]:
         """Give the colours that are seen, (nz, ny, nx, 3) uint8, whatever the format."""
@@ -401,11 +494,35 @@ def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[n
     return np.setdiff1d(index, items.index) if items else index
 
 
-def _as_voxels(what: ArrayLike) -> NDArray[np.integer]:
-    voxels = np.asarray(what)
+def _as_grid(grid: Any) -> Grid:
+    """Return three positive whole numbers as a `Grid`."""
+    sides = list(grid) if isinstance(grid, tuple | list | np.ndarray) else None
+    if sides is None or len(sides) != 3 or not all(isinstance(n, int | np.integer) for n in sides):
+        raise TypeError(
+            f"grid: three whole numbers (nx, ny, nz) are wanted, not {reprlib.repr(grid)}"
+        )
+    found = Grid(*map(int, sides))
+    if not all(1 <= n <= spec.LIMIT_MAX_SIDE for n in sides):
+        raise ValueError(f"grid: sides are 1 to {spec.LIMIT_MAX_SIDE}, not {found}")
+    if found.voxels > spec.LIMIT_MAX_VOXELS:
+        raise ValueError(f"grid: {found} are more than {spec.LIMIT_MAX_VOXELS} voxels")
+    return found
+
+
+def _as_voxels(drawable: object) -> NDArray[np.integer]:
+    try:
+        voxels = np.asarray(drawable)
+    except ValueError:  # rows of different lengths
+        voxels = np.empty(0, dtype=object)
+    is_list = isinstance(drawable, list | tuple) or hasattr(drawable, "__array__")
+    if not is_list or isinstance(drawable, Frame):
+        raise TypeError(
+            f"drawable: draw() takes a curve, a sequence, an (N, 3) array of voxels or a scene, "
+            f"not {type(drawable).__name__} {reprlib.repr(drawable)}"
+        )
     if voxels.ndim != 2 or voxels.shape[1] != 3 or voxels.dtype.kind not in "iu":
         raise ValueError(
-            f"voxels are an (N, 3) array of whole numbers, columns x, y, z; "
+            f"drawable: voxels are an (N, 3) array of whole numbers, columns x, y, z; "
             f"this is {voxels.shape} of {voxels.dtype}"
         )
     return voxels.astype(np.int64)

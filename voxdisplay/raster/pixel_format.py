@@ -6,6 +6,7 @@ Knows the formats of protocol.md, section 2.1, and nothing of frames, curves or 
 from __future__ import annotations
 
 import enum
+import reprlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,11 @@ class PixelFormat(enum.Enum):
     INDEX8 = "index8"
     RGB565 = "rgb565"
     RGB888 = "rgb888"
+
+    @classmethod
+    def _missing_(cls, value: object) -> None:
+        names = ", ".join(format_.value for format_ in cls)
+        raise ValueError(f"format: one of {names} is wanted, not {reprlib.repr(value)}")
 
     @classmethod
     def from_wire(cls, number: int) -> PixelFormat | None:
@@ -112,7 +118,13 @@ class PixelFormat(enum.Enum):
         return np.asarray(values, dtype=self.dtype)
 
     def validate(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> None:
-        """Refuse an array that is not memory of this format.
+        """Raise if an array is not memory of this format.
+
+        Parameters
+        ----------
+        array : ndarray
+        array_shape : (nz, ny, nx)
+            Of the grid.
 
         Raises
         ------
@@ -129,10 +141,26 @@ class PixelFormat(enum.Enum):
         if array.dtype != self.dtype:
             raise ValueError(
                 f"the array is {array.dtype}, a {self.value} frame is {self.dtype.__name__}: "
-                f"convert it with array.astype('{self.dtype.__name__}')"
+                f"{self._conversion(array)}"
             )
         if self is PixelFormat.MONO1 and (array.astype(np.uint8) > 1).any():
             raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
+
+    def _conversion(self, array: NDArray[np.generic]) -> str:
+        """Return how an array of another type becomes pixels of this format."""
+        top = 1 if self is PixelFormat.MONO1 else int(np.iinfo(self.dtype).max)
+        if array.dtype.kind in "iub" and (
+            not array.size or 0 <= int(array.min()) <= int(array.max()) <= top
+        ):
+            return f"convert it with array.astype('{self.dtype.__name__}')"
+        if self is PixelFormat.MONO1:
+            return "choose what is lit, as by (array > threshold).astype('uint8')"
+        meaning = {
+            PixelFormat.INDEX8: "pixels are entries of the palette, 0 (dark) to 255",
+            PixelFormat.RGB565: "pixels are red << 11 | green << 5 | blue, with 5, 6 and 5 bits",
+            PixelFormat.RGB888: "red, green and blue are 0 (dark) to 255",
+        }[self]
+        return f"{meaning}; scale the values to that, round, and convert them"
 
 
 def is_lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:

@@ -3,10 +3,10 @@
 from voxdisplay.errors import MissingExtra
 
 try:
-    from PIL import Image, ImageChops, ImageDraw, ImageFont
+    from PIL import Image, ImageChops, ImageDraw, ImageFont, ImageShow
 except ModuleNotFoundError as error:
     raise MissingExtra(
         "pictures need Pillow, which is not installed", hint="pip install 'voxdisplay[view]'"
     ) from error
 
-__all__ = ["Image", "ImageChops", "ImageDraw", "ImageFont"]
+__all__ = ["Image", "ImageChops", "ImageDraw", "ImageFont", "ImageShow"]

@@ -79,9 +79,22 @@ def test_an_array_of_another_shape_or_type_is_refused(format_):
         if wrong != (7, 5, 3):
             with pytest.raises(ValueError, match=r"\[z, y, x\]"):
                 format_.validate(np.zeros(format_.shape(wrong), dtype=format_.dtype), (7, 5, 3))
-    for dtype in (float, bool, np.int64):
-        with pytest.raises(ValueError, match="astype"):
-            format_.validate(np.zeros(shape, dtype=dtype), (7, 5, 3))
+    for dtype in (bool, np.int64, np.uint32):
+        with pytest.raises(
+            ValueError, match=f"convert it with array.astype.'{format_.dtype.__name__}'"
+        ):
+            format_.validate(np.ones(shape, dtype=dtype), (7, 5, 3))
+
+
+@FORMATS
+@pytest.mark.parametrize("array", [0.5, -1, 1 << 16], ids=["fractions", "negative", "too large"])
+def test_values_that_a_cast_would_spoil_are_not_advised_to_be_cast(format_, array):
+    """0..1 cast to uint8 is black."""
+    with pytest.raises(ValueError, match=f"frame is {format_.dtype.__name__}") as caught:
+        format_.validate(np.full(format_.shape((7, 5, 3)), array), (7, 5, 3))
+    assert "convert it with" not in str(caught.value)
+    word = "threshold" if format_ is PixelFormat.MONO1 else "scale the values"
+    assert word in str(caught.value)
 
 
 def test_mono1_has_only_0_and_1():
