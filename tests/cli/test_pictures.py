@@ -169,8 +169,25 @@ def test_push_imports_no_picture_code():
     assert not {name for name in loaded if f"{name}.".startswith("voxdisplay.view.")}
 
 
-def test_a_frame_without_pillow_has_no_picture():
+@pytest.mark.parametrize(
+    "what",
+    [
+        "vd.Frame((3, 5, 7))",
+        "vd.voxelize(vd.Segment((1, 1, 1), (5, 5, 5)))",
+        """vd.read_scene('{"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}')""",
+    ],
+)
+def test_without_pillow_nothing_has_a_picture(what):
     code = "import sys; sys.modules['PIL'] = None; import voxdisplay as vd; "
-    code += "print(vd.Frame((3, 5, 7))._repr_png_())"
+    code += f"print({what}._repr_png_())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "None\n"
+
+
+def test_save_and_show_without_pillow_say_what_is_missing():
+    code = "import sys; sys.modules['PIL'] = None; import voxdisplay as vd; import tempfile\n"
+    code += "for call in (lambda f: f.save('x.png'), lambda f: f.show()):\n"
+    code += "    try: call(vd.Frame((3, 5, 7)))\n"
+    code += "    except vd.MissingExtra as error: print(error.hint)\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == 2 * "pip install 'voxdisplay[view]'\n"

@@ -1,10 +1,10 @@
-"""A frame: what was drawn, in its order, and what the emulator makes of it."""
+"""Frames: drawing order, arrays, comparison, and the page that the emulator makes of them."""
 
 import numpy as np
 import pytest
 from drawing import page_after, values_of
 
-from voxdisplay import Segment, voxelize
+from voxdisplay import Circle, Scene, Segment, read_scene, voxelize
 from voxdisplay.frame import Frame
 from voxdisplay.raster.pixel_format import PixelFormat
 
@@ -154,3 +154,135 @@ def test_set_refuses_what_is_no_memory_and_changes_nothing(array):
     with pytest.raises(ValueError, match="the array"):
         frame.set(array)
     assert np.count_nonzero(frame.array()) == 1
+
+
+def test_a_colour_may_be_three_numbers():
+    """As libraries for LEDs take it."""
+    frame = Frame((8, 8, 8))
+    assert frame.draw(Circle((4, 4, 4), 3), color=(255, 128, 0)).exact_color
+    colors = frame.rgb().reshape(-1, 3)
+    assert np.unique(colors[colors.any(axis=1)], axis=0).tolist() == [[255, 128, 0]]
+
+
+def test_the_default_colour_is_white():
+    frame = Frame((3, 5, 7))
+    frame.draw([(1, 2, 3)])
+    assert frame.rgb()[3, 2, 1].tolist() == [255, 255, 255]
+
+
+@pytest.mark.parametrize(
+    "what",
+    ["curve.json", b"xyz", 7, 1.5, None, {}, {1}, object(), len, lambda t: t, Circle, Scene,
+     Frame((3, 5, 7)), iter([(1, 2, 3)])],
+    ids=lambda what: type(what).__name__,
+)  # fmt: skip
+def test_draw_names_what_it_takes(what):
+    with pytest.raises(TypeError, match=r"drawable: draw\(\) takes a curve, a sequence, .*scene"):
+        Frame((3, 5, 7)).draw(what)
+
+
+def test_draw_refuses_rows_of_different_lengths():
+    with pytest.raises(ValueError, match="columns x, y, z"):
+        Frame((3, 5, 7)).draw([[1, 2, 3], [1, 2]])
+
+
+TWO = """{"size": [10, 10, 10], "objects": [
+ {"type": "segment", "from": [1, 1, 1], "to": [9, 9, 9], "color": "red"},
+ {"type": "segment", "from": [1, 1, 1], "to": [9, 1, 1], "color": [0, 255, 0]}]}"""
+
+
+def test_a_scene_is_drawn_like_anything_else():
+    scene, frame, expected = read_scene(TWO), Frame((10, 10, 10)), Frame((10, 10, 10))
+    drawing = frame.draw(scene)
+    alone = [expected.draw(item.curve, item.color) for item in scene.items]
+    assert frame == expected
+    assert drawing.voxels == sum(each.voxels for each in alone)
+    assert (drawing.clipped, drawing.exact_color) == (0, True)
+    assert not Frame((10, 10, 10), "mono1").draw(scene).exact_color
+
+
+def test_a_scene_of_another_size_is_fitted_or_kept():
+    scene, fitted, kept = read_scene(TWO), Frame((20, 20, 5)), Frame((20, 20, 5))
+    assert fitted.draw(scene).clipped == 0
+    assert kept.draw(scene, fit="none").clipped > 0
+    with pytest.raises(ValueError, match="contain or none"):
+        kept.draw(scene, fit="cover")
+
+
+def test_a_scene_has_its_own_colours():
+    frame = Frame((10, 10, 10))
+    with pytest.raises(TypeError, match="color: a scene has colours of its own"):
+        frame.draw(read_scene(TWO), color="red")
+    assert not frame.array().any()
+
+
+@FORMATS
+def test_frames_that_look_alike_are_equal(format_):
+    frames = [Frame(GRID, format_) for _ in range(3)]
+    for frame in frames[:2]:
+        frame.draw(Segment((1, 1, 1), (9, 9, 9)), "red")
+    assert frames[0] == frames[1] == frames[0].copy()
+    assert frames[0] != frames[2]
+    frames[2].set(frames[0])
+    assert frames[0] == frames[2], "however it was drawn"
+    frames[2].clear()
+    assert frames[2] == Frame(GRID, format_)
+    assert Frame(GRID, format_) != Frame(GRID[::-1], format_)
+    assert frames[0] != "frame"
+
+
+def test_frames_of_other_formats_or_palettes_differ():
+    assert Frame((3, 5, 7), "mono1") != Frame((3, 5, 7), "index8")
+    palette = Frame((3, 5, 7), "index8").palette
+    same = Frame((3, 5, 7), "index8", palette=palette)
+    assert same == Frame((3, 5, 7), "index8")
+    palette[9] = 1, 2, 3
+    assert Frame((3, 5, 7), "index8", palette=palette) != same
+
+
+def test_a_frame_is_not_hashable():
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(Frame((3, 5, 7)))
+
+
+@FORMATS
+def test_a_frame_is_an_array_to_numpy(format_):
+    frame = Frame((3, 5, 7), format_)
+    frame.draw([(2, 4, 6)])
+    assert np.array_equal(frame, frame.array())
+    copy = np.asarray(frame)
+    assert copy.dtype == format_.dtype
+    copy[...] = 0
+    assert frame.array().any(), "the caller's array is a copy"
+    assert np.asarray(frame, dtype=np.float32).dtype == np.float32
+    assert frame.__array__().dtype == format_.dtype
+    assert frame.__array__(float, copy=True).dtype == float
+    with pytest.raises(ValueError, match="copy"):
+        frame.__array__(copy=False)
+    assert (np.asarray(frame) == frame.array()).all()
+
+
+def test_repr_names_grid_format_and_voxels():
+    frame = Frame((3, 5, 7), "index8", own_palette=True)
+    assert repr(frame) == "<Frame 3x5x7 index8, 0 voxels lit>"
+    frame.draw([(1, 1, 1), (1, 2, 1)], "#010203")
+    assert repr(frame) == "<Frame 3x5x7 index8, 2 voxels lit, own palette>"
+    assert repr(frame.grid) == "Grid(nx=3, ny=5, nz=7)"
+
+
+@pytest.mark.parametrize("grid", [(3, 5), (3, 5, 7, 9), "3x5x7", 3, None, (3, 5, 7.0), ("3", 5, 7)])
+def test_what_is_no_grid(grid):
+    with pytest.raises(TypeError, match=r"grid: three whole numbers \(nx, ny, nz\)"):
+        Frame(grid)
+
+
+@pytest.mark.parametrize("grid", [(0, 5, 7), (3, -5, 7), (3, 5, 65536), (65535, 65535, 65535)])
+def test_a_grid_that_no_display_has(grid):
+    with pytest.raises(ValueError, match="grid: "):
+        Frame(grid)
+
+
+@pytest.mark.parametrize("format_", ["rgb", "", None, 3, b"mono1"])
+def test_what_is_no_format(format_):
+    with pytest.raises(ValueError, match="format: one of mono1, index8, rgb565, rgb888 is wanted"):
+        Frame((3, 5, 7), format_)

@@ -30,13 +30,7 @@ def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
         If a curve cannot be drawn; it names the object.
 
     """
-    try:
-        sequences = vd.voxelize_many((item.curve for item in scene.items), **options)
-    except vd.CurveError:
-        # Voxelised together, they fail together: one by one, to name the object.
-        for item in scene.items:
-            with_object(item, vd.voxelize, item.curve, **options)
-        raise
+    sequences = scene.voxelize(**options)
     for item, sequence in zip(scene.items, sequences, strict=True):
         for remark in _remarks(sequence):
             note(f"{item.path} ({item.type}): {remark}")

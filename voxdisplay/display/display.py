@@ -99,6 +99,11 @@ class Display:
         """What the link has done so far."""
         return self._connection.link.counters
 
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture for notebooks of the frame last proved; None without one, or Pillow."""
+        frame = self._queue.displayed
+        return frame._repr_png_() if frame else None
+
     # -- waiting
 
     def _pump(self, *, wait: bool = True) -> None:

@@ -6,20 +6,25 @@ It must not read files; of the one it came from it holds the text, for the place
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from voxdisplay import voxelization
 from voxdisplay.curves import Transformed
-from voxdisplay.errors import SceneError
+from voxdisplay.errors import CurveError, SceneError
+from voxdisplay.frame import Drawing, Frame
+from voxdisplay.raster.grid import Grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from voxdisplay.curves import Curve
-    from voxdisplay.errors import CurveError
-    from voxdisplay.raster.grid import Grid
     from voxdisplay.scene.json_text import JsonText
+    from voxdisplay.voxelization import Sequence
+
+DEFAULT_SIZE = Grid(128, 128, 128)
+"""Size of the picture of a scene that names none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +72,70 @@ class Scene:
 
     size: Grid | None
     items: tuple[SceneItem, ...]
+
+    def voxelize(self, **options: Any) -> list[Sequence]:
+        """Return the sequences of all items, which are voxelised together.
+
+        Parameters
+        ----------
+        **options
+            Of `voxdisplay.voxelize`.
+
+        Raises
+        ------
+        SceneError
+            If a curve cannot be evaluated or drawn; it names the object.
+
+        """
+        try:
+            return voxelization.voxelize_many((item.curve for item in self.items), **options)
+        except CurveError:
+            # Voxelised together, they fail together: one by one, to name the object.
+            for item in self.items:
+                try:
+                    voxelization.voxelize(item.curve, **options)
+                except CurveError as error:
+                    raise item.scene_error(error) from error
+            raise
+
+    def draw_on(self, frame: Frame, *, fit: Literal["contain", "none"] = "contain") -> Drawing:
+        """Draw all items on a frame: `Frame.draw` of a scene.
+
+        Parameters
+        ----------
+        frame : Frame
+        fit : {"contain", "none"}
+            As of `fitted`.
+
+        Returns
+        -------
+        Drawing
+            The sums of all items.
+
+        Raises
+        ------
+        SceneError
+            As of `voxelize`.
+
+        """
+        fitted, _ = self.fitted(frame.grid, fit)
+        drawings = [
+            frame.draw(sequence, item.color)
+            for sequence, item in zip(fitted.voxelize(), fitted.items, strict=True)
+        ]
+        return Drawing(
+            voxels=sum(drawing.voxels for drawing in drawings),
+            clipped=sum(drawing.clipped for drawing in drawings),
+            exact_color=all(drawing.exact_color for drawing in drawings),
+            undefined=tuple(point for drawing in drawings for point in drawing.undefined),
+            jumps=tuple(t for drawing in drawings for t in drawing.jumps),
+        )
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture for notebooks; None without Pillow."""
+        frame = Frame(self.size or DEFAULT_SIZE)
+        self.draw_on(frame)
+        return frame._repr_png_()
 
     def fitted(
         self, grid: Grid, mode: Literal["contain", "none"] = "contain"

@@ -115,6 +115,12 @@ class Sequence:
     def __len__(self) -> int:
         return len(self.voxels)
 
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture for notebooks, in its bounding box; None without Pillow."""
+        from voxdisplay.view.rich_display import voxels_png  # noqa: PLC0415 - needs an extra
+
+        return voxels_png(self.voxels)
+
     @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Distance of every voxel's centre from the curve, in voxels: (N,)."""
