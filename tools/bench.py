@@ -137,8 +137,8 @@ def push_once(data: bytes, display: vd.Display, link: Stopwatch) -> dict[str, fl
     marks.append(time.perf_counter())
     link.seconds = 0.0
     ticket = display._connection.link.present(payloads)  # noqa: SLF001 - a stage of present()
-    while not display._queue.is_shown(ticket):  # noqa: SLF001
-        display._pump()  # noqa: SLF001
+    while not display._operations.queue.is_shown(ticket):  # noqa: SLF001
+        display._operations.pump()  # noqa: SLF001
     marks.append(time.perf_counter())
     names = ("parse", "voxelise", "draw", "encode", "digest", "pipe")
     stages = {

@@ -97,9 +97,9 @@ def test_none_of_the_rates(uart, monkeypatch):
 def test_a_port_without_a_rate_is_opened_as_it_is(kind, monkeypatch):
     notes = []
     with CARRIERS[kind]() as (transport, peer):
-        monkeypatch.setattr(baud, "open_transport", lambda _port, **_baud: transport)
+        monkeypatch.setattr(baud, "open_transport", lambda _port, **_options: transport)
         assert baud.open_at_best_rate("a port", 1.0, notes.append) is transport
-        assert notes == ["a port is no line that has a rate"]
+        assert notes == ["a port has no baud rate"]
         transport.write(b"x", 1.0)
         assert peer.read(1) == b"x", "and nothing was said before"
 

@@ -1,1 +1,1 @@
-"""Displays as users hold them: opening, sessions, frames on their way, and proof."""
+"""Displays as users hold them: opening, sessions, queued frames, reading back, waiting."""

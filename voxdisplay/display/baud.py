@@ -1,8 +1,8 @@
-"""The rate of a serial line that nobody has told: found by asking.
+"""Detection of a serial line's baud rate.
 
-A device does not say at which rate it listens, and answers at that one only (protocol.md,
-section 16). So HELLO is said at one rate after the other, the fastest first; what arrives at a
-wrong rate is a damaged segment, which changes nothing. Knows ports and HELLO; knows no frames.
+A device listens, and answers, at one rate only and does not announce it (protocol.md, section 16).
+So HELLO is sent at one common rate after the other, the fastest first; what arrives at a wrong rate
+is a damaged segment, which changes nothing. Must not know frames.
 """
 
 from __future__ import annotations
@@ -24,25 +24,32 @@ RATES: Final = (
     12_000_000, 8_000_000, 6_000_000, 4_000_000, 3_000_000, 2_000_000, 1_500_000, 1_000_000,
     921_600, 500_000, 460_800, 230_400, 115_200, 57_600, 38_400, 19_200, 9_600,
 )  # fmt: skip
-_RATE_TIMEOUT_S = 0.35  # long enough for two HELLOs, should the first one's answer begin with noise
+_RATE_TIMEOUT_S = 0.35  # long enough for two HELLOs, should noise damage the first one's answer
 ALL_RATES_S: Final = len(RATES) * _RATE_TIMEOUT_S
 
 
 def open_at_rate(
-    port: str, baud: Baud, timeout_s: float, note: Callable[[str], None] = lambda _text: None
+    port: str,
+    baud: Baud,
+    timeout_s: float,
+    note: Callable[[str], None] = lambda _text: None,
+    *,
+    reset: bool = True,
 ) -> Transport:
     """Open a port at a rate, or at the best one: see `open_at_best_rate`."""
     if baud == "auto":
-        return open_at_best_rate(port, timeout_s, note)
-    return open_transport(port, baud=baud)
+        return open_at_best_rate(port, timeout_s, note, reset=reset)
+    return open_transport(port, baud=baud, reset=reset)
 
 
-def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) -> Transport:
+def open_at_best_rate(
+    port: str, timeout_s: float, note: Callable[[str], None], *, reset: bool = True
+) -> Transport:
     """Open a port at the fastest common rate at which the device behind it answers.
 
-    The port is opened once, so that a board that restarts then does so once. A device that is
-    still starting is asked again at all rates, until ``timeout_s`` is over; every rate is tried at
-    least once. A port without a rate (a pty, TCP, USB) is opened as it is.
+    The port is opened once, because boards may restart when it is. A device that is still starting
+    is asked again at all rates until ``timeout_s`` has passed; every rate is tried at least once. A
+    port without a rate (a pty, TCP, USB) is opened as it is.
 
     Parameters
     ----------
@@ -51,7 +58,9 @@ def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) 
     timeout_s : float
         How long the device may take to answer, besides the time to try all rates.
     note : callable
-        Is told, in a line, what was found.
+        Called with a line of text that names the rate.
+    reset : bool
+        See `open_transport`.
 
     Raises
     ------
@@ -63,11 +72,11 @@ def open_at_best_rate(port: str, timeout_s: float, note: Callable[[str], None]) 
         If it goes away meanwhile.
 
     """
-    transport = open_transport(port, baud=DEFAULT_BAUD)
+    transport = open_transport(port, baud=DEFAULT_BAUD, reset=reset)
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415 - loads pyserial
 
     if not isinstance(transport, SerialTransport) or not transport.has_baud_rate:
-        note(f"{port} is no line that has a rate")
+        note(f"{port} has no baud rate")
         return transport
     try:
         _find_rate(transport, timeout_s)
@@ -90,7 +99,7 @@ def _find_rate(transport: SerialTransport, timeout_s: float) -> None:
             rates = f"{tried[-1]} to {tried[0]} Bd" if tried else "any rate: the port refuses all"
             raise TransportTimeout(
                 f"{transport.port}: nothing answered HELLO at {rates}",
-                hint="is the display switched on, and this its port? Its own rate: --baud RATE",
+                hint="is the display switched on, and is this its port? Another rate: --baud RATE",
             )
 
 

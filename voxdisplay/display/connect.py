@@ -1,27 +1,29 @@
-"""Opening a display by the name of its port: at which rate, and who waits if it goes away.
-
-Knows no frames, and leaves the pipe's kind to `voxdisplay.transport`.
-"""
+"""``vd.open``: a display by the name of its port. Must not know frames."""
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
-from typing import Literal, TextIO
+from typing import Any, Final, Literal, TextIO
 
 from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.display import TIMEOUT_S, Display
-from voxdisplay.display.reconnect import Reconnector
+from voxdisplay.display.reconnect import Reconnector, open_when_available
 from voxdisplay.transport import Transport
+
+DEFAULT_PORT: Final = "sim:"
+PORT_VARIABLE: Final = "VOXDISPLAY_PORT"
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
-    port: str | Transport,
+    port: str | os.PathLike[str] | Transport | None = None,
     *,
     baud: int | Literal["auto"] = DEFAULT_BAUD,
     timeout_s: float = TIMEOUT_S,
     reconnect_s: float = 0.0,
+    no_reset: bool = False,
     note: Callable[[str], None] | None = None,
     capture: TextIO | None = None,
     clock: Clock = time.monotonic,
@@ -30,23 +32,29 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
 
     Parameters
     ----------
-    port : str or Transport
-        ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, or an open
-        pipe, which is closed with the display.
+    port : str, path or Transport, optional
+        ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, an entry of a
+        list of ports, or an open pipe, which is closed with the display. By default what the
+        environment variable VOXDISPLAY_PORT names, else ``sim:``, the built-in emulator.
     baud : int or "auto"
         Bits per second of a serial line; ``"auto"`` for the fastest common one at which the device
         answers: see `voxdisplay.display.baud`.
     timeout_s : float
         How long the device may be silent.
     reconnect_s : float
-        How long a device that is pulled out is waited for. When the same device is back, it gets
-        its picture again, whole, and all goes on. 0: it is not waited for.
+        How long a device that is not there is waited for: when the display is opened, and when it
+        is unplugged later. When the same device is back, it gets its picture again, whole, and all
+        goes on. 0: it is not waited for.
+    no_reset : bool
+        Leave DTR and RTS of a serial line alone, on which many boards restart. (Linux raises both
+        all the same when a port is opened for the first time.)
     note : callable, optional
-        Is told, in a line, when a device is lost and when it is back, and what rate was found.
+        Called with a line of text when a device is lost, waited for or back, when a rate was found,
+        and when `Display.close` could not show the last frame.
     capture : text file, optional
-        Gets all bytes to and from the device, with times: see `voxdisplay.transport.capture`.
+        Receives all bytes to and from the device, with times: see `voxdisplay.transport.capture`.
     clock : callable
-        Gives seconds, on any steady clock.
+        Returns seconds, on any monotonic clock.
 
     Raises
     ------
@@ -55,19 +63,59 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     TransportTimeout
         If nothing behind it answers HELLO.
     IncompatibleDevice
-        If it speaks another protocol major, or has a pixel format we do not know.
+        If the device speaks another protocol major, or has an unknown pixel format.
 
     """
-    note = note or (lambda _text: None)
-    transport = open_at_rate(port, baud, timeout_s, note) if isinstance(port, str) else port
-    try:
-        reconnect = None
-        if reconnect_s:
-            rate = getattr(transport, "baud", DEFAULT_BAUD)
-            reconnect = Reconnector(transport.port, reconnect_s, baud=rate, note=note)
-        return Display(
-            transport, timeout_s=timeout_s, reconnect=reconnect, capture=capture, clock=clock
-        )
-    except BaseException:
-        transport.close()
-        raise
+    opened = _as_port(port)
+    note_or_not = note or (lambda _text: None)
+
+    def attempt() -> Display:
+        if isinstance(opened, str):
+            transport = open_at_rate(opened, baud, timeout_s, note_or_not, reset=not no_reset)
+        else:
+            transport = opened
+        try:
+            reconnector = None
+            if reconnect_s:
+                rate = getattr(transport, "baud", DEFAULT_BAUD)
+                reconnector = Reconnector(
+                    transport.port, reconnect_s, baud=rate, note=note, reset=not no_reset
+                )
+            return Display(
+                transport,
+                timeout_s=timeout_s,
+                reconnector=reconnector,
+                note=note,
+                capture=capture,
+                clock=clock,
+            )
+        except BaseException:
+            transport.close()
+            raise
+
+    if reconnect_s and isinstance(opened, str):
+        return open_when_available(attempt, reconnect_s, note_or_not)
+    return attempt()
+
+
+def _as_port(port: Any) -> str | Transport:
+    """Return the name of a port, or an open pipe; raise `TypeError` for anything else."""
+    if port is None:
+        return os.environ.get(PORT_VARIABLE) or DEFAULT_PORT
+    if isinstance(port, str):
+        return port
+    if isinstance(port, os.PathLike):
+        return os.fsdecode(port)
+    if type(port).__module__.partition(".")[0] != "serial" and all(
+        hasattr(port, name) for name in ("port", "read", "write", "close")
+    ):
+        pipe: Transport = port
+        return pipe
+    # Entries of lists of ports: of pyserial's, and of `voxdisplay.transport.discovery`.
+    for name in ("device", "port"):
+        if isinstance(listed := getattr(port, name, None), str) and not hasattr(port, "write"):
+            return listed
+    raise TypeError(
+        f"port is a {type(port).__name__}: name it by text, such as 'sim:' or '/dev/ttyUSB0', or "
+        "give an open voxdisplay transport"
+    )

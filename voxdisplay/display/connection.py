@@ -1,37 +1,39 @@
-"""One device behind a pipe: a `Link` pumped over a `Transport`, through loss and return.
+"""Session with one device behind a pipe: a `Link` pumped over a `Transport`, through reconnects.
 
-It writes only what the device has room for, so that writing cannot block against the device's
-answers. It knows when to wait, and who is there; it knows no pictures, and what is to be sent or
-sent again is the business of others.
+It writes only what the device has room for, so that a write cannot deadlock against the device's
+answers. Must not know pictures; what is to be sent is decided elsewhere.
 """
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TextIO, TypeAlias
 
 from voxdisplay.display.device_info import DeviceInfo, check_compatible, device_info
-from voxdisplay.display.handshake import closed_before_info, random_session
+from voxdisplay.display.handshake import closed_before_info, closed_meanwhile, random_session
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import IncompatibleDevice, TransportClosed, TransportError, TransportTimeout
 from voxdisplay.link import Event, FrameShown, Link, PageReceived, SessionOpened
 from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 
-_LONGEST_WAIT_S = 0.5
+_MAX_WAIT_S = 0.5
+# Of a line that has no known rate and was not measured either: that of 9600 Bd.
+_SLOW_BYTES_PER_S = 960.0
 
 Clock: TypeAlias = Callable[[], float]
 
 
 @dataclass(frozen=True, slots=True)
 class Reconnected:
-    """The device was gone; it is back, behind a new pipe, and may have forgotten its picture."""
+    """The device is back behind a new pipe, and may have lost its picture."""
 
 
 class Connection:
-    """A session with a device, open.
+    """Open session with a device.
 
     Parameters
     ----------
@@ -39,12 +41,12 @@ class Connection:
         An open pipe to the device.
     timeout_s : float
         How long the device may be silent.
-    reconnect : Reconnect or None
-        Who waits for a device that has gone away, and finds it again.
+    reconnector : Reconnector or None
+        Finds a device again that has gone away.
     capture : text file or None
-        Gets all bytes to and from the device.
+        Receives all bytes to and from the device.
     clock : callable
-        Gives seconds, on any steady clock.
+        Returns seconds, on any monotonic clock.
 
     Attributes
     ----------
@@ -52,8 +54,7 @@ class Connection:
         The name the pipe was opened by.
     link : Link
     info : DeviceInfo
-        What the device said of itself.
-    renewals : int
+    reconnects : int
         How often the device was gone and has come back.
     closed : bool
 
@@ -64,28 +65,31 @@ class Connection:
         transport: Transport,
         *,
         timeout_s: float,
-        reconnect: Reconnector | None,
+        reconnector: Reconnector | None,
         capture: TextIO | None,
         clock: Clock,
     ) -> None:
         self.port = transport.port
         self.reconnects = 0
         self.closed = False
+        self._owner_pid = os.getpid()
+        self._cancelled = False
         self._clock = clock
         self._timeout_s = timeout_s
         self._capture = capture
+        self._pipe = transport
         self._transport = self._with_capture(transport)
-        self._reconnector: Reconnector | None = None  # not before the device is known
+        self._reconnector: Reconnector | None = None  # none before the device is known
         self._events: deque[Event | Reconnected] = deque()
-        self.link = self._new_link()
+        self.link = self._new_link(timeout_s)
         self.info = self._open_session()
-        self._reconnector = reconnect
+        self._reconnector = reconnector
 
     def _with_capture(self, transport: Transport) -> Transport:
         return Capture(transport, self._capture) if self._capture else transport
 
-    def _new_link(self) -> Link:
-        return Link(random_session(), self._clock(), timeout_s=self._timeout_s)
+    def _new_link(self, timeout_s: float) -> Link:
+        return Link(random_session(), self._clock(), timeout_s=timeout_s)
 
     def _open_session(self) -> DeviceInfo:
         try:
@@ -94,55 +98,80 @@ class Connection:
         except TransportTimeout as error:
             raise TransportTimeout(f"{self.port}: {error}", hint=error.hint) from error
         except TransportClosed as error:
-            raise closed_before_info(error, self.link.stream.noise) from error
+            raise closed_before_info(error, self.link) from error
         assert self.link.info is not None  # noqa: S101 - ready
         return device_info(self.link.info)
 
     @property
     def bytes_per_s(self) -> float | None:
-        """What the line carries: as it was seen, or else as its pipe says; None if neither."""
-        return self.link.bytes_per_s or getattr(self._transport, "bytes_per_s", None)
+        """Rate of the line: as measured, else as its pipe knows it; None if neither."""
+        return self.link.bytes_per_s or getattr(self._pipe, "bytes_per_s", None)
+
+    @property
+    def is_inherited(self) -> bool:
+        """True in a process that was forked off the one that opened the connection."""
+        return os.getpid() != self._owner_pid
+
+    def cancel(self) -> None:
+        """Have `pump` raise `LocalProtocolError` in whichever thread it runs, soon."""
+        self._cancelled = True
 
     def pump(self, *, wait: bool) -> None:
-        """Write what may be written, wait for an answer or the time to ask, take what comes."""
+        """Write what may be written, and read what has come.
+
+        Parameters
+        ----------
+        wait : bool
+            Whether to wait for an answer, until something is to be sent again.
+
+        Raises
+        ------
+        TransportError
+            If the pipe fails and the device is not waited for, or does not come back.
+        LocalProtocolError
+            If the connection was cancelled.
+
+        """
+        if self._cancelled:
+            raise closed_meanwhile()
         try:
             self._exchange(wait=wait)
         except (TransportClosed, TransportTimeout) as error:
             self._wait_for_device(error)
 
     def _exchange(self, *, wait: bool) -> None:
-        if not wait:  # the caller was away: what has come since is not to count as newer than this
+        if not wait:  # bytes that came while the caller was away must not count as newer than now
             self._receive(0.0)
         if out := self.link.transmit(self._clock()):
             self._transport.write(out, self._timeout_s)
         if wait:
             wait_s = self.link.next_timeout(self._clock())
-            self._receive(_LONGEST_WAIT_S if wait_s is None else min(wait_s, _LONGEST_WAIT_S))
+            self._receive(_MAX_WAIT_S if wait_s is None else min(wait_s, _MAX_WAIT_S))
 
     def _receive(self, wait_s: float) -> None:
         data = self._transport.read(wait_s)
         self._events += self.link.receive(data, self._clock())
 
     def _wait_for_device(self, error: TransportError) -> None:
-        """Wait for the device to come back."""
         if self._reconnector is None:
             raise error
         self._transport.close()
-        self._transport = self._with_capture(
-            self._reconnector.wait_for_device(error, self.info.serial)
+        self._pipe = self._reconnector.wait_for_device(
+            error, self.info.serial, lambda: self._cancelled
         )
+        self._transport = self._with_capture(self._pipe)
         self.port = self._transport.port
         self.reconnects += 1
         self.link.resume(self._clock())
         self._events.append(Reconnected())
 
     def events(self) -> Iterator[Event | Reconnected]:
-        """Give what has happened, each thing once; what is not taken is kept.
+        """Yield the events since the last call; those that are not consumed are kept.
 
         Raises
         ------
         IncompatibleDevice
-            If another device is behind the port now: what waits to be sent is not for it.
+            If another device is behind the port now, for which the queued frames are not meant.
 
         """
         while self._events:
@@ -150,12 +179,12 @@ class Connection:
             if self._reconnector and isinstance(event, FrameShown | PageReceived):
                 self._reconnector.reset_deadline()
             if isinstance(event, SessionOpened) and self.link.counters.sessions > 1:
-                self._check_same(event)
+                self._check_compatible(event)
             yield event
 
-    def _check_same(self, ready: SessionOpened) -> None:
+    def _check_compatible(self, opened: SessionOpened) -> None:
         try:
-            now = device_info(ready.info)
+            now = device_info(opened.info)
             check_compatible(self.info, now)
         except IncompatibleDevice:
             self.close()
@@ -163,16 +192,28 @@ class Connection:
         self.info = now
 
     def restart(self, within_s: float) -> None:
-        """Open a new session at once, with all that is on its way dropped.
+        """Open a new session, and drop all queued frames.
 
-        The device is not waited for any more if it goes away, and if it is silent, no longer than
-        so many seconds.
+        What the system has not put on the line yet is dropped, too. The device gets the time for
+        what is on the line already, as HELLO waits behind it.
+
+        Parameters
+        ----------
+        within_s : float
+            How long the device may be silent besides, and later. It is not waited for any more if
+            it goes away.
+
         """
         self._reconnector = None
+        self._cancelled = False
         self._timeout_s = min(self._timeout_s, within_s)
+        bytes_per_s = self.bytes_per_s or _SLOW_BYTES_PER_S
+        drain_s = self.link.in_flight_bytes / bytes_per_s
+        if discard := getattr(self._pipe, "discard_output", None):
+            discard()
         self._events.clear()
-        self.link = self._new_link()
-        self._open_session()
+        self.link = self._new_link(self._timeout_s + drain_s)
+        self.info = self._open_session()
 
     def close(self) -> None:
         """Close the pipe. Twice is fine."""

@@ -1,8 +1,8 @@
-"""The frames of one display: which is on display, which are on their way, which comes next.
+"""Queue of frames of one display: displayed, in transmission, pending.
 
-A frame is coded in portions while it is sent, whole or as its difference from what is known to be
-on display; of frames that nobody waits for, the newest is begun when the line needs one. Knows what
-is proved, and what must be shown again. It never waits, never reads back, and knows no bytes.
+A frame is encoded in portions while it is sent, in full or as its difference from what is proved to
+be displayed. Of frames that nobody waits for, the newest is started when the line needs one. Must
+not wait, read back, or know bytes.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from voxdisplay.frame import Frame
 from voxdisplay.link import PictureId
 from voxdisplay.wire.features import UNKNOWN_BYTES_PER_S, select_features
 
-# So many lit voxels for a byte of difference, and the whole frame surely takes more bytes.
+# With so many lit voxels for each byte of the difference, the full frame surely takes more bytes.
 _LIT_PER_DIFFERENCE_BYTE = 64
-# One that the device shows at its next tick, and one behind it.
+# One frame that the device shows at its next refresh tick, and one behind it.
 _MAX_UNSHOWN = 2
-_NO_PICTURE: PictureId = (0, 0)  # is never on display
+_NO_PICTURE: PictureId = (0, 0)  # is never displayed
 
 
 class FrameQueue:
-    """What a display is to show.
+    """Frames that a display is to show.
 
     Parameters
     ----------
     connection : Connection
-        The display. Its link is given payloads; who turns it tells what comes back.
+        The device. Its link is given payloads; whoever pumps it reports its events here.
 
     Attributes
     ----------
     frames : int
-        How many frames have been shown.
+        Number of frames that have been displayed.
 
     """
 
@@ -44,43 +44,43 @@ class FrameQueue:
         self.frames = 0
         self._connection = connection
         self._link = connection.link
-        self._last: Frame | None = None  # that was shown
+        self._last: Frame | None = None  # that was displayed
         self._shown: dict[int, int | None] = {}  # ticket -> digest
-        self._unwaited: dict[int, Frame] = {}  # ticket -> the frame, as it was
+        self._unwaited: dict[int, Frame] = {}  # ticket -> a copy of the frame
         self._displayed: tuple[Frame, PictureId] | None = None
-        self._pending: Frame | None = None  # handed over, and not begun
+        self._pending: Frame | None = None  # handed over, and not started
         self._encoder: _Encoder | None = None
-        self._wrong_in_a_row = 0  # frames that nobody waited for, in a row
+        self._wrong_in_a_row = 0  # of unwaited frames
 
     # -- in
 
     def enqueue(self, frame: Frame) -> int:
-        """Give a frame to the link: whole, or as its difference from what is on display.
+        """Start a frame and return its ticket.
 
-        It must stay as it is until it is shown. Gives its ticket.
+        It is sent in full, or as its difference from what is displayed, whichever is shorter. It
+        must not change until it is displayed.
         """
-        link, known = self._link, self.displayed
-        if known and not link.backlog:
-            whole = cache(partial(self.payloads, frame))
+        link, displayed = self._link, self.displayed
+        if displayed and not link.backlog:
+            full_payloads = cache(partial(self.payloads, frame))
             lit = len(frame.lit()[0])
-            if 2 * len(frame.changed_indices(known)) < lit:
-                payloads = frame.difference(known, link.payload_bytes, self._features)
+            if 2 * len(frame.changed_indices(displayed)) < lit:
+                payloads = frame.difference(displayed, link.payload_bytes, self._features)
                 size = sum(map(len, payloads))
-                # Where there is next to nothing to be sent, the whole frame need not be coded.
-                if size * _LIT_PER_DIFFERENCE_BYTE < lit or size < sum(map(len, whole())):
-                    return link.present_difference(link.displayed, payloads, whole)
-                return link.present(whole())
+                if size * _LIT_PER_DIFFERENCE_BYTE < lit or size < sum(map(len, full_payloads())):
+                    return link.present_difference(link.displayed, payloads, full_payloads)
+                return link.present(full_payloads())
         ticket = link.open_frame()
         coded = frame.iter_payloads(link.payload_bytes, self._features, self._bytes_per_s)
         self._encoder = _Encoder(ticket, coded)
         return ticket
 
     def replace_pending(self, frame: Frame) -> None:
-        """Show a frame when the line needs one, if no newer one comes first."""
+        """Have a copy of a frame started when the line needs one, unless a newer one follows."""
         self._pending = frame.copy()
 
     def payloads(self, frame: Frame) -> list[bytes]:
-        """Code a frame for this device and its line."""
+        """Return a frame encoded for this device and its line."""
         return frame.payloads(self._link.payload_bytes, self._features)
 
     @property
@@ -95,25 +95,30 @@ class FrameQueue:
 
     @property
     def busy(self) -> bool:
-        """Whether a frame that was handed over is neither on display nor skipped."""
+        """True if a frame is neither displayed nor skipped."""
         return bool(self._link.backlog or self._pending)
 
     @property
+    def has_unwaited(self) -> bool:
+        """True if that holds of a frame that nobody waits for."""
+        return bool(self._pending or (self._unwaited and self._link.backlog))
+
+    @property
     def encoding(self) -> bool:
-        """Whether a frame is being coded."""
+        """True if a frame is being encoded."""
         return self._encoder is not None
 
     def encode(self) -> None:
-        """Code a part of a frame; begin the newest if there is none and the line needs it."""
-        if not self._encoder:  # an interrupt: what was lost by it nobody gives again
+        """Encode a portion of a frame; start the pending one if the line needs it."""
+        if not self._encoder:  # after an interrupt, nobody supplies the rest of an open frame
             self._link.abandon_open_frame()
         if self._pending and not self._encoder and self._may_start:
             frame, self._pending = self._pending, None
             self._unwaited[self.enqueue(frame)] = frame
-        if coder := self._encoder:
+        if encoder := self._encoder:
             try:
-                payloads = next(coder.payloads, None)
-                self._link.append_payloads(coder.ticket, payloads or [], last=payloads is None)
+                payloads = next(encoder.payloads, None)
+                self._link.append_payloads(encoder.ticket, payloads or [], last=payloads is None)
             except BaseException:
                 self._encoder = None
                 raise
@@ -122,53 +127,53 @@ class FrameQueue:
 
     @property
     def _may_start(self) -> bool:
-        """Whether another frame keeps the line busy; more would make the display lag behind."""
+        """True if another frame keeps the line busy, and the display does not lag behind by it."""
         return self._link.ready and self._link.backlog < _MAX_UNSHOWN and self._link.needs_frame
 
-    # -- on display
+    # -- displayed
 
     @property
     def displayed(self) -> Frame | None:
-        """What is on display, as far as it is proved; not to be changed."""
+        """What is displayed, if that is proved; must not be changed."""
         if self._displayed and self._displayed[1] == self._link.displayed:
             return self._displayed[0]
         return None
 
-    def set_displayed(self, frame: Frame, place: PictureId) -> None:
-        """Note that a frame is what the link calls so."""
-        self._displayed = frame, place
+    def set_displayed(self, frame: Frame, picture: PictureId) -> None:
+        """Record that a frame is what the link calls ``picture``."""
+        self._displayed = frame, picture
 
     def forget_displayed(self) -> None:
-        """Note that nobody knows what is on display."""
+        """Record that it is unknown what is displayed."""
         self._displayed = None
 
     def confirm(self, frame: Frame, ticket: int, digest: int | None) -> None:
-        """Note that a frame which was waited for is on display; no digest proves nothing."""
+        """Record that a frame that was waited for is displayed; without digest, unproved."""
         self._last = frame
         self.frames += 1
         self._set_shown(frame, ticket, digest)
 
     def _set_shown(self, frame: Frame, ticket: int, digest: int | None) -> None:
-        place = self._link.counters.sessions, ticket
-        self._displayed = None if digest is None else (frame, place)
+        picture = self._link.counters.sessions, ticket
+        self._displayed = None if digest is None else (frame, picture)
 
-    # -- what has happened
+    # -- events
 
     def is_shown(self, ticket: int) -> bool:
-        """Tell whether a frame is on display, or has been; `digest_of` then gives its digest."""
+        """Return whether a frame is or was displayed; `take_digest` then returns its digest."""
         return ticket in self._shown
 
     def take_digest(self, ticket: int) -> int | None:
-        """Give the digest that the device gave for a frame, once."""
+        """Return the digest that the device reported for a frame, once."""
         return self._shown.pop(ticket)
 
     def note_shown(self, ticket: int, digest: int | None) -> None:
-        """Note that the device shows a frame.
+        """Record that the device displays a frame.
 
         Raises
         ------
         DesyncError
-            If nobody waited for it, and for the second time in a row it is not what was meant.
+            If nobody waited for it, and the digest differs for the second time in a row.
 
         """
         if ticket in self._unwaited:
@@ -177,37 +182,39 @@ class FrameQueue:
             self._shown[ticket] = digest
 
     def _note_unwaited_shown(self, ticket: int, digest: int | None) -> None:
-        """Note that a frame which nobody waited for is on display, and all before it are over."""
+        """Record that an unwaited frame is displayed, and all before it are finished."""
         frame = self._unwaited[ticket]
-        again = frame is self._last  # after a renewal, or as it was shown wrongly
+        again = frame is self._last  # after a reconnect, or because it was displayed wrongly
         self._last, self._displayed = frame, None
         self._unwaited = {later: f for later, f in self._unwaited.items() if later > ticket}
         self.frames += not again
-        if digest is None or digest == (meant := frame.digest()):
+        if digest is None or digest == (expected := frame.digest()):
             self._wrong_in_a_row = 0
             self._set_shown(frame, ticket, digest)
             return
         self._wrong_in_a_row += 1
         if self._wrong_in_a_row > 1:
-            raise DesyncError(describe_wrong_digest(digest, meant), hint=WRONG_TWICE_HINT)
-        if not self.busy:  # else the next one mends it
+            raise DesyncError(describe_wrong_digest(digest, expected), hint=WRONG_TWICE_HINT)
+        if not self.busy:  # otherwise the next frame repairs it
             self._pending = frame
 
     def note_reconnect(self) -> None:
-        """Note that the device is back: it gets its last picture, if nothing else is to come."""
+        """Have the last displayed frame sent again, unless another is queued."""
         if self._last and not self._link.backlog:
-            # Coded when the device is there, and its line known.
-            whole = partial(self.payloads, self._last)
-            self._unwaited[self._link.present_difference(_NO_PICTURE, [], whole)] = self._last
+            # Encoded when its turn comes: then the device is there, and its line known.
+            full_payloads = partial(self.payloads, self._last)
+            ticket = self._link.present_difference(_NO_PICTURE, [], full_payloads)
+            self._unwaited[ticket] = self._last
 
     def note_refusal(self) -> None:
-        """Note that the device has refused a packet: the link has dropped all frames."""
+        """Record that the device refused a packet, and that the link has dropped all frames."""
         self._encoder = None
+        self._unwaited.clear()
 
 
 @dataclass(frozen=True, slots=True)
 class _Encoder:
-    """A frame that is being coded: its payloads as they are ready, and the link's ticket."""
+    """Frame that is being encoded: the link's ticket, and the payloads as they get ready."""
 
     ticket: int
     payloads: Iterator[list[bytes]]

@@ -1,4 +1,7 @@
-"""What a display shows against what was meant: words for both outcomes. Knows no display."""
+"""Receipt of a displayed frame, and the description of one that is displayed wrongly.
+
+Must not know the display.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-WRONG_TWICE_HINT = "the device does not draw what protocol.md says, or its memory is faulty"
+WRONG_TWICE_HINT = "the device does not draw as protocol.md requires, or its memory is faulty"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Receipt:
     """What it took to show a frame.
 
@@ -21,15 +24,15 @@ class Receipt:
     voxels : int
         Lit voxels.
     packets, retransmitted : int
-        DATA packets, and how many had to be sent again.
+        DATA packets, and retransmissions of them.
     wire_bytes : int
         All bytes sent.
     elapsed_s : float
-        From handing the frame over to the device's word that it is on display.
+        From the call of `Display.present` to the device's report that the frame is displayed.
     digest : int or None
-        What the device says it shows; it has been compared. None if the device gives none.
+        The device's digest of what it displays, which has been compared. None if it has none.
     repaired : str or None
-        What the display showed at first, if that was something else and the frame was sent again.
+        What the display showed at first, if that was wrong and the frame was sent again.
 
     """
 
@@ -42,15 +45,24 @@ class Receipt:
     digest: int | None
     repaired: str | None = None
 
+    def __repr__(self) -> str:
+        """Return it in one line: ``<Receipt of frame 3: 168 voxels, 412 bytes, 12.3 ms, ...>``."""
+        parts = [f"{self.voxels} voxels", f"{self.wire_bytes} bytes in {self.packets} packets"]
+        parts += [f"{1000 * self.elapsed_s:.1f} ms"]
+        parts += [f"{self.retransmitted} retransmitted"] if self.retransmitted else []
+        parts += ["no digest" if self.digest is None else f"digest {self.digest:08x}"]
+        parts += ["repaired"] if self.repaired else []
+        return f"<Receipt of frame {self.frame}: {', '.join(parts)}>"
 
-def describe_wrong_digest(digest: int, meant: int) -> str:
-    """Say that two digests differ, in one line."""
-    return f"the display's digest is {digest:08x}, the frame's {meant:08x}"
+
+def describe_wrong_digest(digest: int, expected: int) -> str:
+    """Return a line that names two digests which differ."""
+    return f"the display's digest is {digest:08x}, the frame's {expected:08x}"
 
 
-def describe_difference(meant: NDArray[np.generic], got: NDArray[np.generic]) -> str:
-    """Say where two arrays [z, y, x] differ, in one line; nothing if they do not."""
-    differs = meant != got
+def describe_difference(expected: NDArray[np.generic], found: NDArray[np.generic]) -> str:
+    """Return a line on where two arrays [z, y, x] differ; an empty one if they do not."""
+    differs = expected != found
     if differs.ndim == 4:
         differs = differs.any(axis=-1)
     places = np.argwhere(differs)
@@ -59,5 +71,5 @@ def describe_difference(meant: NDArray[np.generic], got: NDArray[np.generic]) ->
     z, y, x = places[0].tolist()
     return (
         f"{len(places)} voxels differ, the first at ({x}, {y}, {z}): "
-        f"{got[z, y, x]} instead of {meant[z, y, x]}"
+        f"{found[z, y, x]} instead of {expected[z, y, x]}"
     )

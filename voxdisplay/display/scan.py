@@ -1,4 +1,4 @@
-"""Asking at many ports at once who is there. Knows ports and HELLO; knows no frames."""
+"""Identification of the devices at many ports at once. Must not know frames."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from voxdisplay.display.device_info import DeviceInfo, device_info
 from voxdisplay.display.handshake import request_info
 from voxdisplay.errors import VoxDisplayError
 
-ProbeResult: TypeAlias = DeviceInfo | str  # who is there, or why nobody is
+ProbeResult: TypeAlias = DeviceInfo | str  # the device that answered, or why none did
 
 
 def probe_ports(
     ports: Iterable[str], *, baud: Baud, timeout_s: float, slack_s: float
 ) -> dict[str, ProbeResult]:
-    """Ask at all ports at once who is there.
+    """Return which device answers HELLO at each of many ports.
 
     Parameters
     ----------
@@ -26,32 +26,32 @@ def probe_ports(
     baud : int or "auto"
         Bits per second of serial lines; ``"auto"``: the fastest at which each answers.
     timeout_s : float
-        How long to ask.
+        How long to send HELLO.
     slack_s : float
         How much longer opening a port may take, besides the time to try all rates.
 
     Returns
     -------
     dict of str to DeviceInfo or str
-        What each device says of itself, or what is wrong, in the order of the ports.
+        The device, or the reason why none answered, in the order of the ports.
 
     """
-    answers: dict[str, ProbeResult] = dict.fromkeys(ports, "it could not be opened in time")
+    results: dict[str, ProbeResult] = dict.fromkeys(ports, "it could not be opened in time")
 
-    def ask(port: str) -> None:
+    def probe(port: str) -> None:
         try:
-            answers[port] = _probe(port, baud, timeout_s)
+            results[port] = _probe(port, baud, timeout_s)
         except VoxDisplayError as error:
-            answers[port] = str(error)
+            results[port] = str(error)
 
-    # One that hangs in the system's call must not keep the program.
-    askers = [threading.Thread(target=ask, args=(port,), daemon=True) for port in answers]
-    for asker in askers:
-        asker.start()
+    # Daemons, because a thread that hangs in a system call must not keep the program alive.
+    threads = [threading.Thread(target=probe, args=(port,), daemon=True) for port in results]
+    for thread in threads:
+        thread.start()
     end_s = time.monotonic() + timeout_s + slack_s + (ALL_RATES_S if baud == "auto" else 0.0)
-    for asker in askers:
-        asker.join(max(0.0, end_s - time.monotonic()))
-    return dict(answers)
+    for thread in threads:
+        thread.join(max(0.0, end_s - time.monotonic()))
+    return dict(results)
 
 
 def _probe(port: str, baud: Baud, timeout_s: float) -> DeviceInfo:

@@ -19,6 +19,7 @@ from serial.urlhandler import protocol_socket
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS
 
 if sys.platform != "win32":
+    import fcntl
     import termios
 
 _ENDED = "the port reads as ended: the device is disconnected, or another program reads it"
@@ -142,7 +143,14 @@ def _clear_hupcl(descriptor: int) -> None:
 
 
 def close_port(line: Any) -> None:
-    """Close all that a port has open: pyserial forgets some of it."""
+    """Close all that a port has open, and give it back whoever has inherited it by a fork.
+
+    pyserial closes its descriptor only. Its lock belongs to the open file, which a forked process
+    may still have; so it is released first.
+    """
+    if isinstance(line, serial.Serial) and sys.platform != "win32":
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            fcntl.flock(line.fileno(), fcntl.LOCK_UN)
     # A socket whose other end is gone, and the file that spy:// writes.
     forgotten = [getattr(line, "_socket", None), getattr(line, "formatter", None)]
     forgotten = [getattr(each, "output", each) for each in forgotten]
@@ -150,3 +158,13 @@ def close_port(line: Any) -> None:
         if each not in (None, sys.stdout, sys.stderr):
             with contextlib.suppress(*LIBRARY_ERRORS):  # it may be gone already
                 each.close()
+
+
+def abandon_port(line: Any) -> None:
+    """Close the descriptors that a fork has inherited, without a word to the line or the server."""
+    with contextlib.suppress(*LIBRARY_ERRORS):
+        if isinstance(line, serial.Serial):
+            line.close()
+        elif inherited := getattr(line, "_socket", None):
+            inherited.close()
+            line._socket, line.is_open = None, False  # noqa: SLF001 - else its end would speak

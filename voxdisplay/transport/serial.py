@@ -8,6 +8,7 @@ are polled. Why a port does not open is the business of `diagnosis`. Knows no pa
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from typing import Any
 
@@ -17,7 +18,7 @@ from voxdisplay.errors import TransportClosed, TransportTimeout
 from voxdisplay.transport.diagnosis import as_open_error
 from voxdisplay.transport.ftdi_latency import lower_latency
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
-from voxdisplay.transport.pyserial_ports import close_port, open_port
+from voxdisplay.transport.pyserial_ports import abandon_port, close_port, open_port
 from voxdisplay.transport.readiness import Readiness
 
 _READ_BYTES = 1 << 16
@@ -58,6 +59,7 @@ class SerialTransport:
     def __init__(self, port: str, *, baud: int = 115200, reset: bool = True) -> None:
         self.port = port
         self.baud = baud
+        self._owner_pid = os.getpid()
         try:
             # Of many kinds, with more than they share.
             self._serial: Any = open_port(port, baud=baud, timeout_s=_POLL_S, reset=reset)
@@ -189,11 +191,17 @@ class SerialTransport:
         for readiness in (self._readable, self._writable):
             if readiness is not None:
                 readiness.close()
+        if os.getpid() != self._owner_pid:
+            abandon_port(self._serial)
+            return
+        self.discard_output()  # a tty would wait half a minute for a device that takes nothing
+        close_port(self._serial)
+
+    def discard_output(self) -> None:
+        """Drop the bytes that the system has not put on the line yet, where it can."""
         if isinstance(self._serial, serial.Serial):
             with contextlib.suppress(*LIBRARY_ERRORS):
-                # A tty would wait half a minute for a device that takes nothing.
                 self._serial.reset_output_buffer()
-        close_port(self._serial)
 
 
 def _descriptor(line: Any) -> int | None:

@@ -6,6 +6,7 @@ Whether a server of serial lines speaks telnet there is found out from what it b
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import time
 from urllib.parse import urlsplit
@@ -37,6 +38,7 @@ class TcpTransport:
     def __init__(self, port: str) -> None:
         self.port = port
         self._telnet = TelnetDetector()
+        self._owner_pid = os.getpid()
         try:
             url = urlsplit(port)
             host, number = url.hostname, url.port
@@ -89,5 +91,8 @@ class TcpTransport:
 
     def close(self) -> None:
         """See `Transport.close`."""
+        if os.getpid() == self._owner_pid:
+            with contextlib.suppress(*LIBRARY_ERRORS):  # a forked process may still have it
+                self._socket.shutdown(socket.SHUT_RDWR)
         with contextlib.suppress(*LIBRARY_ERRORS):
             self._socket.close()

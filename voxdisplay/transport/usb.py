@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import re
 import time
 from collections.abc import Iterator
@@ -58,6 +59,7 @@ class UsbTransport:
         wanted = _DeviceSelector("usb:" if backend is not None else port)
         self.backend = find_backend(port) if backend is None else backend
         self._closed = False
+        self._owner_pid = os.getpid()
         self._consecutive_errors = 0
         self._claimed_interface: int | None = None
         self._detached_driver: int | None = None
@@ -172,6 +174,8 @@ class UsbTransport:
         if self._closed:
             return
         self._closed = True
+        if os.getpid() != self._owner_pid:  # the process that opened it may still use it
+            return
         with contextlib.suppress(*LIBRARY_ERRORS):  # it may be gone
             if self._claimed_interface is not None:
                 usb.util.release_interface(self._device, self._claimed_interface)
@@ -244,7 +248,7 @@ def _select_device(port: str, wanted: _DeviceSelector, backend: Any) -> usb.core
         f"{port}: there is no such display on USB",
         port=port,
         hint=f"there is {named}" if named else "is it plugged in, and switched on?",
-    )
+    ) from FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))  # it may be waited for
 
 
 def _display_devices(backend: Any) -> list[usb.core.Device]:

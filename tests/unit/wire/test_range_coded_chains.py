@@ -84,6 +84,6 @@ def test_it_is_sent_on_slow_lines(rate, used):
         display._connection._transport.bytes_per_s = rate
         frame = display.frame()
         frame.draw(PAPER, "orange")
-        assert (display._queue.payloads(frame)[-1][0] == spec.OP_ARC) == used
+        assert (display._operations.queue.payloads(frame)[-1][0] == spec.OP_ARC) == used
         assert display.present(frame).digest == frame.digest()
         display.verify(frame)

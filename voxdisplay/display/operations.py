@@ -1,0 +1,248 @@
+"""Blocking operations of an open display: show and prove a frame, read a page, ask for a digest.
+
+They pump the connection in the caller's thread until the answer is there. Must not know who calls
+them: neither threads nor closing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from voxdisplay.display.connection import Clock, Connection, Reconnected
+from voxdisplay.display.device_info import device_error
+from voxdisplay.display.frame_queue import FrameQueue
+from voxdisplay.display.receipt import (
+    WRONG_TWICE_HINT,
+    Receipt,
+    describe_difference,
+    describe_wrong_digest,
+)
+from voxdisplay.errors import DesyncError, IncompatibleDevice
+from voxdisplay.frame import Frame
+from voxdisplay.link import (
+    Event,
+    FrameShown,
+    LinkCounters,
+    PacketRefused,
+    PageReceived,
+    StatusReceived,
+)
+from voxdisplay.raster.pixel_format import Pixels
+from voxdisplay.wire.packet import Page
+from voxdisplay.wire.spans import decode_spans
+
+Progress: TypeAlias = Callable[[int, int], None]
+
+
+class Operations:
+    """Blocking operations on one connection.
+
+    Parameters
+    ----------
+    connection : Connection
+    clock : callable
+        Returns seconds, on any monotonic clock.
+
+    Attributes
+    ----------
+    queue : FrameQueue
+
+    """
+
+    def __init__(self, connection: Connection, clock: Clock) -> None:
+        self.queue = FrameQueue(connection)
+        self._connection = connection
+        self._clock = clock
+        self._pages: list[Page] = []
+        self._status: StatusReceived | None = None
+        self._handle_events()
+
+    @property
+    def _counters(self) -> LinkCounters:
+        return self._connection.link.counters
+
+    def can(self, feature: str) -> bool:
+        """Return whether the device has announced a feature."""
+        return feature in self._connection.info.features
+
+    # -- waiting
+
+    def pump(self, *, wait: bool = True) -> None:
+        """Encode a portion, write, read, and handle what came.
+
+        It waits for nothing while a frame is being encoded.
+        """
+        self.queue.encode()
+        self._connection.pump(wait=wait and not self.queue.encoding)
+        self._handle_events()
+
+    def _handle_events(self) -> None:
+        for event in self._connection.events():
+            self._handle(event)
+
+    def _handle(self, event: Event | Reconnected) -> None:
+        match event:
+            case FrameShown(ticket, digest):
+                self.queue.note_shown(ticket, digest)
+            case Reconnected():
+                self.queue.note_reconnect()
+            case StatusReceived():
+                self._status = event
+            case PageReceived(page):
+                self._pages.append(page)
+            case PacketRefused(error):
+                self.queue.note_refusal()
+                raise device_error(error)
+
+    def flush(self) -> None:
+        """Wait until no frame is queued."""
+        while self.queue.busy:
+            self.pump()
+
+    def flush_unwaited(self, timeout_s: float) -> bool:
+        """Wait until no frame is queued that nobody waits for; return whether that was in time."""
+        deadline_s = self._clock() + timeout_s
+        while self.queue.has_unwaited:
+            if self._clock() >= deadline_s:
+                return False
+            self.pump()
+        return True
+
+    # -- frames
+
+    def show(self, frame: Frame, progress: Progress | None) -> Receipt:
+        """Show a frame and compare the digest. See `Display.present`."""
+        began_s = self._clock()
+        before = replace(self._counters)
+        frame = frame.copy()
+        ticket = self.queue.enqueue(frame)
+        digest = self.wait_until_shown(ticket, progress)
+        repaired = None
+        if digest is not None and digest != frame.digest():
+            ticket, repaired = self._repair(frame, digest)
+            digest = frame.digest()
+        self.queue.confirm(frame, ticket, digest)
+        counters = self._counters
+        return Receipt(
+            frame=self.queue.frames,
+            voxels=len(frame.lit()[0]),
+            packets=counters.packets - before.packets,
+            wire_bytes=counters.wire_bytes - before.wire_bytes,
+            retransmitted=counters.retransmitted - before.retransmitted,
+            elapsed_s=self._clock() - began_s,
+            digest=digest,
+            repaired=repaired,
+        )
+
+    def wait_until_shown(self, ticket: int, progress: Progress | None = None) -> int | None:
+        """Wait until a frame is displayed and return the device's digest."""
+        link, total = self._connection.link, 1
+        while not self.queue.is_shown(ticket):
+            self.pump()
+            total = max(total, link.payload_count)
+            if progress and not self.queue.encoding:
+                progress(total - link.unacknowledged_payloads, total)
+        return self.queue.take_digest(ticket)
+
+    def _repair(self, frame: Frame, digest: int) -> tuple[int, str]:
+        """Send a frame again; return its ticket, and what the display showed instead.
+
+        Raises
+        ------
+        DesyncError
+            If it is displayed wrongly again.
+
+        """
+        self.queue.forget_displayed()
+        expected = frame.digest()
+        fault = describe_wrong_digest(digest, expected)
+        if self.can("read"):
+            differs = describe_difference(frame.array(), self.read_page())
+            fault += f"; {differs or 'but its memory reads back as it was meant'}"
+        ticket = self.queue.enqueue(frame)
+        again = self.wait_until_shown(ticket)
+        if again != expected:
+            raise DesyncError(
+                f"{fault}; sent once more, it is {again or 0:08x}", hint=WRONG_TWICE_HINT
+            )
+        return ticket, fault
+
+    def displayed_frame(self, blank: Frame) -> Frame:
+        """Return what is displayed, from memory or read back from the device.
+
+        Parameters
+        ----------
+        blank : Frame
+            Receives the pixels if they must be read back.
+
+        Raises
+        ------
+        IncompatibleDevice
+            If it is not known and the device cannot be read.
+
+        """
+        if displayed := self.queue.displayed:
+            return displayed
+        if not self.can("read"):
+            raise IncompatibleDevice(
+                "it is not known what is on display, and this device cannot be read",
+                hint="present a whole frame first: display.frame() without keep",
+            )
+        link = self._connection.link
+        picture = link.displayed
+        blank.set(self.read_page())
+        # A palette cannot be read back; without it the frame is no base for a difference.
+        if picture == link.displayed and not self.can("palette"):
+            self.queue.set_displayed(blank.copy(), picture)
+        return blank
+
+    # -- questions
+
+    def request_digest(self) -> int | None:
+        """Return the digest of the front page. See `Display.digest`."""
+        self._status = None
+        self._connection.link.request_status()
+        while self._status is None:
+            self.pump()
+        return self._status.digest
+
+    def read_page(self, *, back: bool = False, progress: Progress | None = None) -> Pixels:
+        """Return a page of the device's memory. See `Display.read`."""
+        connection, link, info = self._connection, self._connection.link, self._connection.info
+        link.cancel_reads()  # of a call that was interrupted
+        self._pages.clear()
+        total = info.grid.voxels
+        values = np.zeros(total, dtype=np.uint32)
+        at, reconnects = 0, connection.reconnects
+        while at < total:
+            link.read(at, total - at, back=back)
+            while not self._pages:
+                self.pump()
+            if reconnects != connection.reconnects:  # the device may have lost its memory
+                self.flush()
+                self._pages.clear()
+                at, reconnects = 0, connection.reconnects
+                continue
+            page = self._pages.pop()
+            values[at : at + page.count] = decode_spans(page.ops, page.count, info.format)
+            at += page.count
+            if progress:
+                progress(at, total)
+        return info.format.pixels(values).reshape(info.format.shape(info.grid.array_shape))
+
+    def blank(self, timeout_s: float) -> None:
+        """Show a dark frame at once: a new session drops all that is queued.
+
+        Parameters
+        ----------
+        timeout_s : float
+            How long the device may be silent, besides the time for bytes that are on the line.
+
+        """
+        self._connection.restart(timeout_s)
+        self.queue = FrameQueue(self._connection)
+        self.wait_until_shown(self._connection.link.present([]))
