@@ -68,12 +68,16 @@ def close_on_exit(display: Display, on_exit: OnExit) -> Iterator[None]:
     except (KeyboardInterrupt, TerminationSignal):
         _close_as_chosen(display, on_exit)
         raise
-    finally:
+    except BaseException:
+        display.close(flush=False)
+        raise
+    else:
         display.close()
 
 
 def _close_as_chosen(display: Display, on_exit: OnExit) -> None:
     if on_exit == "keep":
+        display.close(flush=False)
         note("the display keeps its last whole picture")
         return
     try:
