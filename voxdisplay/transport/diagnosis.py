@@ -25,11 +25,11 @@ _MAX_LISTED = 8
 _OF_SERVER = (
     (
         ("does not seem to support RFC2217", "remote rejected value for option 'we-"),
-        "what listens there does not speak RFC 2217; does it pass bytes on? Then try socket://",
+        "what listens there does not speak RFC 2217; does it pass bytes on? Then try tcp://",
     ),
     (
         ("does not accept parameter change", "remote rejected value for option"),
-        "the server did not confirm the line's rate or format: does it let clients set them?",
+        "the server did not confirm the line's rate or format; does it pass bytes on? Then try tcp://",
     ),
     (
         ("server has closed the connection", "reader thread died"),
