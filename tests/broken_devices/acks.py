@@ -243,7 +243,7 @@ def _idle(patch, lapse):
     around(patch, DeviceOnLine, "receive", receive)
 
 
-@mutant("9.2/does-not-lapse", likely="must not count the time")
+@mutant("9.2/does-not-lapse", likely="must not expire")
 def credit_lapses(patch):
     _idle(patch, lambda self: setattr(self, "lapsed", 20))
 
@@ -254,7 +254,7 @@ def credit_lapses(patch):
     _ack(patch, change)
 
 
-@mutant("9.2/does-not-lapse", likely="must not count the time")
+@mutant("9.2/does-not-lapse", likely="must not expire")
 def session_lapses(patch):
     _idle(patch, lambda self: setattr(self, "session", None))
 

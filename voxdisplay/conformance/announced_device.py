@@ -1,6 +1,6 @@
-"""What a device says of itself in INFO, and what follows from it. Judges nothing.
+"""The device as it announces itself in INFO, with the quantities derived from it.
 
-The strings are cut short rather than refused: a check of its own looks at them.
+Checks nothing. Invalid strings are truncated, not refused: the check 5/info-strings looks at them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FORMATS = {
 
 @dataclass(frozen=True, slots=True)
 class AnnouncedDevice:
-    """A device's announcement; the names are those of INFO."""
+    """Fields of an INFO, under the names of protocol.md, section 5."""
 
     format: int
     nx: int
@@ -44,7 +44,7 @@ class AnnouncedDevice:
 
     @classmethod
     def from_info(cls, info: packets.Response) -> AnnouncedDevice:
-        """Take it from an INFO."""
+        """Parse an INFO."""
         texts, at = [], 0
         for _ in range(3):
             size = info.tail[at] if at < len(info.tail) else 0
@@ -55,7 +55,7 @@ class AnnouncedDevice:
         return cls(**values, name=texts[0], firmware=texts[1], serial=texts[2])
 
     def has(self, feature: str) -> bool:
-        """Tell whether a feature is announced, by its name in section 5."""
+        """Return whether a feature is announced, by its name in section 5."""
         return bool(self.features >> FEATURES[feature] & 1)
 
     @property
@@ -65,45 +65,45 @@ class AnnouncedDevice:
 
     @property
     def voxel_count(self) -> int:
-        """V of section 2."""
+        """Number of voxels, V of section 2."""
         return self.nx * self.ny * self.nz
 
     @property
     def pixel_bytes(self) -> int:
-        """Bytes of a pixel."""
+        """Number of bytes of a pixel."""
         return spec.PIXEL_BYTES[self.format]
 
     @property
     def full_pixel(self) -> int:
-        """The value of the full pixel."""
+        """Pixel value of the full pixel, section 2.1."""
         return 1 if self.format == spec.FORMAT_MONO1 else (1 << 8 * self.pixel_bytes) - 1
 
     @property
     def coordinate_bytes(self) -> int:
-        """Bytes of a coordinate."""
+        """Number of bytes of a coordinate in an op."""
         return 2 if max(self.grid) > 256 else 1
 
     @property
     def period_s(self) -> float:
-        """Seconds from a refresh tick to the next; 0 if a swap happens at once."""
+        """Seconds between two refresh ticks; 0 if a swap happens at once."""
         return 1000 / self.refresh if self.refresh else 0.0
 
     @property
     def longest_packet_bytes(self) -> int:
-        """Bytes that the longest packet may have on the wire."""
+        """Most bytes that the longest packet can have on the wire."""
         return packets.max_encoded_bytes(self.max_payload)
 
     @property
     def is_readable(self) -> bool:
-        """Whether it can be found out at all what is on display."""
+        """True if READ or DIGEST is announced: what is on display can be verified."""
         return self.has("READ") or self.has("DIGEST")
 
     def index(self, x: int, y: int, z: int) -> int:
-        """Give the place of a voxel in scan order."""
+        """Return the index of a voxel in scan order."""
         return x + self.nx * (y + self.ny * z)
 
     def voxel_at(self, index: int) -> tuple[int, int, int]:
-        """Give the coordinates of an index."""
+        """Return the coordinates of the voxel with an index."""
         return index % self.nx, index // self.nx % self.ny, index // self.nx // self.ny
 
     def __str__(self) -> str:

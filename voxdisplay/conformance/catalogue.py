@@ -1,7 +1,7 @@
-"""The list of checks: what a check is, and what it needs of a device.
+"""Registry of checks, and the preconditions that a device must meet for a check to apply.
 
-A check is a function of a `Probe` under the decorator `check`, which says the section of
-protocol.md, the check's name and, in few words, what the document demands there.
+A check is a function of a `Probe` under the decorator `check`, which takes the section of
+protocol.md, the check's name and the requirement in one phrase.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ Precondition = Callable[[AnnouncedDevice], str]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that the document demands of a device.
+    """One requirement of the document, and the function that checks it.
 
     Attributes
     ----------
     section, name : str
-        Together they are its ``id``, as ``7.3/line-ties``.
+        Together they are the ``id``, such as ``7.3/line-ties``.
     requirement : str
-        What the document says, in short.
+        The requirement in one phrase.
     preconditions : tuple of callable
         Each takes an `AnnouncedDevice` and returns why the check does not apply to it, or ``""``.
     run : callable
-        Takes a `Probe`; raises `Violation` if the device does otherwise.
+        Takes a `Probe`; raises `Violation` if the device does not meet the requirement.
     """
 
     section: str
@@ -44,21 +44,21 @@ class Check:
 
     @property
     def id(self) -> str:
-        """Section and name."""
+        """Identifier: section and name."""
         return f"{self.section}/{self.name}"
 
     @property
     def order(self) -> tuple[int, ...]:
-        """Its section as numbers, by which checks are listed."""
+        """Section as a tuple of numbers: the sort key of listings."""
         return tuple(map(int, self.section.split(".")))
 
     def matches(self, pattern: str) -> bool:
-        """Tell whether a pattern names it: ``7``, ``7.3``, ``7.3/line-ties``, ``line-*``."""
+        """Return whether a pattern selects it: ``7``, ``7.3``, ``7.3/line-ties``, ``line-*``."""
         inner = f"{self.section}/".startswith((f"{pattern}/", f"{pattern}."))
         return inner or fnmatchcase(self.id, pattern) or fnmatchcase(self.name, pattern)
 
     def not_applicable_reason(self, device: AnnouncedDevice) -> str:
-        """Say why it does not concern a device; ``""`` if it does."""
+        """Return why the check does not apply to a device; ``""`` if it does."""
         return next((reason for need in self.preconditions if (reason := need(device))), "")
 
 
@@ -89,55 +89,55 @@ SECTIONS = {
 }
 
 
-def check(section: str, name: str, demands: str, *needs: Precondition) -> Callable[[Body], Body]:
-    """Put a function on the list."""
+def check(
+    section: str, name: str, requirement: str, *preconditions: Precondition
+) -> Callable[[Body], Body]:
+    """Return a decorator that registers a function as a check."""
 
-    def enlist(run: Body) -> Body:
-        CHECKS.append(Check(section, name, demands, needs, run))
+    def register(run: Body) -> Body:
+        CHECKS.append(Check(section, name, requirement, preconditions, run))
         return run
 
-    return enlist
+    return register
 
 
-# -- what a check may need
+# -- preconditions: functions of a device that return why a check does not apply to it, or ""
 
 
 def feature(name: str) -> Precondition:
-    """Need a feature that is announced."""
+    """Return the precondition that a feature is announced."""
     return lambda device: "" if device.has(name) else f"{name} is not announced"
 
 
 def without_feature(name: str) -> Precondition:
-    """Need a feature that is not announced."""
+    """Return the precondition that a feature is not announced."""
     return lambda device: f"{name} is announced" if device.has(name) else ""
 
 
 def pixel_formats(*values: int) -> Precondition:
-    """Need one of some pixel formats."""
-    return lambda device: "" if device.format in values else "of another pixel format"
+    """Return the precondition that the pixel format is one of these."""
+    return lambda device: "" if device.format in values else "the pixel format is another one"
 
 
 def min_voxels(count: int) -> Precondition:
-    """Need a grid of so many voxels."""
+    """Return the precondition that the grid has at least ``count`` voxels."""
     return lambda device: (
         "" if device.voxel_count >= count else f"the grid has fewer than {count} voxels"
     )
 
 
 def readable_display(device: AnnouncedDevice) -> str:
-    """Need to find out what is on display."""
-    return (
-        ""
-        if device.is_readable
-        else "neither READ nor DIGEST is announced: pictures cannot be seen"
-    )
+    """Require that what is on display can be verified."""
+    if device.is_readable:
+        return ""
+    return "neither READ nor DIGEST is announced: what is on display cannot be verified"
 
 
 def refresh_tick(device: AnnouncedDevice) -> str:
-    """Need a refresh tick."""
+    """Require that swaps wait for a refresh tick."""
     return "" if device.refresh else "swaps happen at once"
 
 
 def immediate_swap(device: AnnouncedDevice) -> str:
-    """Need swaps that happen at once."""
+    """Require that swaps happen at once."""
     return "swaps wait for a tick" if device.refresh else ""

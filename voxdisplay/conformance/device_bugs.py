@@ -1,7 +1,7 @@
-"""Likely mistakes, as decoders: each misreads one rule of section 7, and says so in its docstring.
+"""Typical bugs of devices, as decoders: each misreads one rule of section 7.
 
-When a picture is not what it must be, the same ops are drawn by each of these. The one whose
-picture is that of the device names the fault. Nothing here decides whether a check holds.
+When a picture is wrong, the same ops are drawn by each of these. The decoder whose picture equals
+the device's names the likely cause, by its docstring. Nothing here decides whether a check holds.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class CursorNotReset(ReferenceDecoder):
 
 
 class OctantSigns(ReferenceDecoder):
-    """The octant's bits 0..2 say that an axis falls: here they were taken for rising."""
+    """The octant's bits 0..2 mean that an axis falls: here they were taken for rising."""
 
     def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
         return super().axes_of(octant ^ 7)
@@ -222,30 +222,30 @@ DEVICE_BUGS: tuple[type[ReferenceDecoder], ...] = tuple(
 def pages_by_bug(
     device: AnnouncedDevice, base: Page, payloads: list[bytes]
 ) -> Iterator[tuple[str, Page]]:
-    """Draw payloads with each misreading; give what it says of itself, and its page."""
-    for mistake in DEVICE_BUGS:
-        decoder = mistake(device, base.copy())
+    """Yield the description of each bug, and the page that it makes of some payloads."""
+    for bug in DEVICE_BUGS:
+        decoder = bug(device, base.copy())
         try:
             for payload in payloads:
                 decoder.draw(payload)
-        except Exception:  # noqa: BLE001, S112 - a misreading may stumble over anything
+        except Exception:  # noqa: BLE001, S112 - what a bug makes of the ops may fail anyhow
             continue
-        yield (mistake.__doc__ or "").strip(), decoder.page
+        yield (bug.__doc__ or "").strip(), decoder.page
 
 
 def refusals_by_bug(device: AnnouncedDevice, payload: bytes) -> Iterator[tuple[str, int, int]]:
-    """Give the misreadings that refuse a payload: what each says of itself, its code and where."""
-    for mistake in DEVICE_BUGS:
+    """Yield the bugs that refuse a payload: description, error code and offset of the refusal."""
+    for bug in DEVICE_BUGS:
         try:
-            mistake(device, Page()).draw(payload)
+            bug(device, Page()).draw(payload)
         except Refused as refused:
-            yield (mistake.__doc__ or "").strip(), refused.code, refused.at
-        except Exception:  # noqa: BLE001, S112 - a misreading may stumble over anything
+            yield (bug.__doc__ or "").strip(), refused.code, refused.at
+        except Exception:  # noqa: BLE001, S112 - what a bug makes of the ops may fail anyhow
             continue
 
 
 def pages_by_scan_order(device: AnnouncedDevice, page: Page) -> Iterator[tuple[str, Page]]:
-    """Give a picture as it is if scan order was mistaken."""
+    """Yield each wrong scan order, and the page that it makes of the right one."""
     names = "xyz"
     for order in itertools.permutations(range(3)):
         if order == (0, 1, 2):
@@ -260,7 +260,7 @@ def pages_by_scan_order(device: AnnouncedDevice, page: Page) -> Iterator[tuple[s
 
 
 def digests_by_bug(device: AnnouncedDevice, page: Page, before: Page) -> Iterator[tuple[int, str]]:
-    """Give digests that are computed wrongly, and how."""
+    """Yield wrong digests of a page, each with the bug that computes it."""
     right = page.digest(device)
     old = before.digest(device)
     if device.has("PALETTE"):
@@ -275,18 +275,18 @@ def digests_by_bug(device: AnnouncedDevice, page: Page, before: Page) -> Iterato
         dark = sum(mix(i, 0) for i in range(device.voxel_count) if i not in page.pixels)
         yield (
             (right + dark) & 0xFFFFFFFF,
-            "the digest adds dark voxels: only those that are lit count",
+            "the digest adds dark voxels: only lit ones count",
         )
     yield (
         old,
-        "this is the digest of the picture before: that of the front page after the swap counts",
+        "this is the digest of the picture before: it must be that of the page shown by the swap",
     )
-    yield (right + old) & 0xFFFFFFFF, "the old pictures' terms are still in the digest"
+    yield (right + old) & 0xFFFFFFFF, "the terms of the picture before are still in the digest"
     yield ~right & 0xFFFFFFFF, "the digest is inverted"
     places = {i: device.voxel_at(i) for i in page.pixels}
     _, ny, nz = device.grid
     zyx = sum(mix(z + nz * (y + ny * x), page.pixels[i]) for i, (x, y, z) in places.items())
-    yield zyx & 0xFFFFFFFF, "the index counts z fastest: x runs fastest, then y, then z"
+    yield zyx & 0xFFFFFFFF, "the index runs along z first: it must run along x, then y, then z"
     if device.pixel_bytes > 1:
         size = device.pixel_bytes
         big = sum(
@@ -295,7 +295,7 @@ def digests_by_bug(device: AnnouncedDevice, page: Page, before: Page) -> Iterato
         )
         yield big & 0xFFFFFFFF, "the digest takes a pixel's bytes highest first"
     h = [i * spec.DIGEST_MUL_INDEX + v * spec.DIGEST_MUL_VALUE for i, v in page.pixels.items()]
-    yield sum(h) & 0xFFFFFFFF, "the digest leaves out all steps of mix but the first"
+    yield sum(h) & 0xFFFFFFFF, "the digest uses only the first step of mix"
     lit = [mix(i, value) for i, value in page.pixels.items()]
     exclusive = 0
     for term in lit:

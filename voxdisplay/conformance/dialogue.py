@@ -1,9 +1,8 @@
-"""A conversation with a device: send anything, hear what comes, ask, demand.
+"""Request-response exchange with a device under test, with assertions on what it answers.
 
-Nothing here assumes that an answer comes at once, and nothing waits without an end. Where *no*
-answer is demanded, a STATUS is sent behind: packets are taken in their order, so what has not come
-before the answer to that STATUS does not come. Sends what it is told, right or wrong, and knows
-nothing of pictures.
+Nothing assumes that a response comes at once, and nothing waits without a limit. Where *no*
+response is required, a STATUS is sent behind: packets are processed in order, so a response that
+has not come before that of the STATUS will not come. Sends any packet, valid or not; knows no page.
 """
 
 from __future__ import annotations
@@ -23,43 +22,41 @@ from voxdisplay.errors import TransportTimeout
 from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
 
-_TAGS = range(129, 223)  # never the number of a DATA packet that a check has just sent
-_HELLO_AGAIN_S = 0.25
+_TAGS = range(129, 223)  # never the sequence number of a DATA packet that a check has just sent
+_HELLO_INTERVAL_S = 0.25
 _MAX_RESPONSES = 10_000
 _MAX_LOG_ENTRIES = 2_000
-_BITS_PER_BYTE = 10  # of a serial line
-_LOGGED_BYTES = 48  # of a packet in a transcript
+_BITS_PER_BYTE = 10  # on a serial line
+_LOGGED_BYTES = 48  # of each packet, in a transcript
 
 
 class Violation(Exception):  # noqa: N818 - a verdict
-    """The device does not do what the document demands.
+    """The device does not meet a requirement.
 
     Parameters
     ----------
-    must : str
-        What must be.
-    came : str
-        What was.
-    likely : str
-        The mistake that is probably behind it.
+    expected, actual : str
+        What the document requires, and what the device did.
+    likely_cause : str
+        The bug that is probably behind it, if one is known.
     """
 
-    def __init__(self, must: str, came: str, likely: str = "") -> None:
-        super().__init__(f"must be: {must}; was: {came}")
-        self.expected, self.actual, self.likely_cause = must, came, likely
+    def __init__(self, expected: str, actual: str, likely_cause: str = "") -> None:
+        super().__init__(f"must be: {expected}; was: {actual}")
+        self.expected, self.actual, self.likely_cause = expected, actual, likely_cause
 
 
 class NoResponse(Violation):
-    """Nothing came in time."""
+    """No response came in time."""
 
 
-class NotApplicable(Exception):  # noqa: N818 - no fault at all
-    """The check does not concern this device, or could not be made here."""
+class NotApplicable(Exception):  # noqa: N818 - a verdict
+    """The check does not apply to this device, or cannot be made here."""
 
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
-    """One packet, or some raw bytes, that went or came."""
+    """One packet or some raw bytes, sent or received."""
 
     sent: bool
     data: bytes
@@ -72,35 +69,38 @@ class LogEntry:
 
 
 class Dialogue:
-    """A conversation with a device under examination.
+    """A device under test, spoken to packet by packet.
 
     Parameters
     ----------
     pipe : Transport
     timeout_s : float
-        How long an answer may take, beyond the refresh period and the time on a serial line.
+        How long a response may take, plus a refresh period and the time on a serial line.
     opening_s : float
-        How long the first INFO may take: a board may have to start.
+        How long the first INFO may take: a board may have to boot.
     baud : int
         Bits per second of a serial line.
     seed : int
-        Where all that is random begins.
+        Seed of all random numbers.
     clock : callable
-        Seconds, never going back; those of which ``pipe`` takes its time.
+        Monotonic seconds; the same clock by which ``pipe`` measures its timeouts.
 
     Attributes
     ----------
-    device : Said
-        What the device announced.
+    device : AnnouncedDevice
+        The device as announced in its INFO.
+    info : Response
+        That INFO.
     session : int
-        Number of the session that the kit has opened last.
+        Number of the session opened last.
     seq, frame : int
-        The next sequence number and frame id.
-    state : Answer
-        The latest answer to a STATUS: an ACK, or an ERROR where no session was open.
+        Next sequence number and frame id.
+    state : Response
+        Latest response to a STATUS: an ACK, or an ERROR if no session was open.
+    reader : ResponseReader
     rng : random.Random
-    log : list of Line
-        What went and came since the check began.
+    log : list of LogEntry
+        Packets sent and received since the check began.
     clock : callable
         See above.
     """
@@ -131,7 +131,7 @@ class Dialogue:
         self._tags: Iterator[int] = iter(())
 
     def start_check(self, name: str) -> None:
-        """Forget what was before: a check goes the same way whichever others are made."""
+        """Reset random numbers and log: a check runs alike whichever others are run."""
         self.rng = random.Random(f"{self._seed} {name}")
         self.log = []
 
@@ -143,7 +143,7 @@ class Dialogue:
         self._write(stream)
 
     def send(self, *bodies: bytes) -> None:
-        """Send packets, all in one write."""
+        """Send packets, given as header and payload, in one write."""
         for packet in bodies:
             self._log(sent=True, data=packet, text=packets.describe(packet))
         self._write(b"".join(map(packets.encode, bodies)))
@@ -157,46 +157,46 @@ class Dialogue:
 
     @property
     def response_timeout_s(self) -> float:
-        """How long to wait for an answer."""
+        """Seconds to wait for a response: limit, two ticks, time on the line."""
         line_s = self._unanswered_bytes * _BITS_PER_BYTE / self._baud
         return self._timeout_s + 2 * self.device.period_s + line_s
 
     def receive(self, until_s: float) -> Response | None:
-        """Give the next answer; None if none comes until then, by `clock`."""
+        """Return the next response; None if none comes before a deadline of `clock`."""
         while not self._received:
             left_s = until_s - self.clock()
             if not self._read_pipe(left_s) and left_s <= 0:
                 return None
-            if left_s < -self._timeout_s:  # it babbles
+            if left_s < -self._timeout_s:  # bytes keep coming, but no packet
                 return None
         self._unanswered_bytes = 0
         return self._received.popleft()
 
     def _read_pipe(self, timeout_s: float) -> bool:
-        """Hear what comes next; tell whether anything came. What is there is never missed."""
-        come = self._pipe.read(max(timeout_s, 0.0))
-        for answer in self.reader.feed(come):
-            self._log(sent=False, data=answer.body, text=str(answer))
-            self._received.append(answer)
-        return bool(come)
+        """Read what comes within a time, at least what has come; return whether anything did."""
+        data = self._pipe.read(max(timeout_s, 0.0))
+        for response in self.reader.feed(data):
+            self._log(sent=False, data=response.body, text=str(response))
+            self._received.append(response)
+        return bool(data)
 
     def responses(self) -> Iterator[Response]:
-        """Give answers until none comes in time."""
+        """Yield responses until none comes in time."""
         until_s = self.clock() + self.response_timeout_s
         for _ in range(_MAX_RESPONSES):
             answer = self.receive(until_s)
             if answer is None:
                 return
             yield answer
-        raise NoResponse("the device speaks when it is spoken to", f"{_MAX_RESPONSES} packets")
+        raise NoResponse("a device sends responses only", f"{_MAX_RESPONSES} packets in a row")
 
     def wait_two_ticks(self) -> None:
-        """Wait for two refresh ticks, and a little."""
+        """Wait for a little more than two refresh periods."""
         if self.device.refresh:
             self.stay_silent(2 * self.device.period_s + 0.01)
 
     def stay_silent(self, seconds: float) -> None:
-        """Send nothing for so long; what comes is heard."""
+        """Send nothing for a time; what comes is read."""
         until_s = self.clock() + seconds
         while (left_s := until_s - self.clock()) > 0:
             self._read_pipe(left_s)
@@ -205,37 +205,37 @@ class Dialogue:
         if len(self.log) < _MAX_LOG_ENTRIES:
             self.log.append(LogEntry(sent, data, text))
 
-    # -- questions
+    # -- sessions and requests
 
     def open_session(self) -> None:
-        """Open a new session, and see that it is still the same device that answers."""
+        """Open a new session; raise `Violation` if the device has restarted or does not respond."""
         self.session = self.session % 65535 + 1
         self.seq = self.frame = 0
-        self.send_raw(b"\0", "00, which ends whatever was")
+        self.send_raw(b"\0", "00, which ends any segment before")
         self.send(packets.hello(self.session))
         info = self._await_info()
         if info is None:
             raise NoResponse(
-                "INFO answers HELLO", "nothing", "did it stumble over what came before?"
+                "INFO in response to HELLO", "nothing", "the packets before hung the device"
             )
         if info.boot != self.device.boot:
             self.info, self.device = info, AnnouncedDevice.from_info(info)
             self.reader.device = self.device
             raise Violation(
-                "the device goes on",
+                "the device keeps running",
                 f"it has restarted: its boot id is {info.boot:04X}h now",
-                "it crashed, or a watchdog bit, at what this check sent",
+                "it crashed, or its watchdog fired, at what this check sent",
             )
 
     def handshake(self) -> bool:
-        """Open the first session; tell whether the device answered."""
+        """Open the first session; return whether the device responded."""
         self.session = self.rng.randrange(1, 65536)
         until_s = self.clock() + self._opening_s
         info = None
         while info is None and self.clock() < until_s:
             self.send_raw(b"\0")
             self.send(packets.hello(self.session))
-            info = self._await_info(min(until_s, self.clock() + _HELLO_AGAIN_S))
+            info = self._await_info(min(until_s, self.clock() + _HELLO_INTERVAL_S))
         if info is None:
             return False
         self.info, self.device = info, AnnouncedDevice.from_info(info)
@@ -256,7 +256,7 @@ class Dialogue:
         self.require(self.state.kind == spec.TYPE_ERROR, must, self.state)
 
     def poll_status(self) -> list[Response]:
-        """Ask by STATUS; give all that came before its answer, which is `state` then."""
+        """Send a STATUS, store its response in `state`, and return the responses before it."""
         tag = next(self._tags, 0)
         if not tag:
             self._tags = iter(_TAGS)
@@ -270,46 +270,46 @@ class Dialogue:
                 self.state = answer
                 return before
             before.append(answer)
-        raise NoResponse("STATUS is answered", "nothing" if not before else f"only {before[-1]}")
+        raise NoResponse("a response to STATUS", f"only {before[-1]}" if before else "nothing")
 
     def send_and_poll(self, *bodies: bytes) -> list[Response]:
-        """Send packets and a STATUS; give what came before the answer to that."""
+        """Send packets and a STATUS; return the responses to the packets."""
         self.send(*bodies)
         return self.poll_status()
 
     def request(self, packet: bytes) -> Response:
-        """Send a packet; give its answer, which must be the only one."""
+        """Send a packet; return its response, which must be the only one."""
         self.send(packet)
         answer = next(self.responses(), None)
         if answer is None:
-            raise NoResponse(f"{packets.describe(packet)} is answered", "nothing")
+            raise NoResponse(f"a response to {packets.describe(packet)}", "nothing")
         extra = self.poll_status()
         if extra:
-            raise Violation("one answer", " and ".join(map(str, [answer, *extra])))
+            raise Violation("one response", " and ".join(map(str, [answer, *extra])))
         return answer
 
     def send_raw_and_poll(self, stream: bytes, text: str = "raw") -> list[Response]:
-        """Send bytes and a STATUS; give what came before the answer to that."""
+        """Send bytes and a STATUS; return the responses to the bytes."""
         self.send_raw(stream, text)
         return self.poll_status()
 
-    # -- verdicts
+    # -- assertions
 
-    def fail(self, must: str, came: object, likely: str = "") -> NoReturn:
-        """Say that the device does otherwise."""
-        raise Violation(must, str(came), likely)
+    def fail(self, expected: str, actual: object, likely: str = "") -> NoReturn:
+        """Raise `Violation`."""
+        raise Violation(expected, str(actual), likely)
 
     def skip(self, reason: str) -> NoReturn:
-        """Say that the check cannot be made here."""
+        """Raise `NotApplicable`: the check cannot be made here."""
         raise NotApplicable(reason)
 
-    def require(self, holds: bool, must: str, came: object, likely: str = "") -> None:
-        """Demand something."""
+    def require(self, holds: bool, expected: str, actual: object, likely: str = "") -> None:
+        """Raise `Violation` unless a condition holds."""
         if not holds:
-            raise Violation(must, str(came), likely)
+            raise Violation(expected, str(actual), likely)
 
     def require_ack(self, answer: Response, likely: str = "", /, **fields: int) -> None:
-        """Demand an ACK with some fields; ``shown``, ``pending`` and ``asked`` are its flags."""
+        """Require an ACK with these fields; ``shown``, ``pending`` and ``asked`` are its flags."""
         if answer.kind != spec.TYPE_ACK:
             raise Violation("ACK", str(answer), likely)
         flags = {"shown": SHOWN, "pending": packets.PENDING, "asked": packets.ASKED}
@@ -326,17 +326,17 @@ class Dialogue:
                 raise Violation(f"ACK with {must}", f"{was} in {answer}", likely)
 
     def require_refused(self, packet: bytes, code: int, offset: int) -> Response:
-        """Demand that a packet is refused: with this code, at this offset of the packet."""
+        """Require that a packet is refused with this code, at this offset in the packet."""
         answer = self.request(packet)
         must = f"ERROR {packets.CODE_NAMES[code]} at offset {offset}"
         if answer.kind != spec.TYPE_ERROR:
-            raise Violation(must, str(answer), "the device does not look at this")
+            raise Violation(must, str(answer), "the device does not check this")
         if (answer.code, answer.offset) != (code, offset):
             raise Violation(must, str(answer), _likely_cause(answer, code, offset))
         return answer
 
     def require_ops_refused(self, ops: bytes, code: int, at: int = 0) -> None:
-        """Demand, in a new session, that ops are refused: at this offset of the payload."""
+        """Require, in a new session, that ops are refused, at this offset in the payload."""
         self.open_session()
         self.require_refused(packets.data(0, 0, ops), code, packets.HEADER_BYTES + at)
 

@@ -1,7 +1,7 @@
-"""Where no INFO comes: what may be the reason.
+"""Diagnosis of a failed handshake: likely causes of a HELLO without INFO.
 
-A device that computes its check value otherwise hears nothing but damage. So HELLO is sent in some
-ways in which it could have been meant, and if one of them is answered, that is the mistake.
+A device with another check value drops every packet as damaged. So HELLO is sent in the forms that
+typical bugs would accept; the form that gets a response names the bug.
 """
 
 from __future__ import annotations
@@ -47,29 +47,29 @@ _CHECK_VALUES: dict[str, Callable[[bytes], bytes]] = {
     "INIT is 0": lambda data: _crc32(data, _ETHERNET, init=0).to_bytes(4, "little"),
     "it is CRC-32C": lambda data: _crc32(data, _CASTAGNOLI).to_bytes(4, "little"),
     "it is not reflected": lambda data: _unreflected_crc32(data).to_bytes(4, "little"),
-    "it is left out": lambda data: b"",  # noqa: ARG005
+    "it is missing": lambda data: b"",  # noqa: ARG005
 }
 
 
 def diagnose_silence(probe: Probe) -> str:
-    """Try what a device could take for a HELLO; say what it took, or what to look at."""
+    """Send malformed HELLOs; return which one got a response, or what else to look at."""
     hello = packets.hello(probe.session)
     for why, check_value in _CHECK_VALUES.items():
         if _gets_response(probe, packets.cobs_encode(hello + check_value(hello)) + b"\0"):
-            return f"the device answers a HELLO whose check value is wrong: {why}"
+            return f"the device responds to a HELLO with a wrong check value: {why}"
     if _gets_response(probe, packets.encode(hello)[:-1]):
-        return "the device answers before the 00 that ends a packet"
+        return "the device responds before the 00 that ends a packet"
     if _gets_response(probe, hello + zlib.crc32(hello).to_bytes(4, "little")):
-        return "the device answers a HELLO that is not encoded by COBS"
+        return "the device responds to a HELLO that is not COBS-encoded"
     if probe.reader.byte_count:
-        return f"{probe.reader.byte_count} bytes came, and no packet: is that its baud rate?"
-    return "not a byte came: is it the right port and baud rate, and is the device on?"
+        return f"{probe.reader.byte_count} bytes came, but no packet: check the baud rate"
+    return "no byte came: check port and baud rate, and that the device is on"
 
 
 def _gets_response(probe: Probe, stream: bytes) -> bool:
-    """Send something; tell whether anything comes that could be a packet."""
+    """Send bytes; return whether a segment comes back that could be a packet."""
     before = probe.reader.segment_count
-    probe.send_raw(b"\0" + stream, "a HELLO that is not as it must be")
+    probe.send_raw(b"\0" + stream, "a malformed HELLO")
     until_s = probe.clock() + _VARIANT_TIMEOUT_S
     while probe.clock() < until_s and probe.reader.segment_count == before:
         probe.receive(until_s)
@@ -80,4 +80,4 @@ def _never(probe: Probe) -> None:
     del probe
 
 
-CHECK = Check("5", "answers", "a HELLO is answered with INFO", (), _never)
+CHECK = Check("5", "answers", "the response to HELLO is INFO", (), _never)

@@ -1,6 +1,6 @@
-"""Single ops as bytes, and pictures made of them that fit any grid and any format.
+"""Byte forms of single ops (section 7 of protocol.md), and random ops for any grid and format.
 
-No coder: each function writes just the op that it is asked for (section 7 of protocol.md).
+No encoder: each function writes exactly the op that it is asked for.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
 
 END = bytes((spec.OP_END,))
-MAX_VOXELS = 1 << 16  # voxels that the kit draws at a time, at most
+MAX_VOXELS = 1 << 16  # most voxels that the kit draws with one op
 
 
 def leb128(k: int) -> bytes:
-    """Give k as LEB128 in its shortest form."""
+    """Return k as LEB128 in its shortest form."""
     out = bytearray()
     while k > 127:
         out.append(k & 127 | 128)
@@ -28,48 +28,48 @@ def leb128(k: int) -> bytes:
 
 
 def counted(op: int, n: int) -> bytes:
-    """Give the op byte, and what follows it, of SKIP, RUN, LIT or DIFF with a count."""
+    """Return op byte and count of SKIP, RUN, LIT or DIFF."""
     return bytes((op | n - 1,)) if n < 32 else bytes((op | 31,)) + leb128(n - 32)
 
 
 def skip(n: int) -> bytes:
-    """Give SKIP; nothing for n = 0."""
+    """Return SKIP; nothing for n = 0."""
     return counted(spec.OP_SKIP, n) if n else b""
 
 
 def run(n: int = 1) -> bytes:
-    """Give RUN."""
+    """Return RUN."""
     return counted(spec.OP_RUN, n)
 
 
 def pixel(device: AnnouncedDevice, value: int) -> bytes:
-    """Give a pixel's bytes."""
+    """Return the bytes of a pixel value."""
     return value.to_bytes(device.pixel_bytes, "little")
 
 
 def pen(device: AnnouncedDevice, value: int) -> bytes:
-    """Give PEN."""
+    """Return PEN."""
     return bytes((spec.OP_PEN,)) + pixel(device, value)
 
 
 def xyz(device: AnnouncedDevice, place: Sequence[int]) -> bytes:
-    """Give three coordinates."""
+    """Return three coordinates."""
     return b"".join(at.to_bytes(device.coordinate_bytes, "little") for at in place)
 
 
 def move(device: AnnouncedDevice, place: Sequence[int]) -> bytes:
-    """Give MOVE."""
+    """Return MOVE."""
     return bytes((spec.OP_MOVE,)) + xyz(device, place)
 
 
 def pack_bits(values: Sequence[int], bits: int) -> bytes:
-    """Pack small numbers, the first in the lowest bits."""
+    """Pack numbers of some bits each, the first in the lowest bits."""
     whole = sum(value << bits * i for i, value in enumerate(values))
     return whole.to_bytes(-(-len(values) * bits // 8), "little")
 
 
 def literal(device: AnnouncedDevice, values: Sequence[int]) -> bytes:
-    """Give LIT."""
+    """Return LIT."""
     if device.format == spec.FORMAT_MONO1:
         pixels = pack_bits(values, 1)
     else:
@@ -80,30 +80,30 @@ def literal(device: AnnouncedDevice, values: Sequence[int]) -> bytes:
 def chain(
     device: AnnouncedDevice, octant: int, crumbs: Sequence[int], start: Voxel | None = None
 ) -> bytes:
-    """Give STEP, or FROM if a start is given."""
+    """Return STEP, or FROM if a start is given."""
     op = spec.OP_STEP if start is None else spec.OP_FROM
     head = bytes((op | octant,)) + (b"" if start is None else xyz(device, start))
     return head + bytes((len(crumbs) - 1,)) + pack_bits(crumbs, 2)
 
 
 def line(device: AnnouncedDevice, begin: Voxel, end: Voxel) -> bytes:
-    """Give MOVE and LINE."""
+    """Return MOVE and LINE."""
     return move(device, begin) + bytes((spec.OP_LINE,)) + xyz(device, end)
 
 
 def box(device: AnnouncedDevice, begin: Voxel, end: Voxel) -> bytes:
-    """Give MOVE and BOX."""
+    """Return MOVE and BOX."""
     return move(device, begin) + bytes((spec.OP_BOX,)) + xyz(device, end)
 
 
 def dots(device: AnnouncedDevice, places: Sequence[Voxel]) -> bytes:
-    """Give DOTS."""
+    """Return DOTS."""
     named = b"".join(xyz(device, place) for place in places)
     return bytes((spec.OP_DOTS, len(places) - 1)) + named
 
 
 def brick(device: AnnouncedDevice, level: int, at: Voxel, voxels: Iterable[Voxel]) -> bytes:
-    """Give OCT for voxels of a brick; a node of which all are written has the mask 00."""
+    """Return OCT for voxels of a brick; a node whose voxels are all written has the mask 00."""
     inside = {tuple(v - (a << level) for v, a in zip(voxel, at, strict=True)) for voxel in voxels}
     out = bytes((spec.OP_OCT | level,)) + xyz(device, at)
     nodes = [(0, 0, 0)]
@@ -122,37 +122,37 @@ def brick(device: AnnouncedDevice, level: int, at: Voxel, voxels: Iterable[Voxel
 
 
 def differences(values: Sequence[int]) -> bytes:
-    """Give DIFF for nibbles from -8 to 7."""
+    """Return DIFF for nibbles from -8 to 7."""
     return counted(spec.OP_DIFF, len(values)) + pack_bits([value & 15 for value in values], 4)
 
 
 def colors(first: int, values: Sequence[tuple[int, int, int]]) -> bytes:
-    """Give COLORS."""
+    """Return COLORS."""
     return bytes((spec.OP_COLORS, first, len(values) - 1)) + b"".join(map(bytes, values))
 
 
 def single_voxel(device: AnnouncedDevice, index: int, value: int | None = None) -> bytes:
-    """Give ops that write one voxel."""
+    """Return ops that write the voxel with an index."""
     return skip(index) + (b"" if value is None else pen(device, value)) + run()
 
 
-# -- whatever fits
+# -- random ops that fit a device
 
 
 def random_pixel(device: AnnouncedDevice, rng: random.Random) -> int:
-    """Give a pixel that is not dark, with differing bytes where the format has several."""
+    """Return a random pixel value that is not dark."""
     return 1 if device.format == spec.FORMAT_MONO1 else rng.randint(1, device.full_pixel)
 
 
 def random_voxel(device: AnnouncedDevice, rng: random.Random) -> Voxel:
-    """Give a place on the grid."""
+    """Return a random voxel of the grid."""
     return rng.randrange(device.nx), rng.randrange(device.ny), rng.randrange(device.nz)
 
 
 def random_chain(
     device: AnnouncedDevice, rng: random.Random, octant: int, longest: int = 40
 ) -> tuple[Voxel, list[int]] | None:
-    """Give a start, and crumbs that stay on the grid; None if the main axis has one voxel."""
+    """Return a start, and crumbs that stay on the grid; None if the main axis has one voxel."""
     main = octant >> 3
     if device.grid[main] == 1:
         return None
@@ -177,7 +177,7 @@ def random_chain(
 
 
 def random_op(device: AnnouncedDevice, rng: random.Random) -> bytes:
-    """Give one op of those that the device has; it may lead off the grid."""
+    """Return a random op that the device has; it may lead off the grid."""
     makers: list[Callable[[], bytes]] = [
         lambda: pen(device, random_pixel(device, rng)),
         lambda: pen(device, 0) + run(rng.randint(1, 3)),
@@ -228,7 +228,7 @@ def _random_chain_op(device: AnnouncedDevice, rng: random.Random) -> bytes:
 
 
 def random_voxel_near(device: AnnouncedDevice, rng: random.Random, place: Voxel, far: int) -> Voxel:
-    """Give a place on the grid that is not far from another on each axis."""
+    """Return a voxel of the grid within ``far`` of another one on each axis."""
     x, y, z = (
         min(max(a + rng.randint(-far, far), 0), side - 1)
         for a, side in zip(place, device.grid, strict=True)
@@ -237,7 +237,7 @@ def random_voxel_near(device: AnnouncedDevice, rng: random.Random, place: Voxel,
 
 
 def random_brick(device: AnnouncedDevice, rng: random.Random, level: int, density: float) -> bytes:
-    """Give OCT for about so many of a brick's voxels that are on the grid."""
+    """Return OCT for a random part of a brick's voxels, all on the grid."""
     at = tuple(rng.randrange(-(-side >> level)) for side in device.grid)
     spans = [
         range(a << level, min(a + 1 << level, side))
@@ -254,7 +254,7 @@ def random_brick(device: AnnouncedDevice, rng: random.Random, level: int, densit
 
 
 def random_ops(device: AnnouncedDevice, rng: random.Random, size: int) -> bytes:
-    """Give ops of at most ``size`` bytes that no device refuses."""
+    """Return random valid ops of at most ``size`` bytes."""
     payload = run()
     decoder = ReferenceDecoder(device, Page())
     decoder.draw(payload)
@@ -271,7 +271,7 @@ def random_ops(device: AnnouncedDevice, rng: random.Random, size: int) -> bytes:
 
 
 def split_payloads(device: AnnouncedDevice, ops: Iterable[bytes]) -> list[bytes]:
-    """Put ops that do not depend on each other into as few payloads as they fit."""
+    """Pack independent ops, in order, into as few payloads as possible."""
     payloads = [b""]
     for op in ops:
         if len(payloads[-1]) + len(op) > device.max_payload:

@@ -1,7 +1,7 @@
-"""Packets as bytes, and bytes as packets, as plainly as sections 3 and 4 of protocol.md say it.
+"""Packet encoding and parsing, sections 3 and 4 of protocol.md, in their simplest form.
 
 A host's packet is written as its *body*: header and payload, as in the dialogues of section 17.5.
-The kit must be able to send what is wrong, so nothing here keeps anybody from it.
+Nothing is validated on the way out: the kit must be able to send invalid packets.
 """
 
 from __future__ import annotations
@@ -43,31 +43,31 @@ _FLAG_NAMES = {
 }
 
 
-# -- what a host sends
+# -- packets of a host
 
 
 def body(kind: int, flags: int = 0, seq: int = 0, frame: int = 0, payload: bytes = b"") -> bytes:
-    """Give header and payload of any packet."""
+    """Return header and payload of any packet."""
     return bytes((kind << 4 | flags, seq & 255, frame & 255)) + payload
 
 
 def hello(session: int, major: int = spec.VERSION_MAJOR, more: bytes = b"\0\0") -> bytes:
-    """Give a HELLO; ``more`` is all that follows its session."""
+    """Return a HELLO; ``more`` is all that follows its session."""
     return body(spec.TYPE_HELLO, payload=struct.pack("<BH", major, session) + more)
 
 
 def data(seq: int, frame: int, ops: bytes = b"", flags: int = CLEAR) -> bytes:
-    """Give a DATA packet."""
+    """Return a DATA packet."""
     return body(spec.TYPE_DATA, flags, seq, frame, ops)
 
 
 def status(tag: int) -> bytes:
-    """Give a STATUS."""
+    """Return a STATUS."""
     return body(spec.TYPE_STATUS, seq=tag)
 
 
 def read(start: int, count: int, tag: int = 0, flags: int = 0, reserved: int = 0) -> bytes:
-    """Give a READ."""
+    """Return a READ."""
     return body(spec.TYPE_READ, flags, tag, payload=struct.pack("<BII", reserved, start, count))
 
 
@@ -75,7 +75,7 @@ def read(start: int, count: int, tag: int = 0, flags: int = 0, reserved: int = 0
 
 
 def cobs_encode(packet: bytes) -> bytes:
-    """Encode by COBS, without the 00 that ends a packet."""
+    """COBS-encode a packet, without the 00 delimiter."""
     out, group = bytearray(), bytearray()
     for byte in packet:
         if len(group) == 254:
@@ -90,7 +90,7 @@ def cobs_encode(packet: bytes) -> bytes:
 
 
 def cobs_decode(segment: bytes) -> bytes | None:
-    """Decode COBS; None if a code byte asks for more bytes than there are."""
+    """COBS-decode a segment; return None if a code byte asks for more bytes than there are."""
     out, at = bytearray(), 0
     while at < len(segment):
         code = segment[at]
@@ -104,18 +104,18 @@ def cobs_decode(segment: bytes) -> bytes | None:
 
 
 def encode(packet: bytes) -> bytes:
-    """Give what goes on the wire for a body: with its check value, COBS, and the 00."""
+    """Return the wire form of a body: with check value, COBS-encoded, and delimited by 00."""
     return cobs_encode(packet + zlib.crc32(packet).to_bytes(CHECK_BYTES, "little")) + b"\0"
 
 
 def max_encoded_bytes(payload: int) -> int:
-    """Give the most bytes that a payload of this size may have on the wire."""
+    """Return the most bytes that a packet with a payload of this size can have on the wire."""
     size = payload + spec.LIMIT_OVERHEAD
     return size + -(-size // 254) + 1
 
 
 def decode_segment(segment: bytes, longest: int = spec.LIMIT_MAX_PAYLOAD) -> bytes | None:
-    """Give the body in a segment of at least 8 bytes; None if it is damaged."""
+    """Return the body in a segment of at least 8 bytes; None if it is damaged."""
     packet = cobs_decode(segment)
     if packet is None or not spec.LIMIT_OVERHEAD <= len(packet) <= longest + spec.LIMIT_OVERHEAD:
         return None
@@ -124,32 +124,32 @@ def decode_segment(segment: bytes, longest: int = spec.LIMIT_MAX_PAYLOAD) -> byt
 
 
 def count_damaged(stream: bytes, longest: int) -> int:
-    """Count the damaged segments of a stream that ends with 00, as section 3 defines them."""
+    """Return the number of damaged segments, section 3, of a stream that ends with 00."""
     return sum(
         len(segment) >= spec.LIMIT_MIN_SEGMENT and decode_segment(segment, longest) is None
         for segment in stream.split(b"\0")
     )
 
 
-# -- what a device answers
+# -- packets of a device
 
 
 class NoSuchFieldError(AttributeError):
-    """An answer is of another type than it must be: it does not have what was asked for."""
+    """The response is of another type, which does not have the field that was read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A packet of a device. The fields of its type's layout are attributes, too.
+    """A packet of a device. The fields of its type's layout are attributes.
 
-    Of an ACK, ``next`` is another name for ``seq``.
+    In an ACK, ``next`` is another name for ``seq``.
     """
 
     body: bytes
 
     @property
     def kind(self) -> int:
-        """Type, section 4."""
+        """Packet type, section 4."""
         return self.body[0] >> 4
 
     @property
@@ -169,12 +169,12 @@ class Response:
 
     @property
     def tail(self) -> bytes:
-        """What follows the fields of the layout."""
+        """Bytes behind the fields of the layout."""
         return self.body[HEADER_BYTES + _STRUCTS[self.kind].size :]
 
     @property
     def is_complete(self) -> bool:
-        """Whether it is of a device's type and long enough for that type's fields."""
+        """True if it is of a device's type and long enough for that type's fields."""
         layout = _STRUCTS.get(self.kind)
         return layout is not None and len(self.body) >= HEADER_BYTES + layout.size
 
@@ -191,16 +191,12 @@ class Response:
         layout = _STRUCTS.get(self.kind)
         return layout.unpack_from(self.body, HEADER_BYTES) if layout else ()
 
-    def is_a(self, kind: int) -> bool:
-        """Tell whether it is of a type."""
-        return self.kind == kind
-
     def __str__(self) -> str:
         return describe(self.body)
 
 
 def describe(packet: bytes) -> str:
-    """Say in words what a body is: ``DATA CLEAR|COMMIT seq 3 frame 1``."""
+    """Return a body in words, such as ``DATA CLEAR|COMMIT seq 3 frame 1``."""
     kind, flags = packet[0] >> 4, packet[0] & 15
     names = [name for bit, name in _FLAG_NAMES.get(kind, {}).items() if flags & bit]
     rest = flags & ~sum(bit for bit in _FLAG_NAMES.get(kind, {}) if flags & bit)

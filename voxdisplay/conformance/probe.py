@@ -1,6 +1,6 @@
-"""The hands of a check: talk with a device, draw, look, and read back.
+"""Operations of a check on a device: draw, present, verify what is on display, and read back.
 
-What is expected comes from ``decoder`` and ``page``.
+The expected pixels come from ``reference_decoder`` and ``reference_page``.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _PAGE_COUNTS = (spec.OP_SKIP, spec.OP_RUN, spec.OP_LIT)
 
 
 class Probe(Dialogue):
-    """A device under examination: a `Dialogue` about pictures.
+    """A device under test whose pages are known: a `Dialogue` with drawing and readback.
 
     Attributes
     ----------
     front : Page or None
-        What must be on display; None if that is not known.
+        The page that must be on display; None if it is not known.
     """
 
     front: Page | None = None
@@ -42,46 +42,46 @@ class Probe(Dialogue):
     # -- pictures
 
     def draw(self, payload: bytes, *, clear: bool = True, commit: bool = False) -> list[Response]:
-        """Send one packet of the frame at hand, and see that it is taken."""
+        """Send one packet of the current frame; raise `Violation` unless it is received."""
         flags = (CLEAR if clear else 0) | (COMMIT if commit else 0)
         seq = self.seq % 256
-        come = self.send_and_poll(packets.data(self.seq, self.frame, payload, flags))
-        for answer in come:
+        responses = self.send_and_poll(packets.data(self.seq, self.frame, payload, flags))
+        for answer in responses:
             if answer.kind == spec.TYPE_ERROR:
                 raise Violation(
-                    "the packet is taken", str(answer), self._why_refused(answer, payload)
+                    "the packet is taken", str(answer), self._refusal_cause(answer, payload)
                 )
         self.seq += 1
         if self.state.kind != spec.TYPE_ACK or self.state.next == seq:
             raise Violation(f"the packet with sequence number {seq} is received", str(self.state))
-        return come
+        return responses
 
-    def _why_refused(self, error: Response, payload: bytes) -> str:
+    def _refusal_cause(self, error: Response, payload: bytes) -> str:
         at = error.offset - packets.HEADER_BYTES
         found = device_bugs.refusals_by_bug(self.device, payload)
         likely = _join_causes(
             why for why, code, where in found if (code, where) == (error.code, at)
         )
         if not likely and 0 <= at < len(payload):
-            return f"look at how the op {payload[at]:02X} at byte {at} of the payload is read"
+            return f"check how the op {payload[at]:02X} at byte {at} of the payload is decoded"
         return likely
 
     def show(self, *payloads: bytes, clear: bool = True, exactly: bool = False) -> Response:
-        """Draw a frame, wait until it is on display, and see that it is what the ops say.
+        """Draw and present a frame, and require that it is on display as the ops define it.
 
         Parameters
         ----------
         *payloads : bytes
             The ops of each packet.
         clear : bool
-            Whether the frame starts dark.
+            True if the frame starts dark.
         exactly : bool
-            Demand the right digest; otherwise it is enough if READ gives the right picture.
+            Require the right digest; otherwise the right pixels, read back, suffice.
 
         Returns
         -------
         Answer
-            The ACK that says that it is on display.
+            The ACK that reports it as on display.
         """
         before = self.front or Page()
         after = Page() if clear else before.copy()
@@ -89,18 +89,18 @@ class Probe(Dialogue):
         for payload in payloads:
             decoder.draw(payload)
         self.front = None
-        come: list[Response] = []
+        responses: list[Response] = []
         for number, payload in enumerate(payloads):
-            come += self.draw(payload, clear=clear, commit=number == len(payloads) - 1)
-        ack = self.await_shown(self.frame, [*come, self.state])
+            responses += self.draw(payload, clear=clear, commit=number == len(payloads) - 1)
+        ack = self.await_shown(self.frame, [*responses, self.state])
         self.require_displayed(ack, after, before, list(payloads), clear=clear, exactly=exactly)
         self.front = after
         self.frame = (self.frame + 1) % 256
         return ack
 
-    def await_shown(self, frame: int, come: list[Response] | None = None) -> Response:
-        """Wait for an ACK that says that a frame is on display; ask for it if none comes."""
-        for answer in come or []:
+    def await_shown(self, frame: int, responses: list[Response] | None = None) -> Response:
+        """Wait for an ACK that reports a frame as on display, polling with STATUS if none comes."""
+        for answer in responses or []:
             if answer.kind == spec.TYPE_ACK and _is_shown(answer, frame):
                 return answer
         until_s = self.clock() + self.response_timeout_s
@@ -115,7 +115,7 @@ class Probe(Dialogue):
         raise Violation(
             f"frame {frame} is on display",
             str(self.state),
-            "is a whole frame shown at the next tick, and is SHOWN set then?",
+            "a whole frame is not presented at the next tick, or SHOWN is not set then",
         )
 
     def require_displayed(
@@ -128,7 +128,7 @@ class Probe(Dialogue):
         clear: bool = True,
         exactly: bool = False,
     ) -> None:
-        """Demand that a page is on display; an ACK of now carries its digest."""
+        """Require that a page is on display, by the digest of a current ACK or by readback."""
         device, before = self.device, before or Page()
         if device.has("DIGEST") and ack.digest == must.digest(device):
             return
@@ -158,7 +158,7 @@ class Probe(Dialogue):
                     for d, why in device_bugs.digests_by_bug(device, must, before)
                     if d == ack.digest
                 ),
-                "the pixels read back are right: the digest is not kept as section 8 says",
+                "the pixels read back are right: the digest is not updated as section 8 says",
             )
             raise Violation(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
 
@@ -201,12 +201,12 @@ class Probe(Dialogue):
     # -- reading back
 
     def read_range(self, start: int, count: int, flags: int = 0) -> tuple[dict[int, int], int]:
-        """READ once; give the pixels that are not dark, and how many voxels were covered."""
+        """Send one READ; return the lit pixels by index, and the number of voxels covered."""
         page = self.request_page(packets.read(start, count, 77, flags))
         return self.decode_page(page, start, count), page.count
 
     def decode_page(self, page: Response, start: int, count: int) -> dict[int, int]:
-        """Give the pixels of a PAGE that are not dark; demand that it answers such a READ."""
+        """Return the lit pixels of a PAGE; require that it is valid for a READ of this range."""
         decoder = PageOpsDecoder(self.device, start)
         try:
             decoder.draw(page.tail)
@@ -220,18 +220,18 @@ class Probe(Dialogue):
             raise Violation(
                 f"ops that cover `count` voxels, 1 to {count}",
                 f"count {page.count}, and ops for {decoder.cursor - start}",
-                "is `count` that of the ops, not that of the READ?",
+                "`count` must be that of the ops, not that of the READ",
             )
         return decoder.page.pixels
 
     def request_page(self, packet: bytes) -> Response:
-        """Send a READ that must be answered with PAGE."""
+        """Send a READ and require a PAGE in response."""
         answer = self.request(packet)
         self.require(answer.kind == spec.TYPE_PAGE, "PAGE", answer)
         return answer
 
     def read_page(self, flags: int = 0) -> dict[int, int]:
-        """Read a whole page."""
+        """Read a whole page; return its lit pixels by index."""
         pixels: dict[int, int] = {}
         at = 0
         for _ in range(_MAX_PAGE_PACKETS):
@@ -240,11 +240,11 @@ class Probe(Dialogue):
             part, count = self.read_range(at, self.device.voxel_count - at, flags)
             pixels |= part
             at += count
-        raise NotApplicable(f"the device covers so little with a PAGE that only {at} could be read")
+        raise NotApplicable(f"PAGEs cover too few voxels: {_MAX_PAGE_PACKETS} hold only {at}")
 
 
 class PageOpsDecoder(ReferenceDecoder):
-    """Draws the ops of a PAGE: the cursor begins at its start, and few ops are allowed."""
+    """Decoder of the ops of a PAGE: the cursor begins at its start, and few ops are allowed."""
 
     def __init__(self, device: AnnouncedDevice, start: int) -> None:
         super().__init__(device, Page())
@@ -261,7 +261,7 @@ class PageOpsDecoder(ReferenceDecoder):
 
 
 def _join_causes(reasons: Iterable[str]) -> str:
-    """Join the first few of several explanations."""
+    """Join the first three distinct causes."""
     return ", or: ".join(itertools.islice(dict.fromkeys(reasons), 3))
 
 

@@ -1,8 +1,7 @@
-"""ARC, section 7.7 of protocol.md, in its simplest form: one text for both directions.
+"""Range-coded chains (op ARC, section 7.7 of protocol.md), in their simplest form.
 
-A coder has ``bit`` and ``plain``; each takes the bit that is wanted and gives the one that is
-coded. The `Decoder` does not care what is wanted, the `Encoder` codes just that; so the pieces and
-steps below are written once.
+The model of pieces and steps is written once for both directions: a coder's ``bit`` and ``plain``
+take the value to encode and return the value coded, which for a decoder is the one it read.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ _TOP = 1 << 24
 
 
 class Coder(Protocol):
-    """Codes bits."""
+    """Binary range coder, of either direction."""
 
     def bit(self, i: int, j: int | None = None, want: int = 0) -> int:
-        """Code a bit with models i and j."""
+        """Code a bit with models i and j; return it. ``want`` is the value to encode."""
 
     def plain(self, n: int, want: int = 0) -> int:
-        """Code n bits without models."""
+        """Code a number of n bits without models; return it."""
 
 
 class _Models:
@@ -65,7 +64,7 @@ class _RangeCoder:
 
 
 class Decoder(_RangeCoder):
-    """Decodes; the want of whoever asks is nothing to it."""
+    """Range decoder: ignores the values to encode."""
 
     def __init__(self, data: bytes, refusal: Callable[[int], Exception]) -> None:
         super().__init__()
@@ -96,13 +95,13 @@ class Decoder(_RangeCoder):
         return bit
 
     def end(self) -> None:
-        """Demand that exactly three bytes behind the payload have been read."""
+        """Refuse the op unless exactly three bytes behind the payload have been read."""
         if self._at < len(self._data) + spec.ARC_BEHIND:
             raise self._refusal(spec.CODE_PADDING)
 
 
 class Encoder(_RangeCoder):
-    """Encodes what is wanted."""
+    """Range encoder."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -122,7 +121,7 @@ class Encoder(_RangeCoder):
         return want
 
     def end(self) -> bytes:
-        """Give the bytes."""
+        """Return the bytes of all that was coded."""
         numbers = [*self._numbers, (self._low + _TOP - 1) >> 24]
         for at in reversed(range(1, len(numbers))):
             numbers[at - 1] += numbers[at] >> 8
@@ -152,7 +151,7 @@ class _Axis:
 
 @dataclass(slots=True)
 class _AxisMemory:
-    """The memory of the three axes."""
+    """Step model: what the coder remembers of the three axes."""
 
     axes: list[_Axis] = field(default_factory=lambda: [_Axis(), _Axis(), _Axis()])
 
@@ -251,7 +250,7 @@ def decode(
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Some of a curve: places side by side, from where it jumps to or where the last one ended."""
+    """A piece: 26-connected voxels, from a jump or from where the piece before ended."""
 
     voxels: tuple[Voxel, ...]
     pen: int | None = None
@@ -259,7 +258,7 @@ class Piece:
 
 
 def encode(device: AnnouncedDevice, pieces: list[Piece]) -> bytes:
-    """Give the op ARC that draws pieces."""
+    """Return the op ARC that draws pieces."""
     coder = Encoder()
     memory, at = _AxisMemory(), (0, 0, 0)
     for number, piece in enumerate(pieces):

@@ -1,7 +1,7 @@
-"""What ops draw: a third reading of section 7 of protocol.md, written for being read.
+"""Reference decoder of ops (section 7 of protocol.md), written for readability.
 
 It is the simplest decoder that refuses all that must be refused. Every rule that is easily misread
-is a small method of its own, so that ``mistakes`` can misread one at a time. Knows no packet.
+is a small method of its own, so that ``device_bugs`` can misread one at a time. Knows no packet.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from voxdisplay.wire import spec
 
 
 class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the kit
-    """Ops that a device refuses; ``at`` counts from the first byte of the payload."""
+    """Ops that a device must refuse; ``at`` counts from the first byte of the payload."""
 
     def __init__(self, code: int, at: int) -> None:
         super().__init__(f"code {code} at {at}")
@@ -24,7 +24,7 @@ class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the k
 
 
 class ReferenceDecoder:
-    """Draws the payloads of DATA packets on a page."""
+    """Decoder that draws the payloads of DATA packets on a page."""
 
     def __init__(self, device: AnnouncedDevice, page: Page) -> None:
         self.device = device
@@ -36,7 +36,7 @@ class ReferenceDecoder:
         self._op_at = 0
 
     def draw(self, payload: bytes) -> None:
-        """Draw the ops of one packet, or raise `PacketRefused`."""
+        """Draw the ops of one packet, or raise `Refused`."""
         self.begin_packet()
         self.draw_more(payload)
 
@@ -47,86 +47,86 @@ class ReferenceDecoder:
             self._op_at = self._at
             self._op(self._byte())
 
-    # -- rules that can be misread
+    # -- rules that can be misread, one method each
 
     def begin_packet(self) -> None:
-        """At the start of each packet the cursor is 0 and the pen is the full pixel."""
+        """Reset the cursor to 0 and the pen to the full pixel."""
         self.cursor, self.pen = 0, self.device.full_pixel
 
     def coordinates(self, a: int, b: int, c: int) -> Voxel:
-        """Coordinates come in the order x, y, z."""
+        """Return x, y, z of coordinates as they were sent: in the order x, y, z."""
         return a, b, c
 
     def axes_of(self, octant: int) -> tuple[int, tuple[int, int, int]]:
-        """Octant = 8 · main + (1 if x falls) + 2 · (1 if y falls) + 4 · (1 if z falls)."""
+        """Return main axis and direction on each axis: bits 0..2 are set if x, y, z falls."""
         x, y, z = (-1 if octant >> axis & 1 else 1 for axis in range(3))
         return octant >> 3, (x, y, z)
 
     def chain_axes(self, crumb: int, main: int) -> set[int]:
-        """Bit 0 is for axis main + 1, bit 1 for axis main + 2."""
+        """Return the axes that a step moves on: bit 0 is for axis main + 1, bit 1 for main + 2."""
         return {main} | {(main + 1 + bit) % 3 for bit in (0, 1) if crumb >> bit & 1}
 
     def unpack_bits(self, raw: bytes, count: int, bits: int) -> list[int]:
-        """Crumbs, nibbles and MONO1 pixels: the first is in the lowest bits of the first byte."""
+        """Unpack crumbs, nibbles or MONO1 pixels, the first in the lowest bits."""
         per_byte = 8 // bits
         return [raw[i // per_byte] >> i % per_byte * bits & ((1 << bits) - 1) for i in range(count)]
 
     def steps_of(self, byte: int) -> int:
-        """Give the steps of a chain: the byte is n - 1."""
+        """Return the number of steps of a chain: the byte is n - 1."""
         return byte + 1
 
     def chain_start(self, at: Voxel) -> list[Voxel]:
-        """Begin a chain by writing the voxel at the cursor."""
+        """Return what a chain writes before its first step: the voxel at the cursor."""
         return [at]
 
     def count_of(self, low: int) -> int:
-        """C = 0..30 is n = c + 1, and c = 31 is n = 32 + k; k is LEB128."""
+        """Return a count: n = c + 1 for c = 0..30, n = 32 + k for c = 31, k as LEB128."""
         return low + 1 if low < 31 else 32 + self._leb128()
 
     def rounded(self, k: int, d: int, length: int) -> int:
-        """Ties of a LINE go up: floor((2 k d + L) / (2 L))."""
+        """Return the offset of voxel k of a LINE: floor((2 k d + L) / (2 L)), ties rounded up."""
         return (2 * k * d + length) // (2 * length) if length else 0
 
     def span(self, a: int, b: int) -> range:
-        """Include both ends of a BOX, whichever is the larger."""
+        """Return the coordinates of a BOX on an axis: both ends included, in either order."""
         return range(min(a, b), max(a, b) + 1)
 
     def child(self, bit: int) -> Voxel:
-        """Bit c = cx + 2 · cy + 4 · cz."""
+        """Return (cx, cy, cz) of a child: bit c = cx + 2 · cy + 4 · cz."""
         return bit & 1, bit >> 1 & 1, bit >> 2 & 1
 
     def difference(self, nibble: int) -> int:
-        """Four bits in two's complement."""
+        """Return a DIFF's nibble as a number: four bits in two's complement."""
         return nibble - 16 if nibble > 7 else nibble
 
     def after_chain(self, begin: Voxel, end: Voxel) -> Voxel:
-        """After a chain the cursor is at the last voxel."""
+        """Return the cursor after a chain: the last voxel."""
         del begin
         return end
 
     def after_shape(self, begin: Voxel, end: Voxel) -> Voxel:
-        """After LINE, BOX and DOTS the cursor is at the voxel named last."""
+        """Return the cursor after LINE, BOX or DOTS: the voxel named last."""
         del begin
         return end
 
     def after_brick(self, cursor: int, corner: int) -> int:
-        """OCT leaves the cursor where it is."""
+        """Return the cursor after OCT: unchanged."""
         del corner
         return cursor
 
     def after_literal(self, before: int, last: int) -> int:
-        """LIT makes the last of its pixels the pen."""
+        """Return the pen after LIT: the last of its pixels."""
         del before
         return last
 
     def pixel_of(self, raw: bytes) -> int:
-        """Read a pixel's bytes as a little-endian integer."""
+        """Return the pixel value: the bytes as a little-endian integer."""
         return int.from_bytes(raw, "little")
 
-    # -- reading
+    # -- operands
 
     def refusal(self, code: int) -> Refused:
-        """Give the refusal of the op at hand."""
+        """Return the refusal of the current op."""
         return Refused(code, self._op_at)
 
     def _take(self, count: int) -> bytes:
@@ -139,7 +139,7 @@ class ReferenceDecoder:
         return self._take(1)[0]
 
     def rest(self) -> bytes:
-        """Give all that is left of the payload, and be at its end."""
+        """Consume the rest of the payload and return it."""
         return self._take(len(self._payload) - self._at)
 
     def _read_voxel(self) -> Voxel:
@@ -174,7 +174,7 @@ class ReferenceDecoder:
     # -- drawing
 
     def require_on_grid(self, place: Voxel) -> Voxel:
-        """Give a place back that is on the grid."""
+        """Return the voxel; raise `Refused` if it is off the grid."""
         if not all(0 <= at < side for at, side in zip(place, self.device.grid, strict=True)):
             raise self.refusal(spec.CODE_OUTSIDE)
         return place
@@ -185,7 +185,7 @@ class ReferenceDecoder:
         return self.device.voxel_at(self.cursor)
 
     def write_voxels(self, places: Iterable[Voxel]) -> None:
-        """Write the pen to places."""
+        """Write the pen to voxels; raise `Refused` if one is off the grid."""
         for index in [self.device.index(*self.require_on_grid(place)) for place in places]:
             self.page.write(index, self.pen)
 
@@ -206,49 +206,49 @@ class ReferenceDecoder:
         raise self.refusal(spec.CODE_OP)
 
     def op_end(self, _: int) -> None:
-        """Demand that nothing follows END but 00."""
+        """END: refuse what follows unless all of it is 00."""
         if any(self.rest()):
             raise self.refusal(spec.CODE_PADDING)
 
     def op_move(self, _: int) -> None:
-        """Set the cursor by MOVE."""
+        """MOVE: set the cursor."""
         self.cursor = self.device.index(*self.require_on_grid(self._read_voxel()))
 
     def op_arc(self, _: int) -> None:
-        """Draw an ARC."""
+        """ARC: draw range-coded chains."""
         for pen, voxel in range_coded_chains.decode(self.rest(), self.device, self.refusal):
             self.pen = self.pen if pen is None else pen
             self.write_voxels([voxel])
 
     def op_pen(self, _: int) -> None:
-        """Set the pen by PEN."""
+        """PEN: set the pen."""
         pen = self.pixel_of(self._take(self.device.pixel_bytes))
         if self.device.format == spec.FORMAT_MONO1 and pen > 1:
             raise self.refusal(spec.CODE_PIXEL)
         self.pen = pen
 
     def op_skip(self, low: int) -> None:
-        """Move the cursor on by SKIP."""
+        """SKIP: advance the cursor."""
         count = self.count_of(low)
         if self.cursor + count > self.device.voxel_count:
             raise self.refusal(spec.CODE_OUTSIDE)
         self.cursor += count
 
     def op_run(self, low: int) -> None:
-        """Draw a RUN."""
+        """RUN: write the pen to n voxels in scan order."""
         count = self.count_of(low)
         if self.cursor + count > self.device.voxel_count:
             raise self.refusal(spec.CODE_OUTSIDE)
         self._write_scan_order([self.pen] * count)
 
     def op_literal(self, low: int) -> None:
-        """Draw a LIT."""
+        """LIT: write n pixels in scan order."""
         values = self._pixels(self.count_of(low))
         self._write_scan_order(values)
         self.pen = self.after_literal(self.pen, values[-1])
 
     def op_differences(self, low: int) -> None:
-        """Draw a DIFF."""
+        """DIFF: write n pixels by their differences."""
         values, pen = [], self.pen
         for nibble in self._padded_bits(self.count_of(low), 4):
             pen = (pen + self.difference(nibble)) % 256
@@ -257,11 +257,11 @@ class ReferenceDecoder:
         self.pen = pen
 
     def op_step(self, octant: int) -> None:
-        """Draw a STEP."""
+        """STEP: draw a chain from the cursor."""
         self._chain(octant, None)
 
     def op_from(self, octant: int) -> None:
-        """Draw a FROM."""
+        """FROM: draw a chain from the voxel that it names."""
         self._chain(octant, self._read_voxel())
 
     def _chain(self, octant: int, named: Voxel | None) -> None:
@@ -280,7 +280,7 @@ class ReferenceDecoder:
         self.cursor = self.device.index(*self.after_chain(begin, at))
 
     def op_line(self, _: int) -> None:
-        """Draw a LINE."""
+        """LINE: draw a straight line from the cursor."""
         end = self._read_voxel()
         begin = self._cursor_voxel()
         self.require_on_grid(end)
@@ -294,7 +294,7 @@ class ReferenceDecoder:
         self.cursor = self.device.index(*self.after_shape(begin, end))
 
     def op_box(self, _: int) -> None:
-        """Draw a BOX."""
+        """BOX: fill the box between the cursor and the voxel that it names."""
         end = self._read_voxel()
         begin = self._cursor_voxel()
         self.require_on_grid(end)
@@ -303,14 +303,14 @@ class ReferenceDecoder:
         self.cursor = self.device.index(*self.after_shape(begin, end))
 
     def op_dots(self, _: int) -> None:
-        """Draw DOTS."""
+        """DOTS: write single voxels."""
         places = [self._read_voxel() for _ in range(self.steps_of(self._byte()))]
         self.write_voxels(places)
         begin = self.device.voxel_at(min(self.cursor, self.device.voxel_count - 1))
         self.cursor = self.device.index(*self.after_shape(begin, places[-1]))
 
     def op_brick(self, level: int) -> None:
-        """Draw an OCT."""
+        """OCT: write voxels of a brick."""
         x, y, z = self._read_voxel()
         side = 1 << level
         corner = (x * side, y * side, z * side)
@@ -339,7 +339,7 @@ class ReferenceDecoder:
         return [(x + i, y + j, z + k) for k in part for j in part for i in part]
 
     def op_colors(self, _: int) -> None:
-        """Set COLORS of the palette."""
+        """COLORS: set entries of the palette."""
         first = self._byte()
         count = self._byte() + 1
         raw = self._take(3 * count)

@@ -1,4 +1,4 @@
-"""A page and its digest, as plainly as sections 2.1 and 8 of protocol.md say it."""
+"""Reference page: pixels, palette and digest (sections 2.1 and 8 of protocol.md)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _brightness(level: int, top: int) -> int:
 
 
 def rgb(red: int, green: int, blue: int) -> int:
-    """Give a colour as one number, as section 8 does."""
+    """Return a colour as one number, as section 8 does."""
     return red + 256 * green + 65536 * blue
 
 
@@ -26,7 +26,7 @@ DEFAULT_PALETTE = tuple(
 
 
 def mix(index: int, value: int) -> int:
-    """Give what one voxel adds to the digest."""
+    """Return the term of one voxel in the digest."""
     h = (index * spec.DIGEST_MUL_INDEX + value * spec.DIGEST_MUL_VALUE) & _U32
     h ^= h >> spec.DIGEST_SHIFT_1
     h = h * spec.DIGEST_MUL_1 & _U32
@@ -37,13 +37,13 @@ def mix(index: int, value: int) -> int:
 
 @dataclass(slots=True)
 class Page:
-    """A page: the values of its pixels that are not dark, by index, and its palette."""
+    """A page: the values of its lit pixels by index, and its palette."""
 
     pixels: dict[int, int] = field(default_factory=dict)
     palette: list[int] = field(default_factory=lambda: list(DEFAULT_PALETTE))
 
     def copy(self) -> Page:
-        """Give one that can be drawn on."""
+        """Return an independent copy."""
         return Page(dict(self.pixels), list(self.palette))
 
     def write(self, index: int, value: int) -> None:
@@ -54,7 +54,7 @@ class Page:
             self.pixels.pop(index, None)
 
     def digest(self, device: AnnouncedDevice) -> int:
-        """Give the digest of section 8."""
+        """Return the digest of section 8."""
         total = sum(mix(index, value) for index, value in self.pixels.items())
         if device.has("PALETTE"):
             for i, (color, default) in enumerate(zip(self.palette, DEFAULT_PALETTE, strict=True)):

@@ -1,4 +1,4 @@
-"""What came of an examination, as lines for a person and as one object for a script."""
+"""Presentation of the results, as lines for a person and as one JSON object for a script."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _LAST_LINES = 8  # of a transcript, unless all is shown
 
 
 def report_lines(report: Report, *, transcripts: bool) -> Iterator[str]:
-    """Say what is broken, what came of each section, and how it stands as a whole.
+    """Yield the violations, the counts of each section, and the conclusion.
 
     Parameters
     ----------
     report : Report
     transcripts : bool
-        Whether the last packets of each broken check are shown.
+        True if the last packets of each broken check are shown.
     """
     for result in report.results:
         if result.verdict is Verdict.BROKEN:
@@ -54,14 +54,14 @@ def _counts(verdicts: list[Verdict]) -> str:
 def _conclusion(report: Report) -> str:
     held = report.count(Verdict.HOLDS)
     if report.holds:
-        return f"all that was looked at holds: {held} checks"
+        return f"conforms: all {held} checks that apply hold"
     not_run = report.count(Verdict.NOT_RUN)
     missed = f", {not_run} not run" if not_run else ""
     return f"{report.count(Verdict.BROKEN)} broken, {held} hold{missed}"
 
 
 def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
-    """Say what is wrong: what must be, what was, and what went over the wire."""
+    """Yield what is wrong: what must be, what was, and the last packets."""
     check = result.check
     yield f"BROKEN {check.id}"
     yield f"  section {check.section}: {check.requirement}"
@@ -79,13 +79,13 @@ def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
 
 
 def transcript_lines(log: tuple[LogEntry, ...]) -> Iterator[str]:
-    """Show what went (->) and came (<-): packets without COBS and check value, as section 17.5."""
+    """Yield packets sent (->) and received (<-), without COBS and check value, as section 17.5."""
     for line in log:
         yield printable(f"    {line}")
 
 
 def as_json(port: str, report: Report) -> dict[str, Any]:
-    """Give all of it for a script; transcripts of what is broken."""
+    """Return the results as one JSON object, with transcripts of the broken checks."""
     device = report.device
     return {
         "port": port,

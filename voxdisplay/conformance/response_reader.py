@@ -1,7 +1,7 @@
-"""What comes from a device: segments -> answers, and a list of all that breaks the document.
+"""Incremental parser of a device's responses, which records all that is malformed.
 
-Everything that a device sends, in whatever check, passes here. What is wrong with a packet in
-itself is noted by the rule that it breaks, and looked at by the checks of ``checks/answers``.
+Everything that a device sends, in whatever check, passes here. A packet that is malformed in itself
+is recorded under the rule that it breaks, for the checks of ``checks/all_responses``.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ _MAX_PER_RULE = 5
 
 
 class ResponseReader:
-    """An incremental reader of answers.
+    """Incremental parser of segments into responses.
 
     Attributes
     ----------
-    device : Said or None
-        What the device announced; before that, anything may come (a boot text, say).
-    faults : dict of str to list of str
-        What was wrong, by the name of the rule; of each rule the first few.
-    heard : int
-        How many bytes came.
-    segments : int
-        How many segments came that could be packets, damaged ones included.
+    device : AnnouncedDevice or None
+        Set after the first INFO. Before, nothing is recorded: there may be boot text on the line.
+    violations : dict of str to list of str
+        The first few violations of each rule, by the rule's name.
+    byte_count : int
+        Number of bytes received.
+    segment_count : int
+        Number of segments received that could be packets, damaged ones included.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class ResponseReader:
         self._segment = bytearray()
 
     def feed(self, come: bytes) -> Iterator[Response]:
-        """Take bytes; give the answers that they complete."""
+        """Take bytes; yield the responses that they complete."""
         self.byte_count += len(come)
         *ended, rest = (bytes(self._segment) + come).split(b"\0")
         self._segment[:] = rest[-_LONGEST_SEGMENT:]
@@ -54,7 +54,7 @@ class ResponseReader:
         self.segment_count += len(segment) >= spec.LIMIT_MIN_SEGMENT
         packet = packets.cobs_decode(segment)
         if len(segment) < spec.LIMIT_MIN_SEGMENT or packet is None:
-            self._record("delimited", f"{_hex(segment)} is no COBS of a packet")
+            self._record("delimited", f"{_hex(segment)} is not COBS of a packet")
             return None
         if packets.cobs_encode(packet) != segment:
             self._record(
@@ -66,7 +66,7 @@ class ResponseReader:
             return None
         answer = Response(inner)
         if not answer.is_complete:
-            self._record("whole", f"{_hex(inner)} is of no type of a device, or too short for it")
+            self._record("whole", f"{_hex(inner)} has no type of a device, or is too short for it")
             return None
         self._check_response(answer)
         return answer
@@ -85,7 +85,7 @@ class ResponseReader:
             try:
                 answer.tail.decode()
             except UnicodeDecodeError:
-                self._record("text", f"text {_hex(answer.tail)} of an ERROR is no UTF-8")
+                self._record("text", f"text {_hex(answer.tail)} of an ERROR is not UTF-8")
 
     def _check_ack(self, ack: Response, device: AnnouncedDevice) -> None:
         if ack.boot != device.boot:

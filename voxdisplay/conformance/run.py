@@ -1,4 +1,4 @@
-"""One check after the other, and what came of each. Prints nothing."""
+"""Execution of the checks, one after the other, and their results. Prints nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from voxdisplay.conformance import checks as _checks  # noqa: F401 - they enlist themselves
+from voxdisplay.conformance import checks as _checks  # noqa: F401 - they register themselves
 from voxdisplay.conformance import handshake_diagnosis
 from voxdisplay.conformance.announced_device import FORMATS, AnnouncedDevice
 from voxdisplay.conformance.catalogue import CHECKS, Check
@@ -21,11 +21,11 @@ from voxdisplay.transport import Transport
 from voxdisplay.wire import spec
 
 _T = TypeVar("_T")
-_MAX_SILENT_CHECKS = 3  # checks in a row without any answer, and the device is given up
+_MAX_SILENT_CHECKS = 3  # in a row; then the device is given up
 
 
 class Verdict(enum.Enum):
-    """What came of a check."""
+    """Outcome of a check."""
 
     HOLDS = "holds"
     BROKEN = "broken"
@@ -35,18 +35,18 @@ class Verdict(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What came of one check.
+    """Result of one check.
 
     Attributes
     ----------
     check : Check
     verdict : Verdict
-    must, came, likely : str
-        If it is broken: what the document demands here, what was, and the probable mistake.
+    expected, actual, likely_cause : str
+        If it is broken: what the document requires, what the device did, and the probable bug.
     reason : str
-        If it was not made: why.
-    log : tuple of Line
-        What went over the wire, oldest first.
+        If it was not run: why.
+    log : tuple of LogEntry
+        Packets sent and received, oldest first.
     """
 
     check: Check
@@ -59,25 +59,25 @@ class Result:
 
     @property
     def last_sent(self) -> LogEntry | None:
-        """The latest packet that was sent and did not only ask."""
-        asking = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
-        lines = [line for line in self.log if line.sent]
-        told = [line for line in lines if line.data[0] not in asking]
-        return (told or lines)[-1] if lines else None
+        """Latest packet sent, if possible one other than STATUS and READ."""
+        polls = {spec.TYPE_STATUS << 4, spec.TYPE_READ << 4}
+        sent = [entry for entry in self.log if entry.sent]
+        others = [entry for entry in sent if entry.data[0] not in polls]
+        return (others or sent)[-1] if sent else None
 
 
 @dataclass(slots=True)
 class Report:
-    """What came of an examination.
+    """Results of a run.
 
     Attributes
     ----------
-    device : Said or None
-        What the device announced, None if it did not answer.
+    device : AnnouncedDevice or None
+        None if the device did not respond.
     results : list of Result
         In the order of the checks.
-    left : str
-        What is on display now.
+    display_state : str
+        What is on display now, in words.
     """
 
     device: AnnouncedDevice | None = None
@@ -85,27 +85,27 @@ class Report:
     display_state: str = "unknown"
 
     def count(self, verdict: Verdict) -> int:
-        """Count the checks of which this came."""
+        """Return the number of checks with a verdict."""
         return sum(result.verdict is verdict for result in self.results)
 
     @property
     def holds(self) -> bool:
-        """Whether every check that concerns the device was made, and holds."""
+        """True if every check that applies to the device was run, and holds."""
         return not self.count(Verdict.BROKEN) and not self.count(Verdict.NOT_RUN)
 
 
 def select_checks(patterns: Iterable[str]) -> list[Check]:
-    """Give the checks that any of the patterns names; all, if there is no pattern.
+    """Return the checks that any of the patterns selects; all, if there is no pattern.
 
     Raises
     ------
     ValueError
-        If a pattern names none.
+        If a pattern selects none.
     """
     patterns = list(patterns)
     for pattern in patterns:
         if not any(check.matches(pattern) for check in CHECKS):
-            raise ValueError(f"no check is named by {pattern!r}")
+            raise ValueError(f"{pattern!r} matches no check")
     return [
         check
         for check in CHECKS
@@ -125,7 +125,7 @@ def run_checks(
     greeted: Callable[[AnnouncedDevice, bool], object] | None = None,
     ended: Callable[[Result], object] | None = None,
 ) -> Report:
-    """Examine the device at the other end of a pipe.
+    """Check the device at the other end of a pipe against protocol.md.
 
     Parameters
     ----------
@@ -135,10 +135,10 @@ def run_checks(
     timeout_s, opening_s, baud, seed, clock
         As of `Probe`.
     greeted : callable, optional
-        Is told what the device announced, and whether its picture could be kept, before anything
-        is drawn.
+        Called before anything is drawn, with the announced device and whether its picture could be
+        saved.
     ended : callable, optional
-        Is told what came of each check.
+        Called with the result of each check.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def run_checks(
     Raises
     ------
     ValueError
-        If ``only`` names no check.
+        If a pattern of ``only`` selects no check.
     """
     selected = select_checks(only)
     probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed, clock=clock)
@@ -168,7 +168,7 @@ def run_checks(
             report.results.append(result)
             if ended:
                 ended(result)
-    finally:  # also when somebody has seen enough
+    finally:  # after an interrupt, too
         report.display_state = (
             _none_if_port_lost(lambda: restore_page(probe, kept)) or "unknown: the port is gone"
         )
@@ -176,7 +176,7 @@ def run_checks(
 
 
 def _handshake(probe: Probe) -> Result | None:
-    """Say hello; give what is wrong if the device cannot be talked to at all."""
+    """Open the first session; return the violation if the device cannot be tested at all."""
     likely = ""
     try:
         met = probe.handshake()
@@ -192,8 +192,8 @@ def _handshake(probe: Probe) -> Result | None:
     )
     if met and is_sound:
         return None
-    came = str(probe.info) if met else "nothing that could be read"
-    must = "an INFO that says what the device is"
+    came = str(probe.info) if met else "no response that could be parsed"
+    must = "an INFO that describes the device"
     return Result(
         handshake_diagnosis.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log)
     )
@@ -202,11 +202,11 @@ def _handshake(probe: Probe) -> Result | None:
 def _all_not_run(stranger: Result, selected: list[Check]) -> Iterator[Result]:
     yield stranger
     for check in selected:
-        yield Result(check, Verdict.NOT_RUN, reason="the device cannot be talked to")
+        yield Result(check, Verdict.NOT_RUN, reason="the handshake failed")
 
 
 def _run_selected(probe: Probe, selected: list[Check]) -> Iterator[Result]:
-    """Make the checks, until the device or the port is gone."""
+    """Run the checks until the device or the port is gone."""
     deaf, gone = 0, ""
     for check in selected:
         if gone:
@@ -218,7 +218,7 @@ def _run_selected(probe: Probe, selected: list[Check]) -> Iterator[Result]:
         except _DeviceLost as unheard:
             result = unheard.result
             deaf += 1
-            gone = "the device does not answer any more" if deaf == _MAX_SILENT_CHECKS else ""
+            gone = "the device does not respond any more" if deaf == _MAX_SILENT_CHECKS else ""
         except TransportError as error:
             gone = str(error)
             result = _violation(probe, check, Violation("the port stays open", gone))
@@ -226,7 +226,7 @@ def _run_selected(probe: Probe, selected: list[Check]) -> Iterator[Result]:
 
 
 class _DeviceLost(Exception):  # noqa: N818
-    """The device does not even answer HELLO."""
+    """The device does not even respond to HELLO."""
 
     def __init__(self, result: Result) -> None:
         super().__init__()
@@ -234,7 +234,7 @@ class _DeviceLost(Exception):  # noqa: N818
 
 
 def _run_check(probe: Probe, check: Check) -> Result:
-    """Make one check, in a session of its own; afterwards the device must answer HELLO."""
+    """Run one check in a session of its own; afterwards the device must respond to HELLO."""
     obstacle = check.not_applicable_reason(probe.device)
     if obstacle:
         return Result(check, Verdict.NOT_APPLICABLE, reason=obstacle)
@@ -248,7 +248,7 @@ def _run_check(probe: Probe, check: Check) -> Result:
     except Violation as broken:
         result = _violation(probe, check, broken)
     except NoSuchFieldError as field:
-        result = _violation(probe, check, Violation("an answer of another type", str(field)))
+        result = _violation(probe, check, Violation("a response of another type", str(field)))
     made = tuple(probe.log)
     try:
         probe.open_session()
@@ -274,7 +274,7 @@ def _violation(probe: Probe, check: Check, broken: Violation) -> Result:
 
 
 def _none_if_port_lost(do: Callable[[], _T]) -> _T | None:
-    """Do something that a lost port may end."""
+    """Return the result of a call; None if the port is lost meanwhile."""
     try:
         return do()
     except TransportError:

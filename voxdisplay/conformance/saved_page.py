@@ -1,7 +1,7 @@
-"""What was on display before the examination, and its way back there.
+"""The picture before the checks, read back so that it can be restored after them.
 
-The ops of a PAGE are ops of a DATA packet, too: behind a SKIP to where they begin they draw the
-same pixels (sections 7 and 10). The palette cannot be read, so that it is not brought back.
+The ops of a PAGE are also ops of a DATA packet: behind a SKIP to their start they draw the same
+pixels (sections 7 and 10). The palette cannot be read, so it is not restored.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ _TIMEOUT_S = 20.0
 
 @dataclass(frozen=True, slots=True)
 class SavedPage:
-    """A picture as the device told it: payloads that draw it, and its digest."""
+    """A picture that was on display: payloads that draw it, and its digest."""
 
     payloads: tuple[bytes, ...]
     digest: int
 
 
 def save_page(probe: Probe) -> SavedPage | None:
-    """Read what is on display; None if that cannot be, or takes too long."""
+    """Read the front page; return None if it cannot be read, or not in time."""
     device = probe.device
     until_s = probe.clock() + _TIMEOUT_S
     payloads, at = [], 0
@@ -36,7 +36,7 @@ def save_page(probe: Probe) -> SavedPage | None:
         digest = probe.state.digest
         while at < device.voxel_count:
             page = probe.request_page(packets.read(at, device.voxel_count - at))
-            probe.decode_page(page, at, device.voxel_count - at)  # is it a picture at all?
+            probe.decode_page(page, at, device.voxel_count - at)  # raises if it is malformed
             if probe.clock() > until_s:
                 return None
             payloads.append(ops.skip(at) + page.tail)
@@ -47,7 +47,7 @@ def save_page(probe: Probe) -> SavedPage | None:
 
 
 def restore_page(probe: Probe, kept: SavedPage | None) -> str:
-    """Show what was kept, or nothing; say what is on display now."""
+    """Present the saved page, or a dark one; return in words what is on display now."""
     try:
         probe.open_session()
         if kept:
@@ -63,5 +63,5 @@ def restore_page(probe: Probe, kept: SavedPage | None) -> str:
         probe.draw(b"", commit=True)
         probe.await_shown(0, [probe.state])
     except Violation:
-        return "unknown: the device did not answer any more"
+        return "unknown: the device did not respond any more"
     return "dark"

@@ -1,4 +1,4 @@
-"""The checks, one module per group of sections, imported in the order in which they are run."""
+"""The checks, one module per topic, imported in the order in which they run."""
 
 from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is that of the checks
     delimiting,

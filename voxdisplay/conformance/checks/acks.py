@@ -1,4 +1,4 @@
-"""Section 9: when an ACK comes, and what it says."""
+"""Checks of section 9: occasions and fields of ACK."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def status_(probe: Probe) -> None:
         probe.require_ack(answer, asked=1, last=tag, session=probe.session)
 
 
-@check("9", "each-status", "each STATUS is answered, in their order")
+@check("9", "each-status", "each STATUS is answered, in order")
 def each_status(probe: Probe) -> None:
-    come = probe.send_and_poll(status(3), status(2), status(1))
-    tags = [answer.last for answer in come if answer.kind == spec.TYPE_ACK]
+    responses = probe.send_and_poll(status(3), status(2), status(1))
+    tags = [answer.last for answer in responses if answer.kind == spec.TYPE_ACK]
     probe.require(tags == [3, 2, 1], "ACK with 3, 2 and 1 in `last`", tags)
 
 
@@ -40,7 +40,7 @@ def data_answered(probe: Probe) -> None:
         probe.require_ack(ack, asked=0, last=seq, next=seq + 1, session=probe.session)
 
 
-@check("9", "received", "`next` and the bitmap `received` say which packets have been received")
+@check("9", "received", "`next` and the bitmap `received` name the packets received")
 def received(probe: Probe) -> None:
     between = list(range(1, spec.LIMIT_WINDOW - 1))
     probe.rng.shuffle(between)
@@ -60,22 +60,22 @@ def received(probe: Probe) -> None:
 def last_at_first(probe: Probe) -> None:
     probe.draw(b"")
     probe.open_session()
-    come = probe.send_raw_and_poll(b"\x08\x11\x22\x33\x44\x55\x66\x77\0", "a damaged segment")
-    probe.require(len(come) == 1, "one ACK for a damaged segment", come)
-    probe.require_ack(come[0], last=255, next=0)
+    responses = probe.send_raw_and_poll(b"\x08\x11\x22\x33\x44\x55\x66\x77\0", "a damaged segment")
+    probe.require(len(responses) == 1, "one ACK for a damaged segment", responses)
+    probe.require_ack(responses[0], last=255, next=0)
 
 
 @check("9", "damage-answered", "each damaged segment is answered with ACK if a session is open")
 def damage_answered(probe: Probe) -> None:
     probe.request(data(0, 0))
     junk = b"\x08\x11\x22\x33\x44\x55\x66\x77\0"
-    come = probe.send_raw_and_poll(3 * junk, "three damaged segments")
-    probe.require(len(come) == 3, "three ACKs", len(come))
-    counts = [ack.damaged for ack in come if ack.kind == spec.TYPE_ACK]
+    responses = probe.send_raw_and_poll(3 * junk, "three damaged segments")
+    probe.require(len(responses) == 3, "three ACKs", len(responses))
+    counts = [ack.damaged for ack in responses if ack.kind == spec.TYPE_ACK]
     begin = counts[0] if counts else 0
     counted = [(count - begin) % 65536 for count in counts] == [0, 1, 2]
     probe.require(counted, "`damaged` grows by one with each", counts)
-    for ack in come:
+    for ack in responses:
         probe.require_ack(ack, asked=0, last=0, next=1)
 
 
@@ -84,8 +84,10 @@ def damage_unanswered(probe: Probe) -> None:
     probe.poll_status()
     before = probe.state.damaged
     probe.end_session()
-    come = probe.send_raw_and_poll(b"\x08\x11\x22\x33\x44\x55\x66\x77\0", "a damaged segment")
-    probe.require(not come, "no answer to damage without a session", come and come[0])
+    responses = probe.send_raw_and_poll(b"\x08\x11\x22\x33\x44\x55\x66\x77\0", "a damaged segment")
+    probe.require(
+        not responses, "no response to damage without a session", responses and responses[0]
+    )
     probe.open_session()
     probe.poll_status()
     probe.require_ack(probe.state, damaged=(before + 1) % 65536)
@@ -100,7 +102,7 @@ def damage_stays(probe: Probe) -> None:
     probe.require_ack(probe.state, damaged=before)
 
 
-@check("9", "silent-acks", "at most 8 DATA in a row go without their own ACK, and the last never")
+@check("9", "silent-acks", "at most 8 DATA in a row go without an ACK, and never the last")
 def silent_acks(probe: Probe) -> None:
     device = probe.device
     room = device.rx_buffer - spec.LIMIT_RESERVE

@@ -1,4 +1,4 @@
-"""What holds of every answer: looked at in all that came during all checks before."""
+"""Well-formedness of all responses received in the checks before."""
 
 from __future__ import annotations
 
@@ -9,46 +9,46 @@ from voxdisplay.conformance.probe import Probe
 
 
 def require_no_violation(probe: Probe, rule: str, must: str, likely: str = "") -> None:
-    """Demand that no answer has broken a rule; one exchange, so that there is an answer."""
+    """Require that no response has broken a rule, after one exchange at least."""
     probe.poll_status()
     faults = probe.reader.violations.get(rule, [])
     probe.require(not faults, must, "; ".join(faults), likely)
 
 
-@check("3", "answers-delimited", "all that the device sends is COBS, as section 3 encodes it")
+@check("3", "answers-delimited", "everything the device sends is COBS-encoded as section 3 says")
 def answers_delimited(probe: Probe) -> None:
     require_no_violation(
-        probe, "delimited", "segments of COBS", "does debugging text go to the same port?"
+        probe, "delimited", "segments of COBS", "debug output may go to the same port"
     )
 
 
-@check("4", "answers-checked", "all that the device sends has its check value")
+@check("4", "answers-checked", "everything the device sends has a valid check value")
 def answers_checked(probe: Probe) -> None:
     require_no_violation(probe, "checked", "the CRC-32 of header and payload, lowest byte first")
 
 
 @check(
-    "4", "answers-whole", "all that the device sends is ACK, INFO, PAGE or ERROR, with all fields"
+    "4", "answers-whole", "everything the device sends is ACK, INFO, PAGE or ERROR, with all fields"
 )
 def answers_whole(probe: Probe) -> None:
-    require_no_violation(probe, "whole", "a packet of a device's type, and long enough")
+    require_no_violation(probe, "whole", "a packet of a device's type, with all its fields")
 
 
-@check("4", "answers-length", "nothing that the device sends is longer than max_payload allows")
+@check("4", "answers-length", "no packet of the device is longer than max_payload allows")
 def answers_length(probe: Probe) -> None:
     if probe.device.has("READ"):  # a longest answer at least
         probe.request_page(packets.read(0, show_incompressible(probe)))
     require_no_violation(probe, "length", f"at most {probe.device.max_payload} bytes of payload")
 
 
-@check("4", "answers-reserved", "what is reserved in an answer is 0")
+@check("4", "answers-reserved", "reserved flags and fields of responses are 0")
 def answers_reserved(probe: Probe) -> None:
-    require_no_violation(probe, "reserved", "0 in what is reserved")
+    require_no_violation(probe, "reserved", "0 in reserved flags and fields")
 
 
 @check("9", "answers-boot", "the boot id in each ACK is that of INFO")
 def answers_boot(probe: Probe) -> None:
-    require_no_violation(probe, "boot", "one boot id as long as the device is on")
+    require_no_violation(probe, "boot", "the boot id of INFO until the device restarts")
 
 
 @check("9", "answers-frame", "without SHOWN the frame of an ACK is 0")
@@ -63,7 +63,7 @@ def answers_received(probe: Probe) -> None:
     )
 
 
-@check("9", "answers-pending", "if swaps happen at once, no frame is ever pending")
+@check("9", "answers-pending", "if refresh is 0, no frame is ever pending")
 def answers_pending(probe: Probe) -> None:
     require_no_violation(probe, "pending", "no PENDING if refresh is 0")
 

@@ -1,4 +1,4 @@
-"""Section 9.2: the device has the room that it promises."""
+"""Checks of section 9.2: the device can buffer what its credit grants."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _IDLE_S = 1.5
 
 
 def packets_filling(probe: Probe, first: int, frame: int, room: int) -> list[bytes]:
-    """Give DATA packets that fill so many bytes on the wire, as far as the window allows."""
+    """Return DATA packets that fill ``room`` bytes on the wire, as far as the window allows."""
     packets: list[bytes] = []
     size = min(probe.device.max_payload, max(room // 24, 32))
     for seq in range(first, first + spec.LIMIT_WINDOW):
@@ -27,7 +27,7 @@ def packets_filling(probe: Probe, first: int, frame: int, room: int) -> list[byt
     return packets
 
 
-@check("9.2", "returned", "what has been taken gives its room back: credit never runs out")
+@check("9.2", "returned", "processed packets give their credit back: it never runs out")
 def returned(probe: Probe) -> None:
     device = probe.device
     least = spec.LIMIT_RESERVE + device.longest_packet_bytes
@@ -36,16 +36,16 @@ def returned(probe: Probe) -> None:
         probe.draw(bytes(size))
         probe.require(
             probe.state.credit >= least,
-            f"credit for 64 bytes and the longest packet, {least}, when all has been taken",
+            f"credit for 64 bytes and the longest packet, {least}, when all has been processed",
             probe.state,
-            "credit is the room behind the packet named by `last`, not what is left of a total",
+            "credit counts from the packet named by `last`, it is not what is left of a total",
         )
 
 
 @check(
     "9.2",
     "not-withdrawn",
-    "room that was promised is not taken back",
+    "credit that was granted is not taken back",
 )
 def not_withdrawn(probe: Probe) -> None:
     device = probe.device
@@ -62,7 +62,7 @@ def not_withdrawn(probe: Probe) -> None:
         reach = ends[answer.last] + answer.credit
         probe.require(
             reach >= promised,
-            f"credit {promised - ends[answer.last]} at least, promised before",
+            f"credit {promised - ends[answer.last]} at least, granted before",
             answer,
             "credit counts from the end of the packet named by `last`, whatever of it has arrived",
         )
@@ -70,13 +70,13 @@ def not_withdrawn(probe: Probe) -> None:
     probe.require_ack(probe.state, next=len(burst))
 
 
-@check("9.2", "does-not-lapse", "credit, and its session, stay as they are while nothing is sent")
+@check("9.2", "does-not-lapse", "credit and session stay as they are while nothing is sent")
 def does_not_lapse(probe: Probe) -> None:
     probe.poll_status()
     before = probe.state
     probe.stay_silent(_IDLE_S + 2 * probe.device.period_s)
     probe.poll_status()
-    likely = "a host that has nothing to say says nothing: the device must not count the time"
+    likely = "an idle host sends nothing: credit and session must not expire"
     probe.require_ack(probe.state, likely, session=probe.session)
     left = before.credit - len(encode(status(0)))
     probe.require(probe.state.credit >= left, f"credit {left} at least", probe.state, likely)
@@ -89,7 +89,7 @@ def does_not_lapse(probe: Probe) -> None:
 @check(
     "9.2",
     "room-is-there",
-    "all that credit allows is taken, also behind a frame that waits",
+    "all that credit allows is taken, behind a pending frame too",
     refresh_tick,
 )
 def room_is_there(probe: Probe) -> None:
@@ -101,17 +101,19 @@ def room_is_there(probe: Probe) -> None:
         first = data(0, 0, ops.run(), CLEAR | COMMIT)
         room = min(device.rx_buffer, 1 << 20) - spec.LIMIT_RESERVE - len(encode(first))
         burst = packets_filling(probe, 1, 1, room)
-        come = probe.send_and_poll(first, *burst)
-        for answer in come:
+        responses = probe.send_and_poll(first, *burst)
+        for answer in responses:
             probe.require(
                 answer.kind != spec.TYPE_ERROR,
-                f"{len(burst)} packets in the room of {device.rx_buffer} bytes are taken",
+                f"{len(burst)} packets within the credit of {device.rx_buffer} bytes are taken",
                 answer,
-                "a packet that waits still takes room: is rx_buffer what the device really has?",
+                "a packet that waits occupies the buffer: does rx_buffer allow for that?",
             )
         probe.require_ack(probe.state, next=(1 + len(burst)) % 256, damaged=damaged)
         probe.require(
-            index_of_swap([*come, probe.state], 0) <= len(come), "frame 0 is shown", round_
+            index_of_swap([*responses, probe.state], 0) <= len(responses),
+            "frame 0 is shown",
+            round_,
         )
 
 
@@ -126,8 +128,8 @@ def zeros_between(probe: Probe) -> None:
     probe.send_raw(
         encode(first) + b"".join(encode(packet) + bytes(9) for packet in burst), "packets, and 00"
     )
-    come = probe.poll_status()
-    for answer in come:
+    responses = probe.poll_status()
+    for answer in responses:
         probe.require(answer.kind != spec.TYPE_ERROR, "all packets are taken", answer)
     probe.require_ack(probe.state, next=(1 + len(burst)) % 256, damaged=damaged)
 
@@ -135,7 +137,7 @@ def zeros_between(probe: Probe) -> None:
 @check(
     "11",
     "overrun",
-    "more bytes than credit are told by OVERRUN, and the session goes on",
+    "bytes beyond the credit cause OVERRUN, and the session stays open",
     refresh_tick,
 )
 def overrun(probe: Probe) -> None:
@@ -151,19 +153,21 @@ def overrun(probe: Probe) -> None:
         burst.append(packets.pop(0))
         budget -= len(encode(burst[-1]))
     probe.send(data(0, 0, b"", CLEAR | COMMIT), *burst)
-    come = []
+    responses = []
     for answer in probe.responses():  # a STATUS right behind might be lost, too
-        come.append(answer)
+        responses.append(answer)
         is_ack = answer.kind == spec.TYPE_ACK
         if is_ack and answer.last == len(burst):
             break
-        if index_of_swap(come, 0) < len(come) and any(a.kind == spec.TYPE_ERROR for a in come):
+        if index_of_swap(responses, 0) < len(responses) and any(
+            a.kind == spec.TYPE_ERROR for a in responses
+        ):
             break
-    come += probe.poll_status()
-    errors = [answer for answer in come if answer.kind == spec.TYPE_ERROR]
+    responses += probe.poll_status()
+    errors = [answer for answer in responses if answer.kind == spec.TYPE_ERROR]
     if not errors:
         probe.require_ack(probe.state, next=1 + len(burst), damaged=damaged)
-        probe.skip("the device took more than its credit in time, or the port held it back")
+        probe.skip("the device processed all in time, or flow control of the port held it back")
     for error in errors:
         fields = (error.code, error.offset, error.seq, error.frame, error.session)
         probe.require(

@@ -1,4 +1,4 @@
-"""Section 3: segments, and what becomes of those that are damaged."""
+"""Checks of section 3: segments, COBS and damage."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from voxdisplay.wire import spec
 
 
 def require_damaged(probe: Probe, stream: bytes, what: str, likely: str = "") -> None:
-    """Send bytes that hold no packet; demand that they change nothing but the count."""
+    """Send bytes that hold no packet; require that only the damage count changes."""
     probe.poll_status()
     before = probe.state
     count = packets.count_damaged(stream, probe.device.max_payload)
@@ -24,10 +24,10 @@ def require_damaged(probe: Probe, stream: bytes, what: str, likely: str = "") ->
     probe.require(same, f"{what} changes nothing else", f"{before}, then {after}", likely)
 
 
-@check("3", "empty-segments", "00 may be sent at any time between packets, and is nothing")
+@check("3", "empty-segments", "00 between packets is ignored")
 def empty_segments(probe: Probe) -> None:
-    come = probe.send_raw_and_poll(bytes(40), "40 times 00")
-    probe.require(not come, "no answer to empty segments", come and come[0])
+    responses = probe.send_raw_and_poll(bytes(40), "40 times 00")
+    probe.require(not responses, "no response to empty segments", responses and responses[0])
     require_damaged(probe, bytes(40), "40 times 00", "an empty segment is no damaged one")
 
 
@@ -36,19 +36,23 @@ def short_segments(probe: Probe) -> None:
     for size in range(1, spec.LIMIT_MIN_SEGMENT):
         for segment in (bytes(range(1, size + 1)), b"\xff" * size):
             stream = segment + b"\0"
-            come = probe.send_raw_and_poll(stream, f"a segment of {size} bytes")
-            probe.require(not come, f"no answer to a segment of {size} bytes", come and come[0])
+            responses = probe.send_raw_and_poll(stream, f"a segment of {size} bytes")
+            probe.require(
+                not responses,
+                f"no response to a segment of {size} bytes",
+                responses and responses[0],
+            )
             require_damaged(
                 probe, stream, f"a segment of {size} bytes", "only from 8 bytes on it is damage"
             )
 
 
-@check("3", "shortest-damage", "a segment of 8 bytes that is no packet is damaged")
+@check("3", "shortest-damage", "a segment of 8 bytes that is not a packet counts as damaged")
 def shortest_damage(probe: Probe) -> None:
     require_damaged(probe, b"\x08\x11\x22\x33\x44\x55\x66\x77\0", "a segment of 8 bytes")
 
 
-@check("3", "cobs-overrun", "a code byte that asks for more bytes than there are is damage")
+@check("3", "cobs-overrun", "a code byte beyond the segment's end makes the segment damaged")
 def cobs_overrun(probe: Probe) -> None:
     for size in (1, 6, 20):
         segment = bytearray(encode(data(0, 0, ops.run() * size))[:-1])
@@ -61,11 +65,11 @@ def cobs_overrun(probe: Probe) -> None:
                 probe,
                 bytes(longer) + b"\0",
                 f"a last code byte of {code} instead of {segment[last]}",
-                "is it noticed that a group has fewer bytes than its code byte says?",
+                "a group with fewer bytes than its code byte says is not detected",
             )
 
 
-@check("3", "bit-errors", "a packet with one wrong bit is damaged, whichever bit it is")
+@check("3", "bit-errors", "a packet with any single bit flipped is damaged")
 def bit_errors(probe: Probe) -> None:
     good = encode(data(0, 0, ops.single_voxel(probe.device, 0)))
     bits = range(8 * (len(good) - 1))
@@ -78,30 +82,28 @@ def bit_errors(probe: Probe) -> None:
     probe.draw(ops.single_voxel(probe.device, 0))
 
 
-@check("3", "cut-packets", "a packet that 00 cuts is damaged, or too short to be anything")
+@check("3", "cut-packets", "a packet truncated by 00 is damaged, or dropped as too short")
 def cut_packets(probe: Probe) -> None:
     good = encode(data(0, 0, ops.single_voxel(probe.device, 0)))
     for size in range(1, len(good) - 1):
         require_damaged(probe, good[:size] + b"\0", f"the first {size} bytes of a packet, and 00")
 
 
-@check(
-    "3", "merged-packets", "two packets that have lost the 00 between them are one damaged segment"
-)
+@check("3", "merged-packets", "two packets without the 00 between them are one damaged segment")
 def merged_packets(probe: Probe) -> None:
     first, second = encode(data(0, 0)), encode(data(1, 0))
     require_damaged(probe, first[:-1] + second, "two packets without 00 between")
     probe.draw(b"")
 
 
-@check("3", "resync", "noise ends at the next 00, and the packet behind it is read")
+@check("3", "resync", "after noise, reception resumes behind the next 00")
 def resync(probe: Probe) -> None:
     for noise in (b"boot v1.2\r\n" * 3, b"\xff" * 60, bytes(range(1, 60)), b"\x01" * 60):
         require_damaged(probe, noise + b"\0", f"noise of {len(noise)} bytes, and 00")
     probe.draw(b"")
 
 
-@check("3", "any-pieces", "it is all the same how the bytes of a packet are cut into pieces")
+@check("3", "any-pieces", "a packet may arrive in pieces of any size")
 def any_pieces(probe: Probe) -> None:
     stream = encode(data(0, 0, ops.single_voxel(probe.device, 0))) + encode(data(1, 0))
     for byte in stream:
@@ -128,7 +130,11 @@ def too_long(probe: Probe) -> None:
     probe.draw(b"")
 
 
-@check("3", "cobs-groups", "groups of 254 bytes, and packets that end with one or with 00")
+@check(
+    "3",
+    "cobs-groups",
+    "COBS groups of 254 bytes, and packets that end with such a group or with 00",
+)
 def cobs_groups(probe: Probe) -> None:
     device = probe.device
     one = ops.pen(device, device.full_pixel)

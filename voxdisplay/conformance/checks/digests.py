@@ -1,4 +1,4 @@
-"""Section 8: the digest is that of the front page, whatever has been written."""
+"""Checks of section 8: the digest of the front page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def sum_(probe: Probe) -> None:
 
 
 @check(
-    "8", "overwritten", "an overwritten pixel takes its term out of the digest", feature("DIGEST")
+    "8", "overwritten", "overwriting a pixel removes its term from the digest", feature("DIGEST")
 )
 def overwritten(probe: Probe) -> None:
     device = probe.device
@@ -47,7 +47,7 @@ def overwritten(probe: Probe) -> None:
 
 
 @check(
-    "8", "erased", "a pixel that becomes dark takes its term out of the digest", feature("DIGEST")
+    "8", "erased", "a pixel that becomes dark removes its term from the digest", feature("DIGEST")
 )
 def erased(probe: Probe) -> None:
     device = probe.device
@@ -82,7 +82,7 @@ def of_the_front(probe: Probe) -> None:
 @check(
     "8",
     "given-up",
-    "a frame given up leaves nothing in the digest",
+    "an abandoned frame leaves nothing in the digest",
     feature("DIGEST"),
     min_voxels(2),
 )

@@ -1,4 +1,4 @@
-"""Section 2 and sections 7 to 7.2: the ops that every device has."""
+"""Checks of sections 2 and 7 to 7.2: the ops that every device has."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from voxdisplay.conformance.catalogue import check, min_voxels, pixel_formats, r
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
-# Around every place where a count takes one more byte.
+# Around every count from which the encoding needs one more byte.
 _COUNTS = (1, 2, 30, 31, 32, 33, 34, 95, 96, 159, 160, 161, 287, 288, 16415, 16416, 16417)
 _COLORED = (spec.FORMAT_INDEX8, spec.FORMAT_RGB565, spec.FORMAT_RGB888)
 
 
 def axis_of_two(device: AnnouncedDevice) -> str:
-    """Need an axis of two voxels at least."""
+    """Require an axis of at least two voxels."""
     return "" if max(device.grid) > 1 else "no axis has more than one voxel"
 
 
@@ -41,7 +41,7 @@ def scan_order(probe: Probe) -> None:
 @check(
     "2.1",
     "pixels",
-    "a pixel's bytes come lowest first, and all its bits count",
+    "the bytes of a pixel come lowest first, and all bits count",
     readable_display,
     pixel_formats(*_COLORED),
 )
@@ -56,7 +56,7 @@ def pixels(probe: Probe) -> None:
 @check(
     "7",
     "begins-at-0",
-    "at the start of a packet the cursor is 0 and the pen is full",
+    "at the start of a packet the cursor is 0 and the pen is the full pixel",
     readable_display,
 )
 def begins_at_0(probe: Probe) -> None:
@@ -64,7 +64,11 @@ def begins_at_0(probe: Probe) -> None:
 
 
 @check(
-    "7", "each-packet-anew", "a packet depends on none before it", readable_display, min_voxels(3)
+    "7",
+    "each-packet-anew",
+    "cursor and pen do not carry over from the packet before",
+    readable_display,
+    min_voxels(3),
 )
 def each_packet_anew(probe: Probe) -> None:
     device = probe.device
@@ -72,7 +76,7 @@ def each_packet_anew(probe: Probe) -> None:
     probe.show(ops.run() + ops.literal(device, [0]), ops.run(3))
 
 
-@check("7", "pen", "PEN sets the pen, to dark too", readable_display, min_voxels(3))
+@check("7", "pen", "PEN sets the pen, to pixel 0 too", readable_display, min_voxels(3))
 def pen(probe: Probe) -> None:
     device = probe.device
     values = [ops.random_pixel(device, probe.rng) for _ in range(3)]
@@ -92,14 +96,14 @@ def move(probe: Probe) -> None:
     probe.show(*ops.split_payloads(device, drawn))
 
 
-@check("7", "end", "END ends the ops; what follows is 00", readable_display)
+@check("7", "end", "END ends the ops; only 00 may follow", readable_display)
 def end(probe: Probe) -> None:
     probe.show(ops.run() + ops.END)
     probe.show(ops.run() + ops.END + bytes(7))
     probe.show(ops.END)
 
 
-@check("7", "later-counts", "within one packet the later write counts", readable_display)
+@check("7", "later-counts", "within one packet the last write to a voxel counts", readable_display)
 def later_counts(probe: Probe) -> None:
     device = probe.device
     back = ops.move(device, (0, 0, 0))
@@ -171,7 +175,7 @@ def chain_cursor(probe: Probe) -> None:
     )
 
 
-@check("7.2", "counts", "a count is c + 1, and from 32 on 32 + LEB128", readable_display)
+@check("7.2", "counts", "a count is c + 1 up to 31, then 32 + LEB128", readable_display)
 def counts(probe: Probe) -> None:
     device = probe.device
     for n in _COUNTS:

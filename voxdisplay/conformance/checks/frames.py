@@ -1,4 +1,4 @@
-"""Section 6: frames, and the front and the back page."""
+"""Checks of section 6: frames, front page and back page."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from voxdisplay.wire import spec
 
 
 def lit_page(probe: Probe, *indices: int) -> Page:
-    """Give a page with full pixels at some indices."""
+    """Return a page with full pixels at some indices."""
     return Page(dict.fromkeys(indices, probe.device.full_pixel))
 
 
 def require_front_page(probe: Probe, page: Page, **fields: int) -> None:
-    """Wait for ticks, then demand what is on display, and fields of the ACK."""
+    """Wait for two ticks; then require a front page and fields of the ACK."""
     probe.wait_two_ticks()
     probe.poll_status()
     probe.require_ack(probe.state, **fields)
@@ -56,7 +56,7 @@ def many_packets(probe: Probe) -> None:
     probe.show(*(ops.single_voxel(probe.device, index, 0) for index in range(3)), clear=False)
 
 
-@check("6", "empty-packets", "the sequence of ops may be empty", readable_display)
+@check("6", "empty-packets", "a DATA packet may have no ops", readable_display)
 def empty_packets(probe: Probe) -> None:
     probe.show(b"", ops.single_voxel(probe.device, 0), b"")
 
@@ -73,7 +73,7 @@ def only_by_commit(probe: Probe) -> None:
 @check(
     "6",
     "only-whole",
-    "a frame of which packets are missing is not shown, COMMIT or not",
+    "a frame is not shown while packets of it are missing, even after COMMIT",
     readable_display,
 )
 def only_whole(probe: Probe) -> None:
@@ -83,35 +83,39 @@ def only_whole(probe: Probe) -> None:
     require_front_page(probe, Page(), shown=1, frame=0, pending=0, next=1, received=2)
     probe.send_and_poll(data(1, 1, ops.single_voxel(probe.device, 0)))
     require_front_page(probe, Page(), shown=1, frame=0, pending=0, next=2, received=1)
-    come = probe.send_and_poll(data(2, 1))
-    probe.require_displayed(probe.await_shown(1, come), lit_page(probe, 0, last))
+    responses = probe.send_and_poll(data(2, 1))
+    probe.require_displayed(probe.await_shown(1, responses), lit_page(probe, 0, last))
 
 
 @check(
     "6",
     "begins-by-arrival",
-    "the first packet taken begins a frame, whatever its number",
+    "the first packet received of a frame begins it, whatever its sequence number",
     readable_display,
 )
 def begins_by_arrival(probe: Probe) -> None:
     probe.show(ops.single_voxel(probe.device, probe.device.voxel_count - 1))
     last = probe.device.voxel_count - 1
     probe.send_and_poll(data(2, 1, ops.single_voxel(probe.device, 0), 0), data(1, 1, b"", 0))
-    come = probe.send_and_poll(data(3, 1, b"", COMMIT))
-    probe.require_displayed(probe.await_shown(1, [*come, probe.state]), lit_page(probe, 0, last))
+    responses = probe.send_and_poll(data(3, 1, b"", COMMIT))
+    probe.require_displayed(
+        probe.await_shown(1, [*responses, probe.state]), lit_page(probe, 0, last)
+    )
 
 
-@check("6", "swap-reported", "a swap is reported when it happens, without being asked for")
+@check("6", "swap-reported", "a swap is reported by ACK when it happens, without a STATUS")
 def swap_reported(probe: Probe) -> None:
     for frame in range(3):
         probe.send(data(frame, frame, b"", CLEAR | COMMIT))
-        come = []
+        responses = []
         for answer in probe.responses():
-            come.append(answer)
+            responses.append(answer)
             if answer.kind == spec.TYPE_ACK and answer.flags & SHOWN and answer.frame == frame:
                 break
         else:
-            probe.fail(f"an ACK with SHOWN and frame {frame}", come[-1] if come else "nothing")
+            probe.fail(
+                f"an ACK with SHOWN and frame {frame}", responses[-1] if responses else "nothing"
+            )
         probe.poll_status()
 
 
@@ -141,19 +145,23 @@ def next_id(probe: Probe) -> None:
             probe.require_refused(data(1, frame), spec.CODE_FRAME, 2)
 
 
-@check("6", "after-display", "what belongs to the frame on display is refused: FRAME at 2")
+@check("6", "after-display", "a packet of the frame on display is refused: FRAME at 2")
 def after_display(probe: Probe) -> None:
     probe.show(b"")
     probe.require_refused(data(1, 0), spec.CODE_FRAME, 2)
 
 
-@check("6", "behind-commit", "what belongs to f behind its COMMIT is refused: FRAME at 2")
+@check("6", "behind-commit", "a packet of f with a number above its COMMIT is refused: FRAME at 2")
 def behind_commit(probe: Probe) -> None:
     probe.send_and_poll(data(1, 0, b"", CLEAR | COMMIT))
     probe.require_refused(data(2, 0), spec.CODE_FRAME, 2)
 
 
-@check("6", "clear-flag-differs", "all packets of a frame have the same CLEAR flag: FRAME at 0")
+@check(
+    "6",
+    "clear-flag-differs",
+    "a packet whose CLEAR flag differs from its frame's is refused: FRAME at 0",
+)
 def clear_flag_differs(probe: Probe) -> None:
     for flags in (0, CLEAR):
         probe.open_session()
@@ -162,14 +170,16 @@ def clear_flag_differs(probe: Probe) -> None:
 
 
 @check(
-    "6", "next-while-missing", "f + 1 is dropped while packets of f may be missing, and answered"
+    "6",
+    "next-while-missing",
+    "a packet of f + 1 is dropped, and answered, while packets of f may be missing",
 )
 def next_while_missing(probe: Probe) -> None:
     probe.request(data(1, 0))
     ack = probe.request(data(2, 1, b"\x1f\xff"))
     probe.require_ack(
         ack,
-        "drop the packet, do not look at its ops, do not mark it as received",
+        "the packet must be dropped: its ops not checked, nor itself marked as received",
         next=0,
         received=1,
         last=2,
@@ -178,11 +188,15 @@ def next_while_missing(probe: Probe) -> None:
     probe.require_ack(
         probe.request(data(2, 1, ops.single_voxel(probe.device, 0))), next=3, received=0
     )
-    come = probe.send_and_poll(data(3, 1, b"", CLEAR | COMMIT))
-    probe.require_displayed(probe.await_shown(1, [*come, probe.state]), lit_page(probe, 0))
+    responses = probe.send_and_poll(data(3, 1, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(1, [*responses, probe.state]), lit_page(probe, 0))
 
 
-@check("6", "other-while-missing", "so is a packet of any other frame")
+@check(
+    "6",
+    "other-while-missing",
+    "a packet of any other frame is dropped while packets of f may be missing",
+)
 def other_while_missing(probe: Probe) -> None:
     probe.request(data(1, 0))
     for frame in (2, 7, 255):
@@ -190,7 +204,7 @@ def other_while_missing(probe: Probe) -> None:
         probe.require_ack(ack, "it is dropped like one of f + 1", next=0, received=1, last=2)
 
 
-@check("6", "first-while-missing", "so is one of another frame before any has begun")
+@check("6", "first-while-missing", "a packet of another frame is dropped while number 0 is missing")
 def first_while_missing(probe: Probe) -> None:
     ack = probe.request(data(1, 3, b"\x1f\xff"))
     probe.require_ack(ack, "number 0 is missing", next=0, received=0, last=1)
@@ -199,7 +213,7 @@ def first_while_missing(probe: Probe) -> None:
 @check(
     "6",
     "given-up",
-    "f + 1 drops f if f is not whole and nothing is missing",
+    "f + 1 replaces f if f is not whole and no packet is missing",
     readable_display,
     min_voxels(3),
 )
@@ -220,16 +234,22 @@ def out_of_order_next(probe: Probe) -> None:
     probe.require_ack(probe.request(data(1, 1)), next=3, received=0)
 
 
-@check("6", "two-commits", "of several COMMIT the lowest counts", readable_display, min_voxels(3))
+@check(
+    "6",
+    "two-commits",
+    "of several COMMIT of a frame the lowest sequence number counts",
+    readable_display,
+    min_voxels(3),
+)
 def two_commits(probe: Probe) -> None:
     probe.send_and_poll(data(3, 0, ops.single_voxel(probe.device, 2), CLEAR | COMMIT))
     probe.send_and_poll(data(1, 0, ops.single_voxel(probe.device, 1), CLEAR | COMMIT))
-    come = probe.send_and_poll(data(0, 0, ops.single_voxel(probe.device, 0)))
-    ack = probe.await_shown(0, [*come, probe.state])
+    responses = probe.send_and_poll(data(0, 0, ops.single_voxel(probe.device, 0)))
+    ack = probe.await_shown(0, [*responses, probe.state])
     probe.require_displayed(ack, lit_page(probe, 0, 1, 2))
 
 
-@check("6", "ids-wrap", "frame ids and sequence numbers go round modulo 256")
+@check("6", "ids-wrap", "frame ids and sequence numbers wrap modulo 256")
 def ids_wrap(probe: Probe) -> None:
     for _ in range(255):
         probe.draw(b"")

@@ -1,4 +1,4 @@
-"""Section 5: HELLO, INFO and what becomes of the session before."""
+"""Checks of section 5: HELLO, INFO and the session before."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _ATTEMPTS = 6
 
 
 def request_info(probe: Probe, packet: bytes) -> Response:
-    """Send a HELLO; demand one INFO."""
+    """Send a HELLO and require one INFO."""
     info = probe.request(packet)
     probe.require(info.kind == spec.TYPE_INFO, "INFO", info)
     return info
 
 
-@check("5", "info-fields", "every field of INFO has a value that is allowed")
+@check("5", "info-fields", "every field of INFO has an allowed value")
 def info_fields(probe: Probe) -> None:
     info, device = probe.info, probe.device
     known = sum(1 << bit for bit in FEATURES.values())
@@ -63,7 +63,7 @@ def info_strings(probe: Probe) -> None:
         at = end
 
 
-@check("5", "info-same", "INFO says the same each time, but for the session")
+@check("5", "info-same", "INFO is the same each time, except for the session")
 def info_same(probe: Probe) -> None:
     for session in (1, 0x1234, 0xFFFF):
         info = request_info(probe, hello(session))
@@ -72,16 +72,16 @@ def info_same(probe: Probe) -> None:
         probe.require(same, f"as before: {probe.info}", info)
 
 
-@check("5", "hello-repeated", "each HELLO is answered with INFO, also one that is repeated")
+@check("5", "hello-repeated", "each HELLO is answered with INFO, a repeated one too")
 def hello_repeated(probe: Probe) -> None:
     packet = hello(0x5A17)
-    come = probe.send_and_poll(packet, packet, packet)
-    kinds = [answer.kind for answer in come]
-    probe.require(kinds == 3 * [spec.TYPE_INFO], "3 times INFO", " and ".join(map(str, come)))
+    responses = probe.send_and_poll(packet, packet, packet)
+    kinds = [answer.kind for answer in responses]
+    probe.require(kinds == 3 * [spec.TYPE_INFO], "3 times INFO", " and ".join(map(str, responses)))
     probe.require_ack(probe.state, session=0x5A17, next=0)
 
 
-@check("5", "new-session", "a HELLO begins a session: next 0, nothing received, nothing shown")
+@check("5", "new-session", "HELLO opens a session: next 0, nothing received, nothing shown")
 def new_session(probe: Probe) -> None:
     probe.show(b"")
     for seq in (1, 2, 5):
@@ -108,9 +108,7 @@ def front_page_stays(probe: Probe) -> None:
     probe.require_displayed(probe.state, probe.front or Page())
 
 
-@check(
-    "5", "filling-dropped", "a frame that is not on display is dropped by HELLO", readable_display
-)
+@check("5", "filling-dropped", "HELLO drops a frame that is not on display", readable_display)
 def filling_dropped(probe: Probe) -> None:
     probe.show(b"")
     probe.draw(ops.single_voxel(probe.device, 0))
@@ -122,19 +120,19 @@ def filling_dropped(probe: Probe) -> None:
     probe.show(b"", clear=False)
 
 
-@check("5", "pending-dropped", "so is one that waits for its tick", refresh_tick, readable_display)
+@check("5", "pending-dropped", "HELLO drops a pending frame", refresh_tick, readable_display)
 def pending_dropped(probe: Probe) -> None:
     for _ in range(_ATTEMPTS):
         probe.show(b"")
         session = probe.session % 65535 + 1
-        come = probe.send_and_poll(
+        responses = probe.send_and_poll(
             data(1, 1, ops.single_voxel(probe.device, 0), 1 | COMMIT), hello(session)
         )
         probe.session = session
-        kinds = [answer.kind for answer in come]
-        probe.require(spec.TYPE_INFO in kinds, "INFO", come[-1] if come else "nothing")
+        kinds = [answer.kind for answer in responses]
+        probe.require(spec.TYPE_INFO in kinds, "INFO", responses[-1] if responses else "nothing")
         at = kinds.index(spec.TYPE_INFO)
-        if any(answer.flags & SHOWN and answer.frame == 1 for answer in come[:at]):
+        if any(answer.flags & SHOWN and answer.frame == 1 for answer in responses[:at]):
             probe.open_session()
             continue  # the tick was faster
         probe.wait_two_ticks()
@@ -154,14 +152,20 @@ def other_major(probe: Probe) -> None:
         probe.require_ack(probe.state, "what was open stays open", session=probe.session, next=1)
 
 
-@check("5", "other-major-first", "also where no session is open")
+@check("5", "other-major-first", "a HELLO of another major gets INFO without an open session, too")
 def other_major_first(probe: Probe) -> None:
     probe.end_session()
     request_info(probe, hello(0x4321, 2))
-    probe.require(probe.state.kind == spec.TYPE_ERROR, "NO_SESSION answers STATUS", probe.state)
+    probe.require(
+        probe.state.kind == spec.TYPE_ERROR, "NO_SESSION in response to STATUS", probe.state
+    )
 
 
-@check("5", "hello-ignored", "flags, seq, frame, minor, reserved and further bytes are ignored")
+@check(
+    "5",
+    "hello-ignored",
+    "flags, seq, frame, minor, reserved and further bytes of a HELLO are ignored",
+)
 def hello_ignored(probe: Probe) -> None:
     session = struct.pack("<H", probe.session)
     for packet in (
@@ -194,7 +198,7 @@ def session_zero(probe: Probe) -> None:
 @check(
     "5",
     "keep-in-new-session",
-    "a first frame without CLEAR copies what is shown",
+    "a session's first frame without CLEAR starts as a copy of the front page",
     readable_display,
     min_voxels(2),
 )

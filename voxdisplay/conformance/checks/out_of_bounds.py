@@ -1,4 +1,4 @@
-"""Section 7.8: what an op must not do, and that it is refused wherever it stands."""
+"""Checks of section 7.8: ops that leave the grid or the palette are refused."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from voxdisplay.wire import spec
 
 
 def require_refused_anywhere(probe: Probe, ops_: bytes, code: int) -> None:
-    """Demand a refusal, at the first op and behind another one."""
+    """Require that ops are refused as the first ones, and behind another op."""
     probe.require_ops_refused(ops_, code)
     before = ops.pen(probe.device, 1)
     probe.require_ops_refused(before + ops_, code, len(before))
 
 
-@check("7.8", "move-outside", "the target of a MOVE is on the grid: OUTSIDE")
+@check("7.8", "move-outside", "a MOVE or FROM off the grid is refused: OUTSIDE")
 def move_outside(probe: Probe) -> None:
     device = probe.device
     top = (1 << 8 * device.coordinate_bytes) - 1
@@ -33,7 +33,7 @@ def move_outside(probe: Probe) -> None:
 
 
 @check(
-    "7.8", "step-outside", "a step that leaves the grid on any axis is outside, whatever its index"
+    "7.8", "step-outside", "a step off the grid is refused, even if its index would exist: OUTSIDE"
 )
 def step_outside(probe: Probe) -> None:
     device = probe.device
@@ -51,9 +51,7 @@ def step_outside(probe: Probe) -> None:
             )
 
 
-@check(
-    "7.8", "behind-the-end", "a cursor of V is no voxel: a chain, and any count, is outside there"
-)
+@check("7.8", "behind-the-end", "at the cursor V any chain, shape or count is refused: OUTSIDE")
 def behind_the_end(probe: Probe) -> None:
     device = probe.device
     end = ops.skip(device.voxel_count)
@@ -69,7 +67,7 @@ def behind_the_end(probe: Probe) -> None:
             probe.require_ops_refused(end + op, spec.CODE_OUTSIDE, len(end))
 
 
-@check("7.8", "past-the-end", "nothing goes past the last voxel")
+@check("7.8", "past-the-end", "SKIP, RUN, LIT and DIFF beyond the last voxel are refused: OUTSIDE")
 def past_the_end(probe: Probe) -> None:
     device = probe.device
     begin = ops.skip(device.voxel_count - 1)
@@ -82,7 +80,7 @@ def past_the_end(probe: Probe) -> None:
         probe.require_ops_refused(begin + ops.differences([1, 1]), spec.CODE_OUTSIDE, at)
 
 
-@check("7.8", "shapes-outside", "LINE, BOX and DOTS stay on the grid")
+@check("7.8", "shapes-outside", "LINE, BOX and DOTS off the grid are refused: OUTSIDE")
 def shapes_outside(probe: Probe) -> None:
     device = probe.device
     for axis, side in enumerate(device.grid):
@@ -100,7 +98,9 @@ def shapes_outside(probe: Probe) -> None:
             require_refused_anywhere(probe, dots, spec.CODE_OUTSIDE)
 
 
-@check("7.8", "bricks-outside", "what a brick writes is on the grid", feature("OCT"))
+@check(
+    "7.8", "bricks-outside", "a brick that writes off the grid is refused: OUTSIDE", feature("OCT")
+)
 def bricks_outside(probe: Probe) -> None:
     device = probe.device
     top = (1 << 8 * device.coordinate_bytes) - 1
@@ -117,7 +117,12 @@ def bricks_outside(probe: Probe) -> None:
                 require_refused_anywhere(probe, head + b"\0", spec.CODE_OUTSIDE)
 
 
-@check("7.8", "colors-outside", "entries behind the palette are outside", feature("PALETTE"))
+@check(
+    "7.8",
+    "colors-outside",
+    "COLORS beyond the end of the palette is refused: OUTSIDE",
+    feature("PALETTE"),
+)
 def colors_outside(probe: Probe) -> None:
     require_refused_anywhere(probe, ops.colors(255, [(1, 2, 3), (1, 2, 3)]), spec.CODE_OUTSIDE)
     require_refused_anywhere(probe, ops.colors(240, [(1, 2, 3)] * 17), spec.CODE_OUTSIDE)

@@ -1,4 +1,4 @@
-"""Section 4: types, flags and fields that are reserved."""
+"""Checks of section 4: reserved types, flags and fields."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ HOST_TYPES = (spec.TYPE_DATA, spec.TYPE_HELLO, spec.TYPE_STATUS, spec.TYPE_READ)
 
 
 def require_session_open(probe: Probe) -> None:
-    """Demand that what was refused has changed nothing."""
+    """Require that the session is still open after a refused packet."""
     probe.poll_status()
     probe.require_ack(
         probe.state, "a refused packet other than DATA changes nothing", session=probe.session
     )
 
 
-@check("4", "reserved-types", "a type that is reserved, or a device's, is refused: TYPE")
+@check("4", "reserved-types", "a reserved type, or one of a device, is refused: TYPE")
 def reserved_types(probe: Probe) -> None:
     for kind in range(16):
         if kind not in HOST_TYPES:

@@ -1,4 +1,4 @@
-"""Section 7.7: ARC, range-coded chains."""
+"""Checks of section 7.7: range-coded chains (op ARC)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from voxdisplay.wire import spec
 def random_walk(
     device: AnnouncedDevice, rng: random.Random, steps: int, steady: float
 ) -> list[Voxel]:
-    """Give places side by side: the steadier, the seldomer they turn."""
+    """Return a random 26-connected walk; ``steady`` is the chance that an axis keeps its step."""
     at = list(ops.random_voxel(device, rng))
     way = [rng.choice((-1, 0, 1)) for _ in range(3)]
     places = [(at[0], at[1], at[2])]
@@ -38,7 +38,7 @@ def random_walk(
 
 
 def refusal_of(device: AnnouncedDevice, op: bytes) -> Refused | None:
-    """Say why an op is refused, if it is."""
+    """Return the refusal of an op by the reference decoder; None if it is valid."""
     try:
         ReferenceDecoder(device, Page()).draw(op)
     except Refused as refused:
@@ -47,7 +47,7 @@ def refusal_of(device: AnnouncedDevice, op: bytes) -> Refused | None:
 
 
 def encode_fitting(device: AnnouncedDevice, places: list[Voxel], pen: int | None = None) -> bytes:
-    """Give an ARC of as many of the places as fit a packet."""
+    """Return an ARC of the first of these voxels, as many as fit a packet."""
     while True:
         op = encode(device, [Piece(tuple(places), pen)])
         if len(op) <= device.max_payload:
@@ -75,7 +75,7 @@ def arc_empty(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-curves",
-    "an ARC draws the steps of its piece",
+    "an ARC draws curves of few and many turns",
     feature("ARC"),
     readable_display,
     axis_of_two,
@@ -91,7 +91,7 @@ def arc_curves(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-pieces",
-    "pieces jump or go on, each with its pen",
+    "pieces of an ARC jump or continue, each with its own pen",
     feature("ARC"),
     readable_display,
     axis_of_two,
@@ -117,7 +117,7 @@ def arc_pieces(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-behind-ops",
-    "other ops may come before it, and their pen holds",
+    "other ops may come before an ARC, which keeps their pen",
     feature("ARC"),
     readable_display,
 )
@@ -133,7 +133,7 @@ def arc_behind_ops(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-long",
-    "memory and models hold out over long runs",
+    "run lengths and models of an ARC saturate as specified",
     feature("ARC"),
     readable_display,
     axis_of_two,
@@ -156,7 +156,7 @@ def arc_long(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-cut",
-    "an ARC that needs more bytes is refused: TRUNCATED",
+    "a truncated ARC is refused: TRUNCATED",
     feature("ARC"),
     axis_of_two,
 )
@@ -173,7 +173,7 @@ def arc_cut(probe: Probe) -> None:
 @check(
     "7.7",
     "arc-too-many",
-    "an ARC with a byte too many is refused: PADDING",
+    "an ARC with an extra byte is refused: PADDING",
     feature("ARC"),
     axis_of_two,
 )
@@ -184,7 +184,10 @@ def arc_too_many(probe: Probe) -> None:
 
 
 @check(
-    "7.7", "arc-off-the-grid", "an ARC that begins or leads off the grid is refused", feature("ARC")
+    "7.7",
+    "arc-off-the-grid",
+    "an ARC that starts or leads off the grid is refused: OUTSIDE",
+    feature("ARC"),
 )
 def arc_off_the_grid(probe: Probe) -> None:
     device = probe.device

@@ -1,4 +1,4 @@
-"""Section 10: READ and PAGE."""
+"""Checks of section 10: READ and PAGE."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ READ = feature("READ")
 
 
 def show_test_picture(probe: Probe) -> None:
-    """Show something uneven near the begin and the end of the grid."""
+    """Show random pixels at the beginning and the end of the grid."""
     device, rng = probe.device, probe.rng
     most = min(device.voxel_count, 60, (device.max_payload - 16) // device.pixel_bytes)
     begin = [ops.random_pixel(device, rng) * rng.randrange(2) for _ in range(most)]
@@ -24,7 +24,7 @@ def show_test_picture(probe: Probe) -> None:
 
 
 def show_incompressible(probe: Probe) -> int:
-    """Show something that no PAGE holds whole, as far as the grid has room; give its voxels."""
+    """Show random pixels, more than a PAGE holds if the grid is large enough; return how many."""
     device, rng = probe.device, probe.rng
     most = min(device.voxel_count, 2 * device.max_payload, 4096)
     per_packet = (device.max_payload - 16) // device.pixel_bytes
@@ -37,7 +37,7 @@ def show_incompressible(probe: Probe) -> int:
 
 
 def require_range(probe: Probe, start: int, count: int, flags: int = 0) -> None:
-    """Read a range to its end; demand the pixels that are in the front page."""
+    """Read a range to its end; require the pixels of the front page."""
     must = probe.front.pixels if probe.front else {}
     end = start + count
     while start < end:
@@ -58,11 +58,11 @@ def require_range(probe: Probe, start: int, count: int, flags: int = 0) -> None:
 def _likely(must: dict[int, int], got: dict[int, int], part: range) -> str:
     for shift in (-1, 1):
         if all(must.get(i + shift, 0) == got.get(i, 0) for i in part[: ops.MAX_VOXELS]):
-            return f"all is off by {abs(shift)}: `start` is the index of the first voxel"
-    return "are the bytes of a pixel, and the order of pixels in a LIT, right?"
+            return f"all pixels are off by {abs(shift)}: `start` is the index of the first voxel"
+    return "check the byte order of a pixel, and the order of pixels in a LIT"
 
 
-@check("10", "whole-page", "the front page can be read whole", READ)
+@check("10", "whole-page", "the whole front page can be read", READ)
 def whole_page(probe: Probe) -> None:
     show_test_picture(probe)
     require_range(probe, 0, probe.device.voxel_count)
@@ -86,7 +86,10 @@ def ranges(probe: Probe) -> None:
 
 
 @check(
-    "10", "page-fields", "PAGE has the READ's tag, start and flag, and the frame on display", READ
+    "10",
+    "page-fields",
+    "PAGE carries the READ's tag, start and flag, and the frame on display",
+    READ,
 )
 def page_fields(probe: Probe) -> None:
     probe.show(ops.run())
@@ -116,7 +119,7 @@ def page_frame(probe: Probe) -> None:
 @check(
     "10",
     "back-page",
-    "BACK reads what has been drawn and is not on display yet",
+    "BACK reads the back page: what is drawn, but not on display yet",
     READ,
     min_voxels(2),
 )
@@ -130,7 +133,7 @@ def back_page(probe: Probe) -> None:
     probe.require(got == {0: device.full_pixel}, "the front page with voxel 0 lit", got)
 
 
-@check("10", "dense-page", "what does not fit one PAGE is covered in part", READ)
+@check("10", "dense-page", "a range that does not fit one PAGE is covered in part", READ)
 def dense_page(probe: Probe) -> None:
     require_range(probe, 0, show_incompressible(probe))
 
@@ -166,7 +169,10 @@ def read_length(probe: Probe) -> None:
 
 
 @check(
-    "10", "read-refused", "without the feature READ it is refused: TYPE", without_feature("READ")
+    "10",
+    "read-refused",
+    "without the feature READ, a READ is refused: TYPE",
+    without_feature("READ"),
 )
 def read_refused(probe: Probe) -> None:
     for packet in (read(0, 1), read(0, 0), body(spec.TYPE_READ), packets.read(0, 1, 9, 15)):

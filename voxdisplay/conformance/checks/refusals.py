@@ -1,4 +1,4 @@
-"""Section 11: what is refused, with which code, where, and what becomes of the session."""
+"""Checks of section 11: error codes, offsets, and the session after a refusal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _HUGE = 100_000
 
 
 class _TooManyVoxelsError(Exception):
-    """Ops that would take the kit too long."""
+    """The ops would take the reference decoder too long."""
 
 
 class _BoundedDecoder(ReferenceDecoder):
@@ -32,7 +32,7 @@ class _BoundedDecoder(ReferenceDecoder):
         return count
 
 
-@check("11", "session-ends", "a refused DATA ends the session: NO_SESSION answers all but HELLO")
+@check("11", "session-ends", "a refused DATA ends the session: all but HELLO get NO_SESSION")
 def session_ends(probe: Probe) -> None:
     probe.request(data(0, 0, b"\x1f"))
     for packet in (status(9), data(0, 0), data(1, 0, b"\x1f"), read(0, 1), body(0), body(15, 3, 1)):
@@ -50,7 +50,7 @@ def session_ends(probe: Probe) -> None:
 @check(
     "11",
     "frame-dropped",
-    "what is not on display is dropped when a DATA is refused",
+    "a refused DATA drops the frame that is not on display",
     readable_display,
     min_voxels(2),
 )
@@ -88,7 +88,7 @@ def error_session(probe: Probe) -> None:
     probe.require((error.kind, error.session) == (spec.TYPE_ERROR, 0), "session 0", error)
 
 
-@check("11", "refused-hello", "a HELLO is judged alike with and without a session")
+@check("11", "refused-hello", "an invalid HELLO is refused alike with and without a session")
 def refused_hello(probe: Probe) -> None:
     probe.end_session()
     probe.require_refused(hello(0), spec.CODE_FIELD, 4)
@@ -159,7 +159,11 @@ def truncated(probe: Probe) -> None:
         probe.require_ops_refused(ops.run() + op[:-1], spec.CODE_TRUNCATED, 1)
 
 
-@check("11", "padding", "unused bits of crumbs and bytes behind END that are not 0: PADDING")
+@check(
+    "11",
+    "padding",
+    "unused bits of crumbs, and bytes behind END, that are not 0 are refused: PADDING",
+)
 def padding(probe: Probe) -> None:
     device = probe.device
     place = ops.xyz(device, (0, 0, 0))
@@ -176,14 +180,24 @@ def padding(probe: Probe) -> None:
     require_refused_anywhere(probe, bytes(raw), spec.CODE_PADDING)
 
 
-@check("11", "pixel-padding", "so are those of a MONO1 pixel run", pixel_formats(spec.FORMAT_MONO1))
+@check(
+    "11",
+    "pixel-padding",
+    "unused bits of a MONO1 pixel run that are not 0 are refused: PADDING",
+    pixel_formats(spec.FORMAT_MONO1),
+)
 def pixel_padding(probe: Probe) -> None:
     for n, last in ((1, 2), (7, 0x80), (9, 2), (12, 0x10)):
         raw = bytes(-(-n // 8) - 1) + bytes((last,))
         require_refused_anywhere(probe, bytes((spec.OP_LIT | n - 1,)) + raw, spec.CODE_PADDING)
 
 
-@check("11", "difference-padding", "so is that of a DIFF of odd count", feature("DIFF"))
+@check(
+    "11",
+    "difference-padding",
+    "an unused nibble of a DIFF that is not 0 is refused: PADDING",
+    feature("DIFF"),
+)
 def difference_padding(probe: Probe) -> None:
     for raw in (b"\x10", b"\x01\xf0"):
         require_refused_anywhere(
@@ -194,7 +208,7 @@ def difference_padding(probe: Probe) -> None:
 @check(
     "11",
     "pixel",
-    "a pixel that MONO1 does not have is refused: PIXEL",
+    "a MONO1 pixel other than 0 and 1 is refused: PIXEL",
     pixel_formats(spec.FORMAT_MONO1),
 )
 def pixel(probe: Probe) -> None:
@@ -227,7 +241,12 @@ def order_of_packet(probe: Probe) -> None:
     probe.require_refused(data(1, 0, bad, 0), spec.CODE_FRAME, 0)
 
 
-@check("11", "order-of-read", "so is a READ", feature("READ"))
+@check(
+    "11",
+    "order-of-read",
+    "a READ is checked in the order of the table of section 11",
+    feature("READ"),
+)
 def order_of_read(probe: Probe) -> None:
     v = probe.device.voxel_count
     framed = bytearray(read(v, 0, 9, 2, reserved=1))
@@ -256,7 +275,7 @@ def first_op_first(probe: Probe) -> None:
     )
 
 
-@check("11", "order-of-op", "within an op the faults come in the table's order")
+@check("11", "order-of-op", "an op is checked in the order of the table of section 11")
 def order_of_op(probe: Probe) -> None:
     device = probe.device
     end = ops.skip(device.voxel_count)
@@ -282,7 +301,7 @@ def order_of_op(probe: Probe) -> None:
 @check(
     "11",
     "random-ops",
-    "whatever the ops, they are drawn or refused as sections 7 and 11 say",
+    "random ops, valid or not, are drawn or refused as sections 7 and 11 say",
     readable_display,
 )
 def random_ops(probe: Probe) -> None:

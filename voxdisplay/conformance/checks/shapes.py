@@ -1,4 +1,4 @@
-"""Section 7.3: LINE, BOX and DOTS."""
+"""Checks of section 7.3: LINE, BOX and DOTS."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from voxdisplay.conformance.checks.drawing import axis_of_two
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
-_SIDE = 12  # of the part of the grid in which boxes are drawn
+_MAX_BOX_SIDE = 12
 
 
 def axes_of_three_and_two(device: AnnouncedDevice) -> str:
-    """Need an axis of three voxels, and another one of two."""
+    """Require an axis of at least three voxels, and another one of two."""
     a, b, _ = sorted(device.grid, reverse=True)
     return "" if a > 2 and b > 1 else "no axis of three voxels beside one of two"
 
 
 def corners(device: AnnouncedDevice) -> list[Voxel]:
-    """Give the corners of the grid."""
+    """Return the corners of the grid."""
     xs, ys, zs = (sorted({0, side - 1}) for side in device.grid)
     return [(x, y, z) for z in zs for y in ys for x in xs]
 
@@ -46,7 +46,7 @@ def lines(probe: Probe) -> None:
 @check(
     "7.3",
     "line-ties",
-    "LINE rounds up from the middle, in both directions",
+    "LINE rounds ties up, in both directions",
     feature("LINE"),
     readable_display,
     axes_of_three_and_two,
@@ -72,7 +72,11 @@ def line_ties(probe: Probe) -> None:
 
 
 @check(
-    "7.3", "line-of-one", "a LINE to its own place is one voxel", feature("LINE"), readable_display
+    "7.3",
+    "line-of-one",
+    "a LINE from a voxel to itself is one voxel",
+    feature("LINE"),
+    readable_display,
 )
 def line_of_one(probe: Probe) -> None:
     place = ops.random_voxel(probe.device, probe.rng)
@@ -82,7 +86,7 @@ def line_of_one(probe: Probe) -> None:
 @check(
     "7.3",
     "shape-cursor",
-    "after LINE and BOX the cursor is at the voxel named",
+    "after LINE and BOX the cursor is at the voxel that they name",
     readable_display,
     axis_of_two,
 )
@@ -99,7 +103,7 @@ def shape_cursor(probe: Probe) -> None:
 @check(
     "7.3",
     "boxes",
-    "BOX has all voxels between two corners, whichever is larger",
+    "BOX fills the box between two corners, in either order",
     feature("BOX"),
     readable_display,
 )
@@ -107,16 +111,14 @@ def boxes(probe: Probe) -> None:
     device, rng = probe.device, probe.rng
     base = ops.random_voxel(device, rng)
     for _ in range(10):
-        probe.show(ops.box(device, base, ops.random_voxel_near(device, rng, base, _SIDE)))
+        probe.show(ops.box(device, base, ops.random_voxel_near(device, rng, base, _MAX_BOX_SIDE)))
     place = ops.random_voxel(device, rng)
     probe.show(ops.box(device, place, place))
-    low = tuple(max(side - _SIDE, 0) for side in device.grid)
+    low = tuple(max(side - _MAX_BOX_SIDE, 0) for side in device.grid)
     probe.show(ops.box(device, corners(device)[-1], (low[0], low[1], low[2])))
 
 
-@check(
-    "7.3", "dots", "DOTS draws the 1 to 256 voxels that it names", feature("DOTS"), readable_display
-)
+@check("7.3", "dots", "DOTS writes 1 to 256 single voxels", feature("DOTS"), readable_display)
 def dots(probe: Probe) -> None:
     device, rng = probe.device, probe.rng
     room = (device.max_payload - 2) // (3 * device.coordinate_bytes)

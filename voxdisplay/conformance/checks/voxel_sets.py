@@ -1,4 +1,4 @@
-"""Sections 7.4 to 7.6: OCT, DIFF and COLORS."""
+"""Checks of sections 7.4 to 7.6: OCT, DIFF and COLORS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from voxdisplay.wire import spec
 
 
 def _payload(probe: Probe, level: int, density: float) -> bytes:
-    """Give a brick that fits a packet."""
+    """Return a random brick that fits a packet."""
     while True:
         op = ops.random_brick(probe.device, probe.rng, level, density)
         if len(op) <= probe.device.max_payload:
@@ -33,7 +33,7 @@ def levels(probe: Probe) -> None:
 @check(
     "7.4",
     "children",
-    "bit c = cx + 2 cy + 4 cz is the child at (cx, cy, cz)",
+    "bit c = cx + 2 cy + 4 cz of a mask is the child at (cx, cy, cz)",
     feature("OCT"),
     readable_display,
 )
@@ -49,7 +49,7 @@ def children(probe: Probe) -> None:
 @check(
     "7.4",
     "full-nodes",
-    "a mask 00 is a node of which all voxels are written",
+    "the mask 00 stands for a node whose voxels are all written",
     feature("OCT"),
     readable_display,
 )
@@ -64,7 +64,7 @@ def full_nodes(probe: Probe) -> None:
 @check(
     "7.4",
     "brick-cursor",
-    "OCT leaves cursor and pen as they are",
+    "OCT leaves cursor and pen unchanged",
     feature("OCT"),
     readable_display,
     min_voxels(2),
@@ -132,7 +132,7 @@ def colors(probe: Probe) -> None:
 @check(
     "7.6",
     "palette-of-a-page",
-    "CLEAR gives a page the default palette, KEEP a copy of the front page's",
+    "with CLEAR a page has the default palette, otherwise a copy of the front page's",
     feature("PALETTE"),
     feature("DIGEST"),
 )

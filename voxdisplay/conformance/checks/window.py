@@ -1,4 +1,4 @@
-"""Section 9.1: sequence numbers, duplicates and the window."""
+"""Checks of section 9.1: sequence numbers, duplicates and the window."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from voxdisplay.wire import spec
 
 
 @check(
-    "9.1", "window-edges", "31 above `next` is new, 32 to 223 is refused, from 224 on a duplicate"
+    "9.1",
+    "window-edges",
+    "up to 31 above `next` is new, 32 to 223 is refused, 224 and above is a duplicate",
 )
 def window_edges(probe: Probe) -> None:
     for base in (0, 3):
@@ -40,7 +42,7 @@ def duplicate_answered(probe: Probe) -> None:
 @check(
     "9.1",
     "duplicate-unseen",
-    "neither frame nor ops of a duplicate are looked at",
+    "frame and ops of a duplicate are not checked",
     readable_display,
     min_voxels(3),
 )
@@ -54,23 +56,23 @@ def duplicate_unseen(probe: Probe) -> None:
         data(0, 0, b"", CLEAR | COMMIT),
     ):
         probe.require_ack(probe.request(packet), next=1, received=1)
-    come = probe.send_and_poll(data(1, 0), data(3, 0, b"", CLEAR | COMMIT))
-    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, 0))
+    responses = probe.send_and_poll(data(1, 0), data(3, 0, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(0, [*responses, probe.state]), lit_page(probe, 0))
     probe.require_ack(probe.request(data(3, 0, b"\x1f", CLEAR | COMMIT)), next=4, shown=1)
 
 
 @check(
     "9.1",
     "applied-once",
-    "each packet is applied once, however often it comes",
+    "each packet is applied once, however often it is sent",
     readable_display,
     min_voxels(2),
 )
 def applied_once(probe: Probe) -> None:
     probe.send_and_poll(data(0, 0, ops.run(2)), data(1, 0, ops.pen(probe.device, 0) + ops.run()))
     probe.send_and_poll(data(0, 0, ops.run(2)))
-    come = probe.send_and_poll(data(2, 0, b"", CLEAR | COMMIT))
-    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, 1))
+    responses = probe.send_and_poll(data(2, 0, b"", CLEAR | COMMIT))
+    probe.require_displayed(probe.await_shown(0, [*responses, probe.state]), lit_page(probe, 1))
 
 
 @check(
@@ -83,14 +85,16 @@ def applied_once(probe: Probe) -> None:
 def out_of_order(probe: Probe) -> None:
     order = list(range(9))
     probe.rng.shuffle(order)
-    come = []
+    responses = []
     for seq in order:
         flags = CLEAR | (COMMIT if seq == 8 else 0)
-        come = probe.send_and_poll(data(seq, 0, ops.single_voxel(probe.device, seq), flags))
-    probe.require_displayed(probe.await_shown(0, [*come, probe.state]), lit_page(probe, *range(9)))
+        responses = probe.send_and_poll(data(seq, 0, ops.single_voxel(probe.device, seq), flags))
+    probe.require_displayed(
+        probe.await_shown(0, [*responses, probe.state]), lit_page(probe, *range(9))
+    )
 
 
-@check("9.1", "around-256", "numbers go round: the window lies across 255 and 0")
+@check("9.1", "around-256", "the window wraps from 255 to 0")
 def around_256(probe: Probe) -> None:
     for _ in range(250):
         probe.draw(b"")
@@ -112,7 +116,7 @@ def around_256(probe: Probe) -> None:
 @check(
     "9.1",
     "nothing-of-the-refused",
-    "a refused packet draws nothing that is ever shown",
+    "nothing that a refused packet draws is ever shown",
     readable_display,
 )
 def nothing_of_the_refused(probe: Probe) -> None:
