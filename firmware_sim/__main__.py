@@ -84,6 +84,8 @@ def main(argv: list[str] | None = None) -> int:
         parser.error("--link is a name for a pseudo-terminal: leave out --tcp and --usbip")
     if options.usb_class and not options.usbip:
         parser.error("--usb-class is for --usbip")
+    if options.allow_origin and not options.view:
+        parser.error("--allow-origin is for --view")
     try:
         config = Config(
             options.size,
@@ -219,6 +221,14 @@ def _parser() -> argparse.ArgumentParser:
         help="show the front page in browsers at that address, on this machine only unless "
         "--allow-remote is given (default: any free port of 127.0.0.1)",
     )
+    parser.add_argument(
+        "--allow-origin",
+        metavar="ORIGIN",
+        action="append",
+        default=[],
+        help="with --view: let pages of another address show it, such as https://cube.example.com "
+        "behind a reverse proxy; may be repeated; * is all",
+    )
     return parser
 
 
@@ -289,7 +299,8 @@ def _serve(wire: DeviceOnLine | PacedDevice, options: argparse.Namespace, stop: 
             require_loopback(options.view[0], remote=options.allow_remote)
             tap = stack.enter_context(Tap(wire.device))
             _on_swap_also(wire.device, tap.notify_swap)
-            place["view"] = stack.enter_context(viewer(tap, _format_address(options.view), port))
+            address = _format_address(options.view)
+            place["view"] = stack.enter_context(viewer(tap, address, port, options.allow_origin))
         _announce(place)
         serve(stop)
 

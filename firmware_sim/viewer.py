@@ -2,7 +2,8 @@
 
 The emulator draws nothing itself. A viewer is a module named in the entry point group
 ``voxdisplay_sim.viewer``; it runs in a process of its own, so that its work is not the device's:
-``python -m MODULE --tap HOST:PORT --listen HOST:PORT --title TEXT``. Its first line on stdout is a
+``python -m MODULE --tap HOST:PORT --listen HOST:PORT --title TEXT``, and ``--allow-origin ORIGIN``
+for each origin whose pages may watch besides its own. Its first line on stdout is a
 JSON object with ``url``, where a browser finds it; without such a line it has failed, and has said
 why on stderr. It ends when the tap does.
 """
@@ -11,7 +12,7 @@ import contextlib
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
 from typing import Final
 
@@ -26,7 +27,7 @@ class ViewerError(OSError):
 
 
 @contextlib.contextmanager
-def viewer(tap: Tap, address: str, title: str) -> Iterator[str]:
+def viewer(tap: Tap, address: str, title: str, allow_origins: Iterable[str] = ()) -> Iterator[str]:
     """Run a viewer.
 
     Parameters
@@ -37,6 +38,8 @@ def viewer(tap: Tap, address: str, title: str) -> Iterator[str]:
         Where it listens for browsers, as HOST:PORT; port 0 is any that is free.
     title
         What is written over the picture.
+    allow_origins
+        Origins whose pages may watch, too, such as ``https://cube.example.com``.
 
     Yields
     ------
@@ -53,6 +56,8 @@ def viewer(tap: Tap, address: str, title: str) -> Iterator[str]:
         raise ViewerError("no viewer is installed: pip install 'voxdisplay[view]'")
     command = [sys.executable, "-m", module]
     command += ["--tap", tap.address, "--listen", address, "--title", title]
+    for origin in allow_origins:
+        command += ["--allow-origin", origin]
     # In a session of its own: it is ours to end, not the terminal's.
     process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)  # noqa: S603 - no shell
     try:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shutil
 import socket
 import subprocess
 import sys
@@ -15,6 +16,9 @@ from pathlib import Path
 import browser as browsers
 import numpy as np
 import pytest
+import reverse_proxy
+from carriers import eventually
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 import voxdisplay as vd
@@ -56,10 +60,10 @@ def tab(chromium):
 
 
 @contextlib.contextmanager
-def emulator_with_view(where="127.0.0.1:0"):
+def emulator_with_view(where="127.0.0.1:0", *options):
     """Run an emulator that is viewed; give a display that is open on it, and the URL."""
     command = [sys.executable, "-m", "firmware_sim", "--tcp", "127.0.0.1:0", "--refresh", "0"]
-    command += ["--size", "3x5x7", "--view", where]
+    command += ["--size", "3x5x7", "--view", where, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             place = json.loads(process.stdout.readline())
@@ -275,6 +279,83 @@ def test_the_page_comes_back_when_the_server_does(tab, unused_port):
     page.errors.clear()
 
 
+def test_a_page_behind_a_proxy_says_why_it_is_refused_and_how_it_is_not(tab, live):
+    _, url, _ = live
+    with reverse_proxy.ReverseProxy(url) as proxy:
+        page = tab(proxy.url)
+        page.wait("$('state').dataset.is === 'refused'", errors=True)
+        origin = proxy.url.rstrip("/")
+        assert page.run("$('refusal').textContent") == (
+            f"pages of {origin} may not watch this display; "
+            f"to allow them, start the view with --allow-origin {origin}"
+        )
+        assert page.run("$('refusal').checkVisibility()")
+        assert page.run("document.documentElement.scrollWidth") == 1000
+    assert all("403" in error for error in page.errors)
+    page.errors.clear()
+
+
+@pytest.mark.parametrize("keeps_host", [False, True])
+def test_a_page_behind_a_proxy_is_allowed(keeps_host, tab):
+    with (
+        emulator_with_view("127.0.0.1:0", "--allow-origin", "*") as (display, url),
+        reverse_proxy.ReverseProxy(url, keeps_host=keeps_host) as proxy,
+    ):
+        page = tab(proxy.url)
+        show(display, (1, 2, 3))
+        page.wait("$('state').dataset.is === 'live' && current()?.n === 1")
+        assert page.run("$('refusal').hidden")
+
+
+def test_a_proxy_that_passes_no_websocket_is_named(tab, live):
+    _, url, _ = live
+    with reverse_proxy.ReverseProxy(url, passes_upgrade=False, keeps_host=True) as proxy:
+        page = tab(proxy.url)
+        page.wait("$('state').dataset.is === 'refused'", errors=True)
+        assert "must pass on the headers Upgrade" in page.run("$('refusal').textContent")
+    page.errors.clear()
+
+
+NGINX = """
+daemon off; pid nginx.pid; error_log stderr;
+events {{ }}
+http {{
+  access_log off;
+  server {{
+    listen 127.0.0.1:{port};
+    location / {{
+      proxy_pass {url};
+      proxy_http_version 1.1;
+      proxy_set_header Upgrade $http_upgrade;
+      proxy_set_header Connection upgrade;
+    }}
+  }}
+}}
+"""
+
+
+@pytest.mark.skipif(shutil.which("nginx") is None, reason="nginx is not installed")
+def test_behind_nginx(tab, unused_port, tmp_path):
+    origin = f"http://127.0.0.1:{unused_port}"
+    with emulator_with_view("127.0.0.1:0", "--allow-origin", origin) as (display, url):
+        (tmp_path / "nginx.conf").write_text(NGINX.format(port=unused_port, url=url))
+        command = ["nginx", "-p", str(tmp_path), "-c", str(tmp_path / "nginx.conf")]
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as nginx:
+            try:
+                eventually(lambda: listens_at(unused_port), "nginx's start")
+                page = tab(origin + "/")
+                show(display, (1, 2, 3))
+                page.wait("$('state').dataset.is === 'live' && current()?.n === 1")
+            finally:
+                nginx.terminate()
+
+
+def listens_at(port):
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+        return True
+    return False
+
+
 @pytest.fixture
 def unused_port():
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -431,3 +512,26 @@ def test_a_picture_and_a_film_are_kept(tab, tmp_path):
     page.wait("Object.keys(kept).length === 2")
     kinds = page.run("Object.values(kept).map(b => [b.type.slice(0, 5), b.size > 100])")
     assert sorted(kinds) == [["image", True], ["video", True]]
+
+
+def test_the_command_lets_an_origin_watch():
+    """What `voxdisplay view` answers besides its own page, and what it refuses to start with."""
+    path = "examples/paper-curve.json"
+    command = [sys.executable, "-m", "voxdisplay", "view", str(path), "--no-open"]
+    allowed = ["--allow-origin", "https://cube.example.com"]
+    view = subprocess.Popen([*command, *allowed], stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    try:
+        live_url = view.stdout.readline().strip().replace("http", "ws") + "live"
+        with connect(live_url, origin="https://cube.example.com") as browser:
+            assert browser.recv(browsers.DEADLINE_S)
+        with pytest.raises(InvalidStatus), connect(live_url, origin="https://evil.example"):
+            pass
+    finally:
+        view.kill()
+        view.communicate()
+    done = subprocess.run(
+        [*command, "--allow-origin", "https://x/page"], capture_output=True, text=True, cwd=ROOT,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "is no origin" in done.stderr

@@ -198,6 +198,21 @@ class AddressType(ParamType[tuple[str, int]]):
             self.fail(str(error), param, ctx)
 
 
+class OriginType(ParamType[str]):
+    """An origin of web pages, such as https://cube.example.com; or ``*``."""
+
+    name = "origin"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Normalise it as a browser sends it."""
+        from voxdisplay.view.live.origins import parse_origin  # noqa: PLC0415 - an extra
+
+        try:
+            return parse_origin(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
 class FeaturesType(ParamType[tuple[str, ...]]):
     """Names of device features, such as line,box; ``all``; or ``none``."""
 

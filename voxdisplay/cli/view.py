@@ -19,7 +19,7 @@ from voxdisplay.cli.options import (
     scene_argument,
 )
 from voxdisplay.cli.output import note, print_stdout
-from voxdisplay.cli.param_types import AddressType
+from voxdisplay.cli.param_types import AddressType, OriginType
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -48,6 +48,15 @@ if TYPE_CHECKING:
     "use ssh -L than an address that everyone can reach.  [default: 127.0.0.1:0]",
 )
 @click.option(
+    "--allow-origin",
+    "allow_origins",
+    type=OriginType(),
+    multiple=True,
+    metavar="ORIGIN",
+    help="Let pages of another address show it, such as https://cube.example.com behind a reverse "
+    "proxy; may be repeated. * is all: then any web page can watch.",
+)
+@click.option(
     "--no-open", is_flag=True, help="Do not open a browser; the page's address is on stdout."
 )
 @click.option(
@@ -65,6 +74,7 @@ def view(
     baud: Baud,
     timeout_s: float,
     listen: tuple[str, int],
+    allow_origins: tuple[str, ...],
     no_open: bool,
     terminal: bool,
     size: vd.Grid | None,
@@ -79,7 +89,7 @@ def view(
     if not terminal:
         source = _scene_source(scene, size) if scene else _display_source(port, baud, timeout_s)
         with source as ready:
-            _serve(ready, listen, open_browser=not no_open)
+            _serve(ready, listen, allow_origins, open_browser=not no_open)
         return
     from voxdisplay.view.terminal import run  # noqa: PLC0415 - an extra
 
@@ -91,7 +101,9 @@ def view(
             raise click.UsageError(f"--terminal: {error}") from error
 
 
-def _serve(source: Source, listen: tuple[str, int], *, open_browser: bool) -> None:
+def _serve(
+    source: Source, listen: tuple[str, int], allow_origins: tuple[str, ...], *, open_browser: bool
+) -> None:
     from voxdisplay.view.live.run import run  # noqa: PLC0415 - an extra
 
     def announce(url: str) -> None:
@@ -102,7 +114,7 @@ def _serve(source: Source, listen: tuple[str, int], *, open_browser: bool) -> No
             webbrowser.open(url)
 
     try:
-        run(source, *listen, announce)
+        run(source, *listen, announce, allow_origins)
     except OSError as error:
         if isinstance(error, vd.VoxDisplayError):
             raise

@@ -1,6 +1,6 @@
-"""The emulator's viewer: a program that ``voxdisplay-sim --view`` starts, and ends.
+"""Viewer of the emulator: a program that ``voxdisplay-sim --view`` starts, and ends.
 
-What it is told and what it says is written in ``firmware_sim/viewer.py``.
+Its arguments and its output are described in ``firmware_sim/viewer.py``.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import sys
 
 from voxdisplay.errors import MissingExtra, OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
+from voxdisplay.view.live.origins import parse_origin
 
 
 def main() -> int:
-    """Show a tap; give 0 when it has ended."""
+    """Show a tap; return the exit code, 0 when the tap has ended."""
     try:
         from voxdisplay.view.live.run import run  # noqa: PLC0415 - the extra "view"
         from voxdisplay.view.live.sources import TapSource  # noqa: PLC0415
@@ -25,10 +26,12 @@ def main() -> int:
     for option in ("--tap", "--listen"):
         parser.add_argument(option, type=parse_address, metavar="HOST:PORT", required=True)
     parser.add_argument("--title", default="voxdisplay-sim")
+    parser.add_argument("--allow-origin", type=parse_origin, action="append", default=[])
     options = parser.parse_args()
     try:
         (host, port), (at_host, at_port) = options.tap, options.listen
-        run(TapSource(host, port, options.title), at_host, at_port, _announce)
+        source = TapSource(host, port, options.title)
+        run(source, at_host, at_port, _announce, options.allow_origin)
     except TransportClosed:
         return 0
     except (OpenError, OSError) as error:

@@ -15,12 +15,13 @@ import contextlib
 import io
 import ipaddress
 import threading
-from collections.abc import AsyncIterator, Hashable
+from collections.abc import AsyncIterator, Hashable, Iterable
 from http import HTTPStatus
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from voxdisplay.errors import MissingExtra
 from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.origins import OriginCheck
 from voxdisplay.view.live.page import content_security_policy, page_html
 from voxdisplay.view.live.sources import Source
 from voxdisplay.view.picture import render_page
@@ -40,6 +41,10 @@ _MAX_IN_FLIGHT = 2
 _IDLE_CHECK_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
 _STOP_TIMEOUT_S = 2.0  # how long the source may take to end
 _MAX_MESSAGE_BYTES = 64  # a browser has little to say
+_NO_UPGRADE = (
+    "the page's WebSocket did not get through: what is between must pass on the headers Upgrade "
+    "and Connection, by HTTP/1.1"
+)
 
 
 class _LatestSnapshot:
@@ -92,9 +97,9 @@ class LiveServer:
 
     """
 
-    def __init__(self, source: Source, name: str) -> None:
+    def __init__(self, source: Source, origins: OriginCheck) -> None:
         self.url = ""
-        self._name = name
+        self._origins = origins
         self._source = source
         self._latest = _LatestSnapshot()
         self._closing = False
@@ -135,18 +140,33 @@ class LiveServer:
     async def _handle_request(self, _: ServerConnection, request: Request) -> Response | None:
         """Answer an HTTP request; None lets it become a WebSocket."""
         host = request.headers.get("Host", "")
-        if not _is_known_host(host, self._name):
-            return _text_response(HTTPStatus.FORBIDDEN, f"this is no place called {host!r}\n")
-        match urlsplit(request.path).path:
+        if refusal := self._origins.host_refusal(host):
+            return _text_response(HTTPStatus.FORBIDDEN, refusal)
+        url = urlsplit(request.path)
+        match url.path:
             case "/":
                 return _page_response()
             case "/frame.png":
                 return await self._picture_response()
-            case "/live" if not _is_same_origin(request.headers.get("Origin"), host):
-                return _text_response(HTTPStatus.FORBIDDEN, "not for pages of other sites\n")
             case "/live":
-                return None
-        return _text_response(HTTPStatus.NOT_FOUND, "there are / and /frame.png\n")
+                return self._live_response(request, host, parse_qs(url.query))
+        return _text_response(HTTPStatus.NOT_FOUND, "there are / and /frame.png")
+
+    def _live_response(
+        self, request: Request, host: str, query: dict[str, list[str]]
+    ) -> Response | None:
+        """Let a WebSocket through, or return why it is refused.
+
+        A script cannot see why its WebSocket failed. So it asks here by an ordinary request, which
+        has no Origin header, and names its origin in the query.
+        """
+        asked = query.get("origin", [None])[-1]
+        origin = request.headers.get("Origin", asked)
+        if refusal := self._origins.origin_refusal(origin, host):
+            return _text_response(HTTPStatus.FORBIDDEN, refusal)
+        if asked is not None:
+            return _text_response(HTTPStatus.UPGRADE_REQUIRED, _NO_UPGRADE)
+        return None
 
     async def _picture_response(self) -> Response:
         await self._latest.wait_for_newer(0)
@@ -179,7 +199,9 @@ class LiveServer:
 
 
 @contextlib.asynccontextmanager
-async def open_server(source: Source, host: str, port: int) -> AsyncIterator[LiveServer]:
+async def open_server(
+    source: Source, host: str, port: int, allow_origins: Iterable[str] = ()
+) -> AsyncIterator[LiveServer]:
     """Serve a source.
 
     Parameters
@@ -187,15 +209,17 @@ async def open_server(source: Source, host: str, port: int) -> AsyncIterator[Liv
     source : Source
         It is closed in the end.
     host, port
-        Where to listen; port 0 is any that is free.
+        Address to listen at; port 0 is any that is free.
+    allow_origins : iterable of str
+        Origins from `parse_origin` whose pages may watch, too.
 
     Raises
     ------
     OSError
-        If the address cannot be had.
+        If the address is not available.
 
     """
-    live = LiveServer(source, host)
+    live = LiveServer(source, OriginCheck(host, allow_origins))
     try:
         async with serve(
             live._serve_browser,  # noqa: SLF001 - of this module
@@ -224,30 +248,6 @@ def _url(server: Server) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
-def _is_known_host(host: str, known_as: str) -> bool:
-    """Tell whether a browser that asks for a host means this server, which has one name.
-
-    A number is fine: only a name can be made to point here by somebody else. The port is not
-    looked at, so that a tunnel (``ssh -L``) may have another one.
-    """
-    try:
-        name = urlsplit(f"//{host}").hostname or ""
-    except ValueError:
-        return False
-    if name in ("localhost", known_as.lower()):
-        return True
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_same_origin(origin: str | None, host: str) -> bool:
-    """Tell whether a page that opens a WebSocket came from here; programs send no origin."""
-    return origin is None or origin in (f"http://{host}", f"https://{host}")
-
-
 def _page_response() -> Response:
     headers = {
         "Content-Security-Policy": content_security_policy(connect="'self'")
@@ -258,7 +258,7 @@ def _page_response() -> Response:
 
 
 def _text_response(status: HTTPStatus, text: str) -> Response:
-    return _response(status, "text/plain; charset=utf-8", text.encode())
+    return _response(status, "text/plain; charset=utf-8", f"{text}\n".encode())
 
 
 def _response(
