@@ -154,8 +154,14 @@ class Frame:
         self._shared = twin._shared = True  # noqa: SLF001
         return twin
 
+    def __copy__(self) -> Frame:
+        return self.copy()
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Frame:
+        return self.copy()
+
     def _prepare_change(self) -> None:
-        """Get ready to be changed: the picture of a copy stays as it is."""
+        """Take the raster out of sharing before a change, so that copies keep their picture."""
         if self._shared:
             self._raster = self._raster.copy()
             self._shared = False

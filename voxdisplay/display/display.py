@@ -11,7 +11,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Literal, Self, TextIO, overload
+from typing import Literal, NoReturn, Self, TextIO, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,9 @@ class Display:
         state = "closed" if self._connection.closed else f"{frames} frames shown"
         name = f" {info.name!r}" if info.name else ""
         return f"<Display {self.port}{name} {info.grid} {info.format.value}, {state}>"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Display is open in this process only: pass its port, and open it there")
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks of the frame last proved; None without one, or Pillow."""

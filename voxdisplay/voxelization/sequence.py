@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,7 @@ class Sequence:
         Whether the last voxel is followed by the first.
     starts : (pieces,) int64 array
         Index of the first voxel of every piece; the first is 0. The curve jumps before each other.
+        Read-only.
     t : (N,) float64 array
         A parameter at which the curve is near each voxel, ascending; read-only.
     curve : Curve
@@ -111,9 +113,19 @@ class Sequence:
         self.curve = curve
         self.seconds = seconds
         self.proof = proof
+        self._freeze()
+
+    def _freeze(self) -> None:
+        for array in (self.voxels, self.starts, self.t):
+            array.flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.voxels)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Pickling forgets that arrays are read-only.
+        self.__dict__.update(state)
+        self._freeze()
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks, in its bounding box; None without Pillow."""
