@@ -55,6 +55,27 @@ def test_bad_scenes(capsys, scene, name):
         refused(subprocess.CompletedProcess(arguments, code, said.out, said.err), *words)
 
 
+@pytest.mark.parametrize("command", ["push", "voxelize", "plan"])
+@pytest.mark.parametrize(
+    ("content", "table", "notes"),
+    [
+        ({"objects": []}, "", ["the scene has no objects: there is nothing to show"]),
+        (
+            {"type": "points", "file": "points.csv"},
+            ",x,y,z\n0,1,2,3\n1,4,5,6\n",
+            ["'points.csv': x, y, z are columns 2, 3, 4 ('x', 'y', 'z') of 4, separated by commas"],
+        ),
+        ({"type": "points", "file": "points.csv"}, "1,2,3\n4,5,6\n", []),
+    ],
+)
+def test_notes_of_scenes(capsys, scene, command, content, table, notes):
+    path = scene(content)
+    path.with_name("points.csv").write_text(table)
+    assert main([command, str(path), *(["--port", "sim:"] if command == "push" else [])]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert [line for line in lines if "points.csv" in line or "no objects" in line] == notes
+
+
 TEXTS = {
     "broken": '{"objects": [',
     "empty": "",

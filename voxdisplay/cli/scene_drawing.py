@@ -16,7 +16,7 @@ _MAX_UNDEFINED_NAMED: Final = 8
 
 
 def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
-    """Return the sequences of a scene's objects, and note where curves jump or have no value.
+    """Return the sequences of a scene's objects; note what the reader chose and curves lack.
 
     Parameters
     ----------
@@ -30,6 +30,8 @@ def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
         If a curve cannot be drawn; it names the object.
 
     """
+    for remark in scene.notes:
+        note(remark)
     sequences = scene.voxelize(**options)
     for item, sequence in zip(scene.items, sequences, strict=True):
         for remark in _remarks(sequence):

@@ -1,6 +1,6 @@
-"""Where an object stands in a scene file: makes numbers of what it says, and errors of what fails.
+"""Evaluation context of a scene object: resolves expressions, attaches JSON paths to errors.
 
-Knows params and expressions; does not know what the numbers are for.
+Knows params and expressions; it must not know what the numbers are for.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.expressions.program import Expression
+    from voxdisplay.scene.point_table import FilePoints
 
 
 @contextmanager
 def as_scene_error(path: str) -> Iterator[None]:
-    """Turn a CurveError into a SceneError that says where."""
+    """Raise a CurveError of the block as a SceneError at a JSON path."""
     try:
         yield
     except CurveError as error:
@@ -33,16 +34,18 @@ def as_scene_error(path: str) -> Iterator[None]:
 
 
 class EvaluationContext:
-    """The place of one object.
+    """Evaluation context of one scene object.
 
-    Parameters
+    Attributes
     ----------
     path : str
-        Its JSON path.
+        JSON path of the object.
     names : mapping of str to float
         The scene's params.
     folder : Path or None
-        Where the files are that it may name; None when it may not.
+        Folder of the files that the object may name; None: it may name none.
+    notes : list of str
+        Lines for people about what was chosen while the object was read.
 
     """
 
@@ -50,20 +53,21 @@ class EvaluationContext:
         self.path = path
         self.names = names
         self.folder = folder
+        self.notes: list[str] = []
 
     def formula(self, key: str, source: str | float) -> Expression:
-        """Parse an expression of t."""
+        """Return the expression of t that a key has."""
         with as_scene_error(f"{self.path}.{key}"):
             return parse(source, self.names)
 
     def number(self, key: str, source: str | float) -> float:
-        """Compute a number."""
+        """Return the number that a key has."""
         with as_scene_error(f"{self.path}.{key}"):
             return constant(source, self.names)
 
     def numbers(self, key: str, sources: Sequence[str | float]) -> Floats:
-        """Compute a list of n numbers: (n,) float64."""
-        # Long lists are of plain numbers, which need no parser and no path each.
+        """Return a list of n numbers: (n,) float64."""
+        # Long lists are of plain numbers: those need neither parser nor path.
         row = [
             source if isinstance(source, float) else self.number(f"{key}[{i}]", source)
             for i, source in enumerate(sources)
@@ -72,7 +76,7 @@ class EvaluationContext:
             return arguments.array(key, row, (None,))
 
     def points(self, key: str, rows: Sequence[Sequence[str | float]]) -> Floats:
-        """Compute n rows of three numbers: (n, 3) float64."""
+        """Return n rows of three numbers: (n, 3) float64."""
         table = [
             [
                 source if isinstance(source, float) else self.number(f"{key}[{i}][{j}]", source)
@@ -83,9 +87,22 @@ class EvaluationContext:
         with as_scene_error(self.path):
             return arguments.points(key, table, least=0)
 
-    def points_from_file(self, key: str, name: str) -> Floats:
-        """Read a file of points beside the scene: (n, 3) float64."""
+    def points_from_file(self, key: str, name: str, *, split: bool) -> FilePoints:
+        """Read a file of points beside the scene.
+
+        Parameters
+        ----------
+        key : str
+        name : str
+            Relative to the scene's folder.
+        split : bool
+            Whether rows that are not finite separate strands.
+
+        """
         with as_scene_error(f"{self.path}.{key}"):
             if self.folder is None:
                 raise CurveError("this scene has no folder, and may name no file")
-            return read_points(self.folder, name)
+            found = read_points(self.folder, name, split=split)
+        if found.note:
+            self.notes.append(found.note)
+        return found

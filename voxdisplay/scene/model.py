@@ -67,11 +67,14 @@ class Scene:
         The grid it was composed for; None: the display's own.
     items : tuple of Item
         In the order in which they are drawn.
+    notes : tuple of str
+        Lines for people about what was chosen while the file was read.
 
     """
 
     size: Grid | None
     items: tuple[SceneItem, ...]
+    notes: tuple[str, ...] = ()
 
     def voxelize(self, **options: Any) -> list[Sequence]:
         """Return the sequences of all items, which are voxelised together.
@@ -169,4 +172,4 @@ class Scene:
             replace(item, curve=Transformed(item.curve, scale, offset)) for item in self.items
         )
         note = f"scene composed for {self.size}, scaled by {scale:.3g} to {grid}"
-        return Scene(grid, items), note
+        return replace(self, size=grid, items=items), note

@@ -4,9 +4,9 @@ The JSON Schema is derived from these. Knows the keys and their types; the value
 the curves. In angles, ``deg`` is a constant: ``"90*deg"``.
 """
 
-from abc import abstractmethod
-from typing import Annotated, get_args
+from typing import Annotated, Literal, get_args
 
+import numpy as np
 from msgspec import Meta, Struct, field
 
 from voxdisplay import curves
@@ -65,9 +65,13 @@ class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=
     color: Color = "white"
     closed: bool | None = None
 
-    @abstractmethod
-    def curve(self, context: EvaluationContext) -> curves.Curve:
-        """Make the curve; raise SceneError or CurveError."""
+    def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
+        """Make the object's curves; raise SceneError or CurveError."""
+        return [self.build_curve(context)]
+
+    def build_curve(self, context: EvaluationContext) -> curves.Curve:
+        """Make the curve of an object that has one; raise SceneError or CurveError."""
+        raise NotImplementedError
 
 
 class Parametric(SceneObject, tag="parametric", frozen=True):
@@ -81,7 +85,7 @@ class Parametric(SceneObject, tag="parametric", frozen=True):
     dy: Formula | None = None
     dz: Formula | None = None
 
-    def curve(self, context: EvaluationContext) -> curves.Parametric:
+    def build_curve(self, context: EvaluationContext) -> curves.Parametric:
         """Make the curve."""
         x, y, z = (context.formula(key, getattr(self, key)) for key in ("x", "y", "z"))
         dx, dy, dz = (
@@ -98,7 +102,7 @@ class Segment(SceneObject, tag="segment", frozen=True):
     start: Vector = field(name="from")
     end: Vector = field(name="to")
 
-    def curve(self, context: EvaluationContext) -> curves.Segment:
+    def build_curve(self, context: EvaluationContext) -> curves.Segment:
         """Make the curve."""
         return curves.Segment(
             context.numbers("from", self.start), context.numbers("to", self.end), closed=self.closed
@@ -110,7 +114,7 @@ class Polyline(SceneObject, tag="polyline", frozen=True):
 
     points: list[Vector]
 
-    def curve(self, context: EvaluationContext) -> curves.Polyline:
+    def build_curve(self, context: EvaluationContext) -> curves.Polyline:
         """Make the curve."""
         return curves.Polyline(context.points("points", self.points), closed=self.closed)
 
@@ -127,7 +131,7 @@ class Arc(SceneObject, tag="arc", frozen=True):
     end: Number
     normal: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, context: EvaluationContext) -> curves.Arc:
+    def build_curve(self, context: EvaluationContext) -> curves.Arc:
         """Make the curve."""
         return curves.Arc(
             context.numbers("center", self.center),
@@ -146,7 +150,7 @@ class Circle(SceneObject, tag="circle", frozen=True):
     radius: Number
     normal: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, context: EvaluationContext) -> curves.Circle:
+    def build_curve(self, context: EvaluationContext) -> curves.Circle:
         """Make the curve."""
         return curves.Circle(
             context.numbers("center", self.center),
@@ -162,7 +166,7 @@ class Ellipse(SceneObject, tag="ellipse", frozen=True):
     center: Vector
     axes: tuple[Vector, Vector]
 
-    def curve(self, context: EvaluationContext) -> curves.Ellipse:
+    def build_curve(self, context: EvaluationContext) -> curves.Ellipse:
         """Make the curve."""
         return curves.Ellipse(
             context.numbers("center", self.center),
@@ -181,7 +185,7 @@ class Helix(SceneObject, tag="helix", frozen=True):
     axis: Vector = (0.0, 0.0, 1.0)
     start: Number = 0.0
 
-    def curve(self, context: EvaluationContext) -> curves.Helix:
+    def build_curve(self, context: EvaluationContext) -> curves.Helix:
         """Make the curve."""
         return curves.Helix(
             context.numbers("center", self.center),
@@ -202,7 +206,7 @@ class Lissajous(SceneObject, tag="lissajous", frozen=True):
     frequency: Vector
     phase: Vector = (0.0, 0.0, 0.0)
 
-    def curve(self, context: EvaluationContext) -> curves.Lissajous:
+    def build_curve(self, context: EvaluationContext) -> curves.Lissajous:
         """Make the curve."""
         return curves.Lissajous(
             context.numbers("center", self.center),
@@ -226,7 +230,7 @@ class TorusKnot(SceneObject, tag="torus_knot", frozen=True):
     minor: Number
     axis: Vector = (0.0, 0.0, 1.0)
 
-    def curve(self, context: EvaluationContext) -> curves.TorusKnot:
+    def build_curve(self, context: EvaluationContext) -> curves.TorusKnot:
         """Make the curve."""
         return curves.TorusKnot(
             context.number("p", self.p),
@@ -244,7 +248,7 @@ class Bezier(SceneObject, tag="bezier", frozen=True):
 
     points: list[Vector]
 
-    def curve(self, context: EvaluationContext) -> curves.Bezier:
+    def build_curve(self, context: EvaluationContext) -> curves.Bezier:
         """Make the curve."""
         return curves.Bezier(context.points("points", self.points), closed=self.closed)
 
@@ -257,7 +261,7 @@ class BSpline(SceneObject, tag="bspline", frozen=True):
     knots: list[Number] | None = None
     weights: list[Number] | None = None
 
-    def curve(self, context: EvaluationContext) -> curves.BSpline:
+    def build_curve(self, context: EvaluationContext) -> curves.BSpline:
         """Make the curve."""
         return curves.BSpline(
             context.points("points", self.points),
@@ -273,7 +277,7 @@ class CatmullRom(SceneObject, tag="catmull_rom", frozen=True):
 
     points: list[Vector]
 
-    def curve(self, context: EvaluationContext) -> curves.CatmullRom:
+    def build_curve(self, context: EvaluationContext) -> curves.CatmullRom:
         """Make the curve."""
         return curves.CatmullRom(context.points("points", self.points), closed=self.closed)
 
@@ -281,21 +285,26 @@ class CatmullRom(SceneObject, tag="catmull_rom", frozen=True):
 class Points(SceneObject, tag="points", frozen=True):
     """Ordered points, joined by straight lines: either inline or in a file beside the scene.
 
-    The file is a .csv of three columns x, y, z, or a .npy array of shape (n, 3).
+    The file is a text table (.csv, .txt, .tsv, .dat, .xyz) of columns x, y, z, or a .npy array of
+    shape (n, 3). With "gaps": "split", rows that are empty or not finite split it into strands.
     """
 
     points: list[Vector] | None = None
     file: str | None = None
+    gaps: Literal["split"] | None = None
 
-    def curve(self, context: EvaluationContext) -> curves.Points:
-        """Make the curve."""
+    def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
+        """Make one curve for each strand."""
         if self.points is not None and self.file is None:
+            if self.gaps:
+                raise CurveError("the key 'gaps' belongs to the key 'file'")
             points = context.points("points", self.points)
-        elif self.file is not None and self.points is None:
-            points = context.points_from_file("file", self.file)
-        else:
+            return [curves.Points(points, closed=self.closed)]
+        if self.file is None or self.points is not None:
             raise CurveError("points needs either the key 'points' or the key 'file'")
-        return curves.Points(points, closed=self.closed)
+        found = context.points_from_file("file", self.file, split=self.gaps == "split")
+        strands = np.split(found.points, found.starts[1:])
+        return [curves.Points(strand, closed=self.closed) for strand in strands]
 
 
 Object = (

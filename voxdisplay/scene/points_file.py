@@ -1,7 +1,7 @@
-"""Files of points beside a scene: .csv and .npy, never outside the scene's folder.
+"""Files of points beside a scene: text tables and .npy arrays, never outside the scene's folder.
 
 The files are as little trusted as the scene: nothing is allocated for what a header claims, and
-nothing in them is evaluated. Does not know what the points are for.
+nothing in them is evaluated. It must not know what the points are for.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 import os
 import re
 import stat
-from array import array
-from pathlib import Path, PureWindowsPath
+from pathlib import Path, PurePath, PureWindowsPath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from voxdisplay.errors import CurveError, did_you_mean
 from voxdisplay.expressions.parse import excerpt
+from voxdisplay.scene.point_table import GAPS_HINT, FilePoints, read_table, split_strands
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 MAX_BYTES = 16 << 20
 """Largest file: a million points or so, which is more than a display has along any curve."""
 
+_TABLES = (".csv", ".txt", ".tsv", ".dat", ".xyz", ".asc", ".pts")
 
-def read_points(folder: Path, name: str) -> NDArray[np.float64]:
+
+def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
     """Read a file of points.
 
     Parameters
@@ -33,13 +35,10 @@ def read_points(folder: Path, name: str) -> NDArray[np.float64]:
     folder : Path
         The scene's folder.
     name : str
-        The file's path relative to it: ``.csv``, three columns x, y, z of numbers, perhaps under
-        a line that says so; or ``.npy``, shape (n, 3), real numbers of any type.
-
-    Returns
-    -------
-    (n, 3) float64 array
-        All finite.
+        The file's path relative to it: a text table, as `read_table` takes it; or ``.npy``, shape
+        (n, 3), real numbers of any type.
+    split : bool
+        Whether rows that are empty or not finite separate strands; else they are errors.
 
     Raises
     ------
@@ -49,9 +48,10 @@ def read_points(folder: Path, name: str) -> NDArray[np.float64]:
         file, and the line or row.
 
     """
-    read = _READERS.get(name[-4:].lower())
-    if read is None:
-        raise CurveError(f"{excerpt(name)} is neither a .csv nor a .npy file")
+    kind = PurePath(name).suffix.lower()
+    if kind not in (*_TABLES, ".npy"):
+        kinds = f"{', '.join(_TABLES)} or .npy"
+        raise CurveError(f"{excerpt(name)} is not a file of points: {kinds}")
     try:
         data = _bytes(folder, name)
     except FileNotFoundError:
@@ -62,11 +62,19 @@ def read_points(folder: Path, name: str) -> NDArray[np.float64]:
     except (OSError, ValueError, RuntimeError) as error:  # of links in a loop, of a NUL
         what = error.strerror if isinstance(error, OSError) else error
         raise CurveError(f"cannot read {excerpt(name)}: {what}") from error
-    points = read(name, data)
+    read = _read_array if kind == ".npy" else read_table
+    found = read(name, data, split=split)
+    if not len(found.points):
+        raise CurveError(f"{excerpt(name)} holds no points")
+    return found
+
+
+def _read_array(name: str, data: bytes, *, split: bool) -> FilePoints:
+    points = _npy(name, data)
     wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if wrong.size:
-        raise CurveError(f"point {wrong[0]} of {excerpt(name)} is not finite")
-    return points
+    if wrong.size and not split:
+        raise CurveError(f"row {wrong[0]} of {excerpt(name)} is not finite", hint=GAPS_HINT)
+    return FilePoints(*split_strands(points, []))
 
 
 def _bytes(folder: Path, name: str) -> bytes:
@@ -95,27 +103,6 @@ def _beside(folder: Path) -> list[str]:
         return [entry.name for entry, _ in zip(entries, range(1000), strict=False)]
 
 
-def _csv(name: str, data: bytes) -> NDArray[np.float64]:
-    numbers = array("d")
-    for i, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").splitlines(), start=1):
-        if not line.strip():
-            continue
-        fields = line.split(b",")
-        try:
-            x, y, z = map(float, fields)
-        except ValueError:
-            if not numbers and [field.strip(b' "').lower() for field in fields] == [
-                b"x",
-                b"y",
-                b"z",
-            ]:
-                continue
-            wrong = excerpt(line.decode("utf-8", "replace"))
-            raise CurveError(f"{excerpt(name)}, line {i}: {wrong} is not three numbers") from None
-        numbers.extend((x, y, z))
-    return np.array(numbers, dtype=np.float64).reshape(-1, 3)
-
-
 # numpy's own reader makes an array of whatever shape the header claims, and evaluates the header.
 _NPY_DESCR = re.compile(rb"'descr' *: *'([<>|=]?[fiu][1248])'")
 _NPY_ORDER = re.compile(rb"'fortran_order' *: *(True|False)")
@@ -133,10 +120,13 @@ def _npy(name: str, data: bytes) -> NDArray[np.float64]:
         pattern.search(header) for pattern in (_NPY_DESCR, _NPY_ORDER, _NPY_SHAPE)
     )
     if not (descr and order and shape):
-        raise CurveError(f"{excerpt(name)} is not an array of real numbers")
+        hint = "save an array of shape (n, 3), of floats or integers"
+        raise CurveError(f"{excerpt(name)} is not an array of real numbers", hint=hint)
     sides = [int(side) for side in shape[1].split(b",") if side.strip()]
     if len(sides) != 2 or sides[1] != 3:
-        raise CurveError(f"{excerpt(name)} has shape ({shape[1].decode()}), not (n, 3)")
+        transposed = len(sides) == 2 and sides[0] == 3
+        problem = f"{excerpt(name)} has shape ({shape[1].decode()}), not (n, 3)"
+        raise CurveError(problem, hint=f"save array{'.T' if transposed else '[:, :3]'}")
     try:
         numbers = np.frombuffer(data, dtype=descr[1].decode(), offset=end)
     except (TypeError, ValueError):  # TypeError: f1
@@ -145,6 +135,3 @@ def _npy(name: str, data: bytes) -> NDArray[np.float64]:
         raise CurveError(f"{excerpt(name)} does not hold the {sides[0]} points that it claims")
     points = numbers.reshape(3, -1).T if order[1] == b"True" else numbers.reshape(-1, 3)
     return points.astype(np.float64)
-
-
-_READERS = {".csv": _csv, ".npy": _npy}

@@ -142,15 +142,19 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
             raise SceneError("expected text in double quotes", path="$.$schema")
         scene_object: SceneObject = _convert(raw, Object, source)
         context = EvaluationContext("$", {}, folder)
-        return Scene(None, (_item(scene_object, context, source),))
+        return Scene(None, _items(scene_object, context, source), tuple(context.notes))
     file: SceneFile = _convert(raw, SceneFile, source)
     names = _params(file.params)
     size = _size(file.size, names) if file.size else None
-    items = [
-        _item(scene_object, EvaluationContext(f"$.objects[{i}]", names, folder), source)
-        for i, scene_object in enumerate(file.objects)
-    ]
-    return Scene(size, tuple(items))
+    items: list[SceneItem] = []
+    notes: list[str] = []
+    for i, scene_object in enumerate(file.objects):
+        context = EvaluationContext(f"$.objects[{i}]", names, folder)
+        items += _items(scene_object, context, source)
+        notes += context.notes
+    if not items:
+        notes.append("the scene has no objects: there is nothing to show")
+    return Scene(size, tuple(items), tuple(notes))
 
 
 def _means(key: str, raw: dict[str, Any]) -> bool:
@@ -180,13 +184,15 @@ def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
     return grid
 
 
-def _item(scene_object: SceneObject, context: EvaluationContext, source: JsonText) -> SceneItem:
+def _items(
+    scene_object: SceneObject, context: EvaluationContext, source: JsonText
+) -> tuple[SceneItem, ...]:
+    """Return what an object draws: one item for each strand of points, else one."""
     with as_scene_error(context.path):
-        curve = scene_object.curve(context)
+        strands = scene_object.build_curves(context)
     kind = str(scene_object.__struct_config__.tag)
-    return SceneItem(
-        kind, curve, _colors(scene_object.color, f"{context.path}.color"), context.path, source
-    )
+    colors = _colors(scene_object.color, f"{context.path}.color")
+    return tuple([SceneItem(kind, curve, colors, context.path, source) for curve in strands])
 
 
 def _colors(color: Color, path: str) -> NDArray[np.uint8]:

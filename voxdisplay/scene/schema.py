@@ -13,7 +13,7 @@ import inspect
 import json
 import sys
 from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -112,6 +112,8 @@ def _container(origin: Any, arguments: tuple[Any, ...]) -> dict[str, Any]:
             "prefixItems": [_part(each) for each in arguments],
             "items": False,
         }
+    if origin is Literal:
+        return {"enum": list(arguments)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _part(arguments[1])}
     raise TypeError(f"no schema for {origin}")

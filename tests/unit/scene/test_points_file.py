@@ -1,9 +1,10 @@
-"""Files of points beside a scene: what they mean, and how wrong and hostile ones are refused."""
+"""Files of points beside a scene: access to them, arrays, and hostile ones."""
 
 from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import sys
 import time
@@ -69,27 +70,6 @@ def test_npy_of_a_later_version(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("1,2,3\n1,2\n", "'data.csv', line 2: '1,2' is not three numbers"),
-        ("1,2,3\n1,2,3,4\n", "line 2"),
-        ("x,y,z\n1,2,three\n", "line 2"),
-        ("a,b,c\n1,2,3\n", "line 1"),
-        ("1,2,3\nx,y,z\n", "line 2"),
-        ("1;2;3\n", "line 1"),
-        ("1,2,3\n1,2,nan\n", "point 1 of 'data.csv' is not finite"),
-        ("\0", "line 1"),
-        ("\u00ff" * 9999, "line 1"),
-        ("", "0 of at least 1 points"),
-        ("x,y,z\n", "0 of at least 1 points"),
-    ],
-)
-def test_wrong_csv(folder: Path, text: str, message: str) -> None:
-    (folder / "data.csv").write_text(text, encoding="latin-1")
-    assert message in refused(folder, "data.csv")
-
-
-@pytest.mark.parametrize(
     ("header", "message"),
     [
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 3), }", "claims"),
@@ -113,6 +93,26 @@ def test_wrong_npy(folder: Path, header: str, message: str) -> None:
 def test_what_is_no_npy(folder: Path, data: bytes) -> None:
     (folder / "data.npy").write_bytes(data)
     assert "is not a .npy file" in refused(folder, "data.npy")
+
+
+@pytest.mark.parametrize(
+    ("shape", "hint"), [((3, 5), "array.T"), ((4, 4), "array[:, :3]"), ((2, 3, 4), "array[:, :3]")]
+)
+def test_arrays_of_another_shape(folder: Path, shape: tuple[int, ...], hint: str) -> None:
+    np.save(folder / "data.npy", np.zeros(shape))
+    message = refused(folder, "data.npy")
+    assert f"has shape ({', '.join(map(str, shape))}), not (n, 3)" in message
+    assert hint in message
+
+
+def test_rows_that_are_not_finite(folder: Path) -> None:
+    rows = np.array([*POINTS[:2], [1, math.nan, 2], POINTS[2], [math.inf] * 3, POINTS[3]])
+    np.save(folder / "data.npy", rows)
+    assert "row 2 of 'data.npy' is not finite" in refused(folder, "data.npy")
+    scene = {"type": "points", "file": "data.npy", "gaps": "split"}
+    strands = read_scene(json.dumps(scene), folder=folder).items
+    assert [item.curve.t_range[1] for item in strands] == [1, 1, 1]
+    assert [item.path for item in strands] == ["$", "$", "$"]
 
 
 def test_pickles_are_not_loaded(folder: Path) -> None:
