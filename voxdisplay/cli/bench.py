@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import default_port, json_option, port_options, quiet_option
+from voxdisplay.cli.options import default_port, json_option, no_reset, port_options, quiet_option
 from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout, progress_bar
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def bench(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
             if progress:
                 progress(done, _STEPS)
 
-        transport = open_at_rate(port, baud, timeout_s, note)
+        transport = open_at_rate(port, baud, timeout_s, note, reset=not no_reset())
         try:
             greeting = request_info(transport, timeout_s)
             raw = measurements.measure_raw_pipe(transport, greeting, timeout_s)

@@ -11,6 +11,8 @@ from voxdisplay.cli.options import (
     baud_option,
     default_port,
     json_option,
+    no_reset,
+    no_reset_option,
     port_option,
     quiet_option,
     timeout_option,
@@ -40,6 +42,7 @@ _EXIT_BROKEN = 1
 )
 @port_option
 @baud_option()
+@no_reset_option
 @timeout_option(1.0)
 @click.option(
     "--opening",
@@ -98,7 +101,7 @@ def conformance(
     from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate  # noqa: PLC0415
 
     port = default_port(port)
-    pipe = open_at_rate(port, baud, opening_s, note)
+    pipe = open_at_rate(port, baud, opening_s, note, reset=not no_reset())
     done = 0
     try:
         with progress_bar("checking") as progress:

@@ -74,9 +74,33 @@ def timeout_option(default_s: float = 5.0) -> Callable[[_C], _C]:
     )
 
 
+_NO_RESET = "voxdisplay.no_reset"
+
+
+def _remember_no_reset(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+    del parameter
+    context.meta[_NO_RESET] = value
+
+
+# For whoever opens a port, by `no_reset`: no command has any other use for it.
+no_reset_option = click.option(
+    "--no-reset",
+    is_flag=True,
+    expose_value=False,
+    callback=_remember_no_reset,
+    help="Leave DTR and RTS of a serial line alone: many boards restart on them.",
+)
+
+
+def no_reset() -> bool:
+    """Return whether the command that runs was given ``--no-reset``."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_NO_RESET))
+
+
 def port_options(function: _C) -> _C:
-    """Add ``--port``, ``--baud`` and ``--timeout``."""
-    for option in (timeout_option(), baud_option(), port_option):
+    """Add ``--port``, ``--baud``, ``--no-reset`` and ``--timeout``."""
+    for option in (timeout_option(), no_reset_option, baud_option(), port_option):
         function = option(function)
     return function
 
@@ -87,8 +111,8 @@ reconnect_option = click.option(
     type=seconds_type(0),
     default=0.0,
     metavar="SECONDS",
-    help="How long to wait for a display that is pulled out. When it is back, its picture is sent "
-    "again.  [default: do not wait]",
+    help="How long to wait for a display that is not plugged in yet, or is pulled out. When it is "
+    "back, its picture is sent again.  [default: do not wait]",
 )
 
 on_exit_option = click.option(
@@ -182,6 +206,7 @@ def open_display(
         baud=baud,
         timeout_s=timeout_s,
         reconnect_s=reconnect_s,
+        no_reset=no_reset(),
         note=note,
         capture=capture,
     )

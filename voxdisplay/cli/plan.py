@@ -15,6 +15,8 @@ from voxdisplay.cli.options import (
     display_size_option,
     fit_option,
     json_option,
+    no_reset,
+    no_reset_option,
     quiet_option,
     scene_argument,
 )
@@ -48,6 +50,7 @@ _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what
     help="Ask this display for its size, format, features, longest packet and refresh rate.",
 )
 @baud_option(None, "all common rates, and USB")
+@no_reset_option
 @display_size_option(
     "Size of the display in voxels.  "
     f"[default: the port's, else the scene's, else {DEFAULT_SIZE_TEXT}]"
@@ -111,7 +114,7 @@ def _ask(port: str, baud: Baud | None) -> tuple[vd.DeviceInfo, int | None]:
     """Return what a display announces, and the rate of its line if that was given or found."""
     from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate  # noqa: PLC0415
 
-    transport = open_at_rate(port, baud or DEFAULT_BAUD, _TIMEOUT_S, note)
+    transport = open_at_rate(port, baud or DEFAULT_BAUD, _TIMEOUT_S, note, reset=not no_reset())
     found = getattr(transport, "baud", None) if baud == "auto" else baud
     with vd.open(transport) as display:
         return display.info, found

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 import voxdisplay as vd
-from voxdisplay.cli.options import baud_option, json_option, quiet_option, timeout_option
+from voxdisplay.cli.options import (
+    baud_option,
+    json_option,
+    no_reset,
+    no_reset_option,
+    quiet_option,
+    timeout_option,
+)
 from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout
 
 if TYPE_CHECKING:
@@ -37,6 +44,7 @@ _SLACK_S: Final = 2.0
 )
 @timeout_option(3.0)
 @baud_option()
+@no_reset_option
 @quiet_option
 @json_option
 def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
@@ -54,7 +62,9 @@ def ports(*, probe: bool, timeout_s: float, baud: Baud, as_json: bool) -> None:
         if sys.stderr.isatty():
             note(f"asking {plural(len(found), 'port')}, for up to {timeout_s:g} s ...")
         names = [port.port for port in found]
-        answers = scan.probe_ports(names, baud=baud, timeout_s=timeout_s, slack_s=_SLACK_S)
+        answers = scan.probe_ports(
+            names, baud=baud, timeout_s=timeout_s, slack_s=_SLACK_S, reset=not no_reset()
+        )
     if as_json:
         print_json({"ports": [_port_json(port, answers.get(port.port)) for port in found]})
         return

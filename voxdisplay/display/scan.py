@@ -16,7 +16,7 @@ ProbeResult: TypeAlias = DeviceInfo | str  # the device that answered, or why no
 
 
 def probe_ports(
-    ports: Iterable[str], *, baud: Baud, timeout_s: float, slack_s: float
+    ports: Iterable[str], *, baud: Baud, timeout_s: float, slack_s: float, reset: bool = True
 ) -> dict[str, ProbeResult]:
     """Return which device answers HELLO at each of many ports.
 
@@ -29,6 +29,8 @@ def probe_ports(
         How long to send HELLO.
     slack_s : float
         How much longer opening a port may take, besides the time to try all rates.
+    reset : bool
+        See `open_transport`.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def probe_ports(
 
     def probe(port: str) -> None:
         try:
-            results[port] = _probe(port, baud, timeout_s)
+            results[port] = _probe(port, baud, timeout_s, reset=reset)
         except VoxDisplayError as error:
             results[port] = str(error)
 
@@ -54,8 +56,8 @@ def probe_ports(
     return dict(results)
 
 
-def _probe(port: str, baud: Baud, timeout_s: float) -> DeviceInfo:
-    transport = open_at_rate(port, baud, timeout_s)
+def _probe(port: str, baud: Baud, timeout_s: float, *, reset: bool) -> DeviceInfo:
+    transport = open_at_rate(port, baud, timeout_s, reset=reset)
     try:
         return device_info(request_info(transport, timeout_s))
     finally:
