@@ -49,6 +49,7 @@ class Camera:
         if not 0 < self.fov < math.pi:
             raise ValueError(f"the field of view {self.fov} is not between 0 and pi")
 
+    @np.errstate(under="ignore")  # of angles next to nothing
     def project(
         self, points: ArrayLike, grid: tuple[int, int, int], size: tuple[int, int]
     ) -> tuple[Floats, Floats, Floats]:

@@ -53,6 +53,7 @@ class LightRegion(NamedTuple):
     top: int
 
 
+@np.errstate(under="ignore")  # light fades to nothing
 def accumulate_light(
     lit: LitVoxels, grid: Grid, camera: Camera, size: tuple[int, int]
 ) -> LightRegion:

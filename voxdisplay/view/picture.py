@@ -97,6 +97,7 @@ def render_page(
     return render_voxels(lit_voxels(page, grid, format, palette), grid, options)
 
 
+@np.errstate(under="ignore")  # light fades to nothing
 def render_voxels(
     lit: LitVoxels, grid: Grid, options: RenderOptions, exposure: float | None = None
 ) -> Image.Image:
@@ -133,6 +134,7 @@ def _screen_blended(image: Image.Image, light: Image.Image, left: int, top: int)
     return image
 
 
+@np.errstate(under="ignore")
 def auto_exposure(light: Light) -> float:
     """Find the exposure that shows light best: most of what is lit clearly, little of it burnt."""
     apart = max(1, round((light[0].size / _METER_PIXELS) ** 0.5))
