@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from voxdisplay import voxelization
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
-from voxdisplay.raster.color import Color, as_colors, interpolate_colors
+from voxdisplay.raster.color import Color, as_colors, colors_at, interpolate_colors
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
@@ -182,7 +182,8 @@ class Frame:
             Voxels of an array have columns x, y, z. What lies outside the grid is clipped.
         color : str, (r, g, b), list of these, or (k, 3) integer array, optional
             A colour, or several spread along the curve: see `voxdisplay.raster.color.as_colors`.
-            White by default. A scene has colours of its own.
+            As many as a `Points` curve has points belong to those points. White by default. A
+            scene has colours of its own.
         fit : {"contain", "none"}
             For a scene that was composed for a grid of another size: scale and centre it, or keep
             its numbers.
@@ -210,6 +211,8 @@ class Frame:
         if isinstance(drawable, Curve):
             drawable = voxelization.voxelize(drawable)
         if isinstance(drawable, voxelization.Sequence):
+            if len(colors) > 1 and len(colors) == drawable.curve.point_count:
+                colors = colors_at(colors, voxelization.point_indices(drawable))
             drawing = self._add(drawable.voxels, colors, _corner_rows(drawable))
             return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
         return self._add(_as_voxels(drawable), colors, _NO_INDICES)
@@ -225,7 +228,8 @@ class Frame:
     ) -> Drawing:
         self._prepare_change()
         # One colour is looked up once.
-        rgb = colors if len(colors) == 1 else interpolate_colors(colors, len(voxels))
+        each = len(colors) in {1, len(voxels)}
+        rgb = colors if each else interpolate_colors(colors, len(voxels))
         found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
         exact = np.array_equal(self._colors_of(found), rgb)
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found

@@ -34,12 +34,16 @@ class Curve(ABC):
     family : hashable
         Key of curves that `batch_evaluator` takes together: equal for curves of one class with
         the same formula, the same ``degree`` and the same ``thread_safe``. None: evaluated alone.
+    point_count : int or None
+        Number of points that the curve was made of, if it passes through them at t = 0, 1, 2, ...
+        and each may have a colour of its own. None for all others.
 
     """
 
     t_range: tuple[float, float]
     closed: bool | None = None
     family: Hashable = None
+    point_count: int | None = None
     _arguments: Mapping[str, object] = {}
 
     def __init_subclass__(cls, **named: Any) -> None:

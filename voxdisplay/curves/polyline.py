@@ -105,6 +105,10 @@ class Points(Polyline):
 
     _min_points = 1
 
+    def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
+        super().__init__(points, closed=closed)
+        self.point_count = len(np.asarray(points))
+
 
 class Segment(Polyline):
     """The straight line from start (t = 0) to end (t = 1).

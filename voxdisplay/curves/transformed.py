@@ -38,6 +38,7 @@ class Transformed(Curve):
         self.t_range = curve.t_range
         self.closed = curve.closed
         self.breaks = curve.breaks
+        self.point_count = curve.point_count
         if curve.family is not None:
             self.family = (type(curve).batch_evaluator, curve.family)
         self._arguments = {"curve": curve, "scale": self.scale, "offset": self.offset}

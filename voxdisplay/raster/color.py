@@ -124,9 +124,17 @@ def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint
     """Return ``count`` colours that lead evenly through k colours, blending: (count, 3) uint8."""
     if len(colors) == 1:
         return np.broadcast_to(colors, (count, 3))
-    place = np.linspace(0, len(colors) - 1, count)
-    stops = np.arange(len(colors))
-    blended = [np.interp(place, stops, colors[:, channel]) for channel in range(3)]
+    return colors_at(colors, np.linspace(0, len(colors) - 1, count))
+
+
+def colors_at(colors: NDArray[np.uint8], index: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the colours at fractional indices, (n,), of k colours, blending: (n, 3) uint8.
+
+    Beyond the last colour, the first one follows.
+    """
+    stops = np.arange(len(colors) + 1)
+    ring = np.concatenate((colors, colors[:1]))
+    blended = [np.interp(index, stops, ring[:, channel]) for channel in range(3)]
     return np.floor(np.stack(blended, axis=1) + 0.5).astype(np.uint8)
 
 

@@ -46,7 +46,7 @@ _OBJ = re.compile(
 )
 _STL = re.compile(rb"\s*solid\b[^\n]*\n\s*(?:facet\s+normal|endsolid)\b")
 _NUMBERS = re.compile(
-    rb"(?:\s*[#%][^\n]*\n)*(?:[\w \"',;.\t-]*+[\r\n]++)?"
+    rb"(?:\s*[#%][^\n]*\n)*(?:[\w \"',;.\t-]*+[\r\n]++)?"  # comments, and a line of names
     rb"\s*+[-+]?[\d.][-+.\deE]*\s*[,;\t ]\s*[-+\d.]"
 )
 

@@ -13,9 +13,19 @@ from collections.abc import Iterable
 from voxdisplay.curves.curve import Curve
 from voxdisplay.voxelization import measure, tangent_march
 from voxdisplay.voxelization.digitise import digitise
+from voxdisplay.voxelization.point_indices import point_indices
 from voxdisplay.voxelization.sequence import Report, Sequence, clip
 
-__all__ = ["Report", "Sequence", "clip", "march", "measure", "voxelize", "voxelize_many"]
+__all__ = [
+    "Report",
+    "Sequence",
+    "clip",
+    "march",
+    "measure",
+    "point_indices",
+    "voxelize",
+    "voxelize_many",
+]
 
 
 def voxelize(
