@@ -10,6 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -21,6 +22,13 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
 # For a program that hangs; nothing is measured by it. An emulated machine needs more patience.
 DEADLINE_S = 60 * int(os.environ.get("TEST_PATIENCE", "1"))
+
+
+@pytest.fixture(autouse=True)
+def numpy_raises():
+    """Have numpy raise in every test, as some programs do: the package must not mind."""
+    with np.errstate(all="raise"):
+        yield
 
 
 @dataclass

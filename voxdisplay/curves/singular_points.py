@@ -159,6 +159,7 @@ def singular_points(curve: Curve) -> tuple[SingularPoint, ...]:
     return curve.singular_points if isinstance(curve, CompletedCurve) else ()
 
 
+@np.errstate(all="ignore")
 def complete(curve: Curve, also: Iterable[float] = ()) -> Curve:
     """Return a curve that has a point at its isolated singular parameters, if it has any.
 
@@ -242,6 +243,7 @@ def _candidates(curve: Curve) -> Floats:
     return _unbounded(curve) if bounded else customary_parameters(first, last)
 
 
+@np.errstate(all="ignore")
 def customary_parameters(first: float, last: float) -> Floats:
     """Return parameters in a range at which formulas of people tend to be singular, ascending.
 

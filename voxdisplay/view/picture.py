@@ -151,6 +151,7 @@ def _background(grid: Grid, options: RenderOptions) -> Image.Image:
     return Image.new("RGB", options.size, BACKGROUND)
 
 
+@np.errstate(all="ignore")  # light that underflows is dark
 def _tone_mapped(light: Light) -> Light:
     """Bring light of any strength below 1, keeping its hue; the brightest turns towards white."""
     most = light.max(axis=0)

@@ -48,6 +48,7 @@ ONE_PIECE = np.zeros(1, dtype=np.int64)
 ONE_PIECE.flags.writeable = False
 
 
+@np.errstate(all="ignore")
 def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
     """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
     curves = list(curves)

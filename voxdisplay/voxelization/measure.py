@@ -155,6 +155,7 @@ def _later(cells: SpatialHash, voxels: Voxels, offset: tuple[int, int]) -> tuple
 # ------------------------------------------------------------------- the voxels and the curve
 
 
+@np.errstate(all="ignore")
 def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> Floats:
     """Measure how far voxel centres are from a curve.
 
@@ -199,6 +200,7 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
     return best
 
 
+@np.errstate(all="ignore")
 def coverage(voxels: Voxels, curve: Curve) -> float:
     """Measure how far a curve gets away from the voxels that should show it.
 

@@ -62,6 +62,7 @@ class MarchTrace:
     distances: Floats
 
 
+@np.errstate(all="ignore")
 def march(
     curve: Curve,
     variant: int = 3,
@@ -84,6 +85,7 @@ def march(
     )
 
 
+@np.errstate(all="ignore")
 def follow(
     curve: Curve,
     variant: int = 3,

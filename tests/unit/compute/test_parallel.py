@@ -117,7 +117,7 @@ def test_there_is_at_least_one_processor() -> None:
 
 
 def test_batches_are_the_same_on_any_number_of_processors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DIGITISE, "CURVES", 7)
+    monkeypatch.setattr(DIGITISE, "MAX_BATCH_CURVES", 7)
     curves = beziers(80)
     many = voxelize_many(curves)
     alone(monkeypatch)
@@ -130,7 +130,7 @@ def test_batches_are_the_same_on_any_number_of_processors(monkeypatch: pytest.Mo
 def test_batches_are_done_apart_where_it_is_worth_it(
     worth: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(DIGITISE, "CURVES", 4)
+    monkeypatch.setattr(DIGITISE, "MAX_BATCH_CURVES", 4)
     monkeypatch.setattr(kernel_backend, "enabled", lambda: worth)
     asked: set[int] = set()
 
@@ -193,7 +193,7 @@ def test_an_interrupt_leaves_the_collector_of_garbage_on(monkeypatch: pytest.Mon
 
 
 def test_the_first_bad_curve_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DIGITISE, "CURVES", 4)
+    monkeypatch.setattr(DIGITISE, "MAX_BATCH_CURVES", 4)
     far = Segment((0, 0, 0), (3e9, 0, 0))
     curves = [*beziers(40), far, *beziers(9), far]
     with pytest.raises(CurveError, match=r"^curve 40: x = .* is too far out"):
@@ -201,7 +201,7 @@ def test_the_first_bad_curve_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_may_not_be_asked_from_several_threads_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DIGITISE, "CURVES", 4)
+    monkeypatch.setattr(DIGITISE, "MAX_BATCH_CURVES", 4)
     monkeypatch.setattr("voxdisplay.voxelization.plane_crossings.BLOCK", 50)
     asked: set[int] = set()
 
