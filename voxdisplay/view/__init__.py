@@ -1,7 +1,7 @@
-"""Pictures of what a display shows: files, terminal, browser.
+"""Rendering of a display's page: to files, notebooks, the terminal and the browser.
 
-All of it starts from a page, the array that a display's memory is, so that what was read back from
-a device is drawn like what a host means to send. It knows grids and pixel formats, and neither
-curves, scenes, packets nor ports. Nothing here is imported until a picture is asked for; all but
-`camera` and `voxels` needs the extra ``view``.
+Everything starts from a page, the array of a display's memory, so that a page that was read back
+from a device is drawn like one that a host is about to send. Knows grids and pixel formats; knows
+no curve, scene, packet or port. Nothing here is imported before a picture is asked for; all but
+`camera` and `lit_voxels` needs the extra ``view``.
 """

@@ -1,6 +1,6 @@
-"""Films: a display that turns once, as an animated GIF or as MP4.
+"""Turntable films of a page, written as animated GIF or MP4.
 
-A film has one exposure, and a GIF one palette, so that nothing flickers. Knows no file names.
+A film has one exposure, and a GIF one palette, so that nothing flickers. Knows no file suffixes.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from voxdisplay.view.picture import RenderOptions, auto_exposure, render_voxels
 from voxdisplay.view.pillow import Image
 from voxdisplay.view.stage import AXIS_COLORS
 
-# Pictures that the palette is made from, spread over the film, and how much a colour's frequency
-# counts in it: 0 not at all, 1 fully.
+# Number of pictures that the palette is made from, spread over the film; weight of a colour's
+# frequency in it: 0 none, 1 proportional.
 _PALETTE_SAMPLES, _FREQUENCY_EXPONENT = 4, 0.4
 
 
 class Turntable(Sequence[Image.Image]):
-    """The pictures of one whole turn, drawn as they are asked for.
+    """The pictures of one full turn, rendered when they are accessed.
 
     Parameters
     ----------
     lit : Lit
     grid : Grid
     options : Look
-        Its camera is where the turn begins.
+        Its camera is that of the first picture.
     count : int
-        Pictures.
+        Number of pictures.
     progress : callable, optional
-        Called with (number of a picture that was drawn, from 1; pictures in all).
+        Called with (pictures rendered, pictures in all).
 
     """
 
@@ -81,10 +81,10 @@ class Turntable(Sequence[Image.Image]):
 
 
 def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
-    """Write an animated GIF that repeats for ever.
+    """Write an animated GIF that repeats without end.
 
-    Its clock ticks a hundred times a second: the times of the pictures are rounded to that, and
-    the whole is as long as it should be.
+    GIF counts time in hundredths of a second: each picture's start is rounded to that, so that the
+    whole film has its length.
     """
     samples = {
         n: pictures[n]
@@ -105,17 +105,17 @@ def save_gif(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
         append_images=quantised,
         duration=[10 * (after - at) for at, after in itertools.pairwise(ticks)],
         loop=0,
-        palette=bytes(palette.getpalette() or b""),  # said twice, or each picture has a copy
-        optimize=False,  # it would give pictures palettes of their own
+        palette=bytes(palette.getpalette() or b""),  # or else each picture has a copy
+        optimize=False,  # True gives pictures palettes of their own
         disposal=1,
     )
 
 
 def _palette(samples: Sequence[Image.Image]) -> Image.Image:
-    """Find 256 colours for all pictures of which these are some.
+    """Return an image with a palette of 256 colours for all pictures, found from some of them.
 
-    A colour that is rare counts nearly as much as one that is common: the ground is most of a
-    picture, and least of what one looks at.
+    Rare colours count nearly as much as common ones: the background is most of a picture, and
+    least of what matters.
     """
     colors = np.concatenate([np.asarray(one)[::3, ::3].reshape(-1, 3) for one in samples])
     red, green, blue = (colors >> 1).astype(np.int32).T
@@ -126,7 +126,7 @@ def _palette(samples: Sequence[Image.Image]) -> Image.Image:
     )
     rgb = np.stack([repeated >> 14, repeated >> 7 & 127, repeated & 127], axis=1).astype(np.uint8)
     rgb <<= 1
-    count = 256 - len(AXIS_COLORS)  # thin lines, which an average would lose
+    count = 256 - len(AXIS_COLORS)  # thin lines, which averaging would lose
     found = Image.fromarray(rgb[None]).quantize(count, method=Image.Quantize.MEDIANCUT)
     palette = Image.new("P", (1, 1))
     palette.putpalette([*(found.getpalette() or [])[: 3 * count], *np.ravel(AXIS_COLORS).tolist()])
@@ -144,7 +144,7 @@ def save_mp4(path: Path, pictures: Sequence[Image.Image], fps: float) -> None:
         If the encoder fails.
 
     """
-    width, height = (side & ~1 for side in pictures[0].size)  # colour has half the resolution
+    width, height = (side & ~1 for side in pictures[0].size)  # chroma has half the resolution
     frames = (picture.crop((0, 0, width, height)) for picture in pictures)
     try:
         import av  # noqa: F401, PLC0415 - an extra, and 120 MB
@@ -164,7 +164,7 @@ def _encode_by_pyav(
 ) -> None:
     import av  # noqa: PLC0415
 
-    picture_of_av: Any = av.VideoFrame  # of which PyAV gives no types
+    picture_of_av: Any = av.VideoFrame  # PyAV has no types for it
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
@@ -189,7 +189,9 @@ def _encode_by_ffmpeg(
                 encoder.stdin.write(picture.tobytes())
             encoder.stdin.close()
         except BrokenPipeError:
-            pass  # it says why below
-        said = printable_lines(encoder.stderr.read().decode(errors="replace").strip())
+            pass  # its message follows
+        message = printable_lines(encoder.stderr.read().decode(errors="replace").strip())
     if encoder.returncode:
-        raise OSError(0, f"ffmpeg failed: {said.splitlines()[-1][:200] if said else ''}", str(path))
+        raise OSError(
+            0, f"ffmpeg failed: {message.splitlines()[-1][:200] if message else ''}", str(path)
+        )

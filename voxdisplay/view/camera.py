@@ -1,7 +1,7 @@
-"""Where the eye is: the one definition of how a voxel comes to lie on the screen.
+"""Perspective camera: the one definition of where a voxel lies in a picture.
 
-The page in a browser repeats `Camera.project` word for word; a test holds the two together. Knows
-no picture and no voxel's colour.
+The page for browsers implements `Camera.project` a second time; a test compares the two. Knows no
+picture and no colour.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-# From here no corner of a grid, at most sqrt(3)/2 from its centre, can come behind the eye.
+# At this distance no corner of a grid, at most sqrt(3)/2 from its centre, is behind the camera.
 NEAREST = 1.0
 FARTHEST = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """An eye that looks at the grid's centre, z up.
+    """A camera that looks at the grid's centre, z up.
 
     Attributes
     ----------
     yaw, pitch : float
-        Radians. At yaw 0 and pitch 0 the eye is in front: x grows to the right, z up, and y away
-        from it. A greater yaw turns the grid clockwise as seen from above; a greater pitch lifts
-        the eye, and at pi/2 it looks straight down.
+        Radians. At yaw 0 and pitch 0 the camera is in front: x grows to the right, z up, and y
+        away from it. A greater yaw turns the grid clockwise as seen from above; a greater pitch
+        raises the camera, and at pi/2 it looks straight down.
     distance : float
-        From the eye to the grid's centre, in longest sides of the grid; 1 to 10.
+        From the camera to the grid's centre, in longest sides of the grid; 1 to 10.
     fov : float
-        The angle that the picture's shorter side spans, in radians.
+        Field of view across the picture's shorter side, in radians.
 
     """
 
@@ -43,7 +43,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, (self.yaw, self.pitch, self.distance, self.fov))):
-            raise ValueError("a camera is made of finite numbers")
+            raise ValueError("the numbers of a camera must be finite")
         if not NEAREST <= self.distance <= FARTHEST:
             raise ValueError(f"the distance {self.distance} is not {NEAREST:g} to {FARTHEST:g}")
         if not 0 < self.fov < math.pi:
@@ -53,7 +53,7 @@ class Camera:
     def project(
         self, points: ArrayLike, grid: tuple[int, int, int], size: tuple[int, int]
     ) -> tuple[Floats, Floats, Floats]:
-        """Find where points lie in the picture.
+        """Return where points lie in the picture.
 
         With ``(nx, ny, nz)`` the grid, ``L = max(nx, ny, nz)``, ``(W, H)`` the picture::
 
@@ -79,12 +79,12 @@ class Camera:
             Right and down from the picture's upper left corner; pixel (i, j) is
             [i, i+1) x [j, j+1).
         scale : (n,) float64 array
-            How many pixels wide a voxel is there: the greater, the nearer.
+            Width of a voxel there, in pixels: the greater, the nearer.
 
         """
         width, height = size
         longest = max(grid)
-        # By columns, and not as a product of matrices: half the time, and no threads.
+        # By columns, not as a matrix product: half the time, and no threads.
         x, y, z = (
             (column - side / 2) / longest
             for column, side in zip(np.asarray(points, dtype=np.float64).T, grid, strict=True)
@@ -97,10 +97,10 @@ class Camera:
         return width / 2 + k * right, height / 2 - k * up, k / longest
 
     def turned(self, yaw: float, pitch: float = 0.0) -> Camera:
-        """Give the camera turned by some radians; the pitch stays between the poles."""
+        """Return the camera turned by angles in radians; the pitch is limited to +-pi/2."""
         pitch = min(max(self.pitch + pitch, -math.pi / 2), math.pi / 2)
         return replace(self, yaw=math.remainder(self.yaw + yaw, 2 * math.pi), pitch=pitch)
 
     def zoomed(self, factor: float) -> Camera:
-        """Give the camera nearer, by a factor above 1, or farther, as near and far as it may."""
+        """Return the camera nearer by a factor, or farther below 1; the distance is limited."""
         return replace(self, distance=min(max(self.distance / factor, NEAREST), FARTHEST))

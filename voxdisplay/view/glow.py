@@ -1,7 +1,7 @@
-"""The light that lit voxels send to the eye, added up as a volumetric display adds it.
+"""Additive splatting of lit voxels: the light that reaches the camera, as a display emits it.
 
-Nothing hides anything: there is no depth buffer, and no order. Gives linear light without bounds;
-how that is exposed on a picture is not known here.
+Voxels do not hide each other: there is no depth buffer, and no order. The result is linear light
+without an upper bound; exposure is the business of `picture`.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from voxdisplay.view.pillow import Image
 
 Light = NDArray[np.float32]
 
-# Voxels added at once: bounds the memory that a dense volume takes.
+# Voxels splatted at once: bounds the memory that a dense volume takes.
 _CHUNK_VOXELS = 1 << 19
-# Blobs wider than this, as a standard deviation in pixels, are drawn on a coarser raster, so wide
-# there at least, and enlarged: as smooth, and much faster.
+# Splats of a greater standard deviation, in pixels, are drawn on a coarser raster, where they have
+# at least this one, and are upsampled: as smooth, and much faster.
 _COARSE_SIGMA_PX = 1.5
-# On a coarser raster, voxels whose sizes differ by less are blobs of one size.
+# On a coarser raster, voxels whose sizes differ by less than this factor have one splat size.
 _SIZE_CLASS_RATIO = 1.1
-# What bilinear weights alone blur a point by: its variance, in square pixels.
+# Variance of a point splatted by bilinear weights alone, in square pixels.
 _BILINEAR_VARIANCE = 1 / 6
-# A pass of the blur adds so much variance at most. Small steps make rounder spots, which is seen,
-# and is cheap, where they are enlarged.
+# Most variance that one pass of the blur adds. Smaller steps make rounder spots; on a coarser
+# raster that is visible, and cheap.
 _MAX_STEP_VARIANCE, _COARSE_STEP_VARIANCE = 0.5, 0.15
 
 _LINEAR = (np.arange(256) / 255) ** 2.2
 
 
 class LightRegion(NamedTuple):
-    """Light on a part of the picture; all else is dark.
+    """Light of a rectangle of the picture; the rest is dark.
 
     Attributes
     ----------
     light : (3, h, w) float32 array
-        Planes of linear red, green and blue: 1 is about the middle of one full voxel.
+        Planes of linear red, green and blue; 1 is about the centre of one voxel of full colour.
     left, top : int
-        Where its first pixel lies in the picture.
+        Position of its first pixel in the picture.
 
     """
 
@@ -57,9 +57,9 @@ class LightRegion(NamedTuple):
 def accumulate_light(
     lit: LitVoxels, grid: Grid, camera: Camera, size: tuple[int, int]
 ) -> LightRegion:
-    """Add up the light of lit voxels.
+    """Return the sum of the light of lit voxels.
 
-    Each is a soft round spot, as wide as the voxel at its distance; nearer ones are brighter.
+    Each is a Gaussian spot as wide as the voxel at its distance; nearer ones are brighter.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def accumulate_light(
         x, y = x / factor - box.left, y / factor - box.top
         near = scale / middle_px
         light = _LINEAR.take(lit.colors[part].T) * (near * near)
-        # Blobs of a pixel or two cannot differ much in size; on a coarse grid they show distance.
+        # Spots of a pixel or two differ little in size; on a coarser raster size shows distance.
         band = (
             np.rint(np.log(near) / math.log(_SIZE_CLASS_RATIO)).astype(np.int64)
             if factor > 1
@@ -101,7 +101,7 @@ def accumulate_light(
     for number, raster in rasters.items():
         spread_px = _splat_sigma_px(middle_px * _SIZE_CLASS_RATIO**number) / factor
         variance = max(0.0, spread_px**2 - _BILINEAR_VARIANCE)
-        # A voxel's light has spread over so many pixels, and is to be 1 in its middle.
+        # Normalised to 1 in the centre of a voxel's spot.
         total += blur(raster, variance, step) * np.float32(
             2 * math.pi * (variance + _BILINEAR_VARIANCE)
         )
@@ -113,7 +113,7 @@ def accumulate_light(
 
 
 class _Region(NamedTuple):
-    """A part of a raster."""
+    """A rectangle of a raster, in pixels."""
 
     left: int
     top: int
@@ -124,7 +124,7 @@ class _Region(NamedTuple):
 def _lit_region(
     lit: LitVoxels, grid: Grid, camera: Camera, size: tuple[int, int], factor: int
 ) -> _Region:
-    """Find the part of the raster that can have light: where the lit voxels' own box is seen."""
+    """Return the rectangle that light can reach: the projected bounding box, with a margin."""
     if len(lit.positions) == 0:
         return _Region(0, 0, 0, 0)
     ends = [(column.min() + 0.5, column.max() + 0.5) for column in lit.positions.T]
@@ -143,12 +143,12 @@ def _lit_region(
 
 
 def _splat_sigma_px(voxel_px: float) -> float:
-    """Give a spot's standard deviation: neighbours melt into a line, unless they are large."""
+    """Return a spot's standard deviation: small neighbours merge into a line, large ones do not."""
     return voxel_px * (0.19 + 0.26 / (1 + (voxel_px / 6) ** 2))
 
 
 def _splat(raster: Light, x: Floats, y: Floats, light: Floats) -> None:
-    """Add points to the four pixels around each; leave out what is outside."""
+    """Add points to the four pixels around each by bilinear weights; skip those outside."""
     height, width = raster.shape[1:]
     left, top = np.floor(x - 0.5), np.floor(y - 0.5)
     inside = (left >= 0) & (left < width - 1) & (top >= 0) & (top < height - 1)
@@ -165,15 +165,15 @@ def _splat(raster: Light, x: Floats, y: Floats, light: Floats) -> None:
 
 
 def blur(light: Light, variance: float, step: float) -> Light:
-    """Blur planes by a variance, in square pixels, in passes of at most a step; 2/3 at most."""
+    """Blur planes by a variance in square pixels, in passes of at most `step` (up to 2/3)."""
     passes = math.ceil(variance / step)
     share = np.float32(variance / max(1, passes) / 2)
     light = light.copy()
     given = np.empty_like(light[0])
-    for plane in light:  # one by one: it stays in the processor's cache
+    for plane in light:  # one by one: each stays in the processor's cache
         for _ in range(passes):
             for here, there in ((plane, given), (plane.T, given.T)):
-                # Each pixel gives its two neighbours a share: a variance of two shares.
+                # Each pixel passes a share to both neighbours, which adds a variance of two shares.
                 np.multiply(plane, share, out=given)
                 plane *= 1 - 2 * share  # noqa: PLW2901 - in place
                 here[:, 1:] += there[:, :-1]
@@ -182,7 +182,7 @@ def blur(light: Light, variance: float, step: float) -> Light:
 
 
 def _upsampled(light: Light, box: _Region, factor: int, size: tuple[int, int]) -> LightRegion:
-    """Bring light from a coarser raster onto the picture's."""
+    """Upsample light from a coarser raster to the picture's."""
     wide, high = box.width * factor, box.height * factor
     planes = [
         np.asarray(Image.fromarray(plane).resize((wide, high), Image.Resampling.BICUBIC))

@@ -1,6 +1,6 @@
-"""A picture made of text: two pixels a character, the upper half block and its ground.
+"""Rendering as text: two pixels a character, by the upper half block and its background.
 
-Gives text; who writes it to what terminal is not known here.
+Returns strings; knows no terminal.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from voxdisplay.view.stage import AXIS_COLORS, axis_tips
 
 RESET = "\x1b[0m"
 _UPPER_HALF = "\N{UPPER HALF BLOCK}"
-# Drawn so much finer and reduced: thin lines keep their brightness, and edges are soft.
+# Rendered larger by this factor and reduced: thin lines keep their brightness.
 _SUPERSAMPLING = 2
-# Nearer than on a screen: there is no room to give away.
+# Nearer than for a window: the raster is small.
 CAMERA = Camera(distance=2.2)
 
 # The 6x6x6 colours and 24 greys that a terminal of 256 colours has from number 16 on.
@@ -32,7 +32,7 @@ _XTERM = np.concatenate((_CUBE, np.arange(8, 248, 10)[:, None].repeat(3, axis=1)
 
 
 def has_true_color(environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell whether the terminal says that it has all colours, and not only 256."""
+    """Return whether the terminal announces 24-bit colours, not only 256."""
     return environment.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
 
 
@@ -45,7 +45,7 @@ def half_blocks(
     camera: Camera = CAMERA,
     full: bool = True,
 ) -> list[str]:
-    """Draw lit voxels as lines of text.
+    """Render lit voxels as lines of text.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ def half_blocks(
         Characters.
     camera : Camera
     full : bool
-        Use all colours, 24 bit; else the 256 that nearly every terminal has.
+        Use 24-bit colours; else the 256 that nearly every terminal has.
 
     Returns
     -------
     list of str
-        ``rows`` lines without line ends, each of which resets the colours at its end.
+        ``rows`` lines without line ends; each ends with a reset of the colours.
 
     """
     size = columns * _SUPERSAMPLING, 2 * rows * _SUPERSAMPLING
@@ -75,7 +75,7 @@ def half_blocks(
 
 
 def _axis_name_cells(grid: Grid, options: RenderOptions) -> dict[int, dict[int, int]]:
-    """Find where the axes' names stand: row -> column -> axis. A cell beyond each tip."""
+    """Return the cells of the axes' names, just beyond each tip: row -> column -> axis."""
     x, y, _ = options.camera.project(np.vstack((np.zeros(3), axis_tips(grid))), grid, options.size)
     columns, rows = options.size[0], options.size[1] // 2
     found: dict[int, dict[int, int]] = {}
@@ -89,7 +89,7 @@ def _axis_name_cells(grid: Grid, options: RenderOptions) -> dict[int, dict[int, 
 
 
 def _color_codes(pixels: NDArray[np.uint8], *, full: bool) -> list[list[str]]:
-    """Give each pixel's colour as terminals write it, after 38; or 48;."""
+    """Return the parameters of each pixel's colour for SGR, to follow ``38;`` or ``48;``."""
     if full:
         return [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
     flat, index = np.unique(pixels.reshape(-1, 3), axis=0, return_inverse=True)

@@ -1,7 +1,7 @@
-"""Pictures as a page for a browser that needs no server: it opens from a file, turns and plays.
+"""Export of pages to one HTML file that needs no server: it can be turned and played.
 
-It is the page of the live view with the frames inside; see `voxdisplay.view.live.message` for
-what a frame is. Nothing in it comes from elsewhere, and it may ask for nothing.
+It is the page of the live view with embedded frames, each a message of
+`voxdisplay.view.live.message`. It loads nothing from elsewhere, and its policy forbids that.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ def save_html(
     path: Path | str,
     pages: Sequence[NDArray[np.integer]],
     grid: Grid,
-    format: PixelFormat,  # noqa: A002 - the word of the command line
+    format: PixelFormat,  # noqa: A002 - as the option --format
     *,
     title: str = "voxdisplay",
     fps: float = 20.0,
     palette: Colors | None = None,
 ) -> None:
-    """Write pages as one HTML file, that takes the place of another only when it is whole.
+    """Write pages as one HTML file, which replaces another only when it is complete.
 
     Parameters
     ----------
     path : Path or str
     pages : sequence of ndarray
-        As `Display.read` and `Frame.array` give them, indexed [z, y, x]; one at least.
+        As from `Display.read` or `Frame.array`, indexed [z, y, x]; at least one.
     grid : Grid
     format : PixelFormat
     title : str
     fps : float
-        Pages a second, 0.1 to 120.
+        Pages per second, 0.1 to 120.
     palette : (256, 3) uint8 array, optional
         Of index8 pages; by default the default one.
 
@@ -65,9 +65,9 @@ def save_html(
 
     """
     if not len(pages):
-        raise ValueError("there is no page to write")
+        raise ValueError("pages is empty: there is nothing to write")
     if not (math.isfinite(fps) and 0.1 <= fps <= 120):
-        raise ValueError(f"{fps} pages a second: take 0.1 to 120")
+        raise ValueError(f"{fps} pages per second: the rate must be 0.1 to 120")
     grid = Grid(*grid)
     frames = [
         Snapshot(np.asarray(one), grid, format, number, title, palette=palette)

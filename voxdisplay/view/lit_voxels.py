@@ -1,6 +1,6 @@
-"""From a page, the array that a display's memory is, to its lit voxels and their colours.
+"""Extraction of lit voxels and their colours from a page.
 
-Knows grids and pixel formats; nothing of pictures.
+Knows grids and pixel formats; knows no picture.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 
-_BLOCK_PIXELS = 8  # pixels of 1, 2 or 3 bytes, which make whole words
-_DENSE_RATIO = 8  # where more than one in so many has something, it does not pay to look twice
+_BLOCK_PIXELS = 8  # of 1, 2 or 3 bytes each: they make whole 64-bit words
+_DENSE_RATIO = 8  # with more than one nonzero word in so many, one pass is faster than two
 
 
 class LitVoxels(NamedTuple):
@@ -37,15 +37,15 @@ class LitVoxels(NamedTuple):
 def lit_voxels(
     page: NDArray[np.integer],
     grid: Grid,
-    format: PixelFormat,  # noqa: A002 - the word of the command line
+    format: PixelFormat,  # noqa: A002 - as the option --format
     palette: Colors | None = None,
 ) -> LitVoxels:
-    """List what is lit.
+    """Return the lit voxels of a page.
 
     Parameters
     ----------
     page : ndarray
-        What `Display.read` and `Frame.array` give, indexed [z, y, x].
+        As from `Display.read` or `Frame.array`, indexed [z, y, x].
     grid : Grid
     format : PixelFormat
     palette : (256, 3) uint8 array, optional
@@ -81,10 +81,10 @@ def lit_voxels(
 
 
 def _nonzero_pixels(flat: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.integer]]:
-    """Find pixels that are not 0, and give where they are and what.
+    """Return the indices and values of the pixels that are not 0.
 
-    Most of a volume is dark: looks at words first, eight bytes of eight pixels,
-    and at the pixels only of those that are not 0.
+    Most of a volume is dark: blocks of eight pixels are tested as 64-bit words first, and single
+    pixels only in blocks that are not 0.
     """
     whole = len(flat) // _BLOCK_PIXELS
     eights = flat[: whole * _BLOCK_PIXELS].reshape(whole, _BLOCK_PIXELS, *flat.shape[1:])
@@ -93,9 +93,11 @@ def _nonzero_pixels(flat: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArr
     if np.count_nonzero(something) > len(words) // _DENSE_RATIO:
         index = np.flatnonzero(_is_nonzero(flat))
         return index, flat[index]
-    found = np.flatnonzero(something) // flat[:1].nbytes  # a pixel's bytes are an eight's words
+    found = (
+        np.flatnonzero(something) // flat[:1].nbytes
+    )  # a pixel has as many bytes as a block words
     busy = found[np.diff(found, prepend=-1) != 0]
-    # What fills no eight is looked at in any case.
+    # Pixels after the last whole block are tested in any case.
     pixels = np.concatenate(
         (eights[busy].reshape(-1, *flat.shape[1:]), flat[whole * _BLOCK_PIXELS :])
     )
@@ -106,7 +108,7 @@ def _nonzero_pixels(flat: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArr
 
 
 def _is_nonzero(pixels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Tell which pixels are not 0. A comparison last: numpy finds True fastest."""
+    """Return the mask of pixels that are not 0, as bool: `flatnonzero` is fastest on that."""
     if pixels.ndim > 1:
         red, green, blue = pixels.T
         pixels = red | green | blue

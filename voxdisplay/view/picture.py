@@ -1,4 +1,4 @@
-"""A page as a picture: light on a stage, exposed like a photograph of the display.
+"""Rendering of a page as a picture: light over a background, with exposure and bloom.
 
 Used for files, notebooks, films and terminals. Knows no device and no scene.
 """
@@ -21,20 +21,20 @@ from voxdisplay.view.stage import BACKGROUND, draw_stage
 
 SIZE = (800, 600)
 
-# The halo is made on a raster this much coarser.
+# The bloom is made on a raster coarser by this factor.
 _BLOOM_SCALE = 8
-# Its blurs: variance in square pixels of that raster, and share.
+# Its blurs: variance in square pixels of that raster, and weight.
 _BLOOM_BLURS = ((0.8, 0.6), (12.0, 0.8))
 _BLOOM_STEP_VARIANCE = 0.6
-# How white the brightest light becomes.
+# Share of white in the brightest light.
 _HIGHLIGHT_WHITENESS = 0.35
-# It is amplified to this brightness of 255 at most, and by no more than this.
+# The bloom is amplified to this brightness of 255, and by no more than this factor.
 _BLOOM_PEAK, _BLOOM_MAX_GAIN = 72.0, 3.0
 _SMOOTH = Image.Resampling.BICUBIC
-# How bright the light is, as a share of full, that this share of the lit pixels does not exceed.
+# Exposure: this quantile of the lit pixels is shown at this share of full brightness.
 _METER_QUANTILE, _METER_TARGET = 0.92, 0.8
 
-# Of so many pixels at most.
+# Pixels that are metered, at most.
 _METER_PIXELS = 1 << 15
 _SRGB_STEPS = 4096
 _SRGB_TABLE = np.rint(255 * (np.arange(_SRGB_STEPS) / (_SRGB_STEPS - 1)) ** (1 / 2.2)).astype(
@@ -44,7 +44,7 @@ _SRGB_TABLE = np.rint(255 * (np.arange(_SRGB_STEPS) / (_SRGB_STEPS - 1)) ** (1 /
 
 @dataclass(frozen=True, slots=True)
 class RenderOptions:
-    """How a picture is taken.
+    """Options of a picture.
 
     Attributes
     ----------
@@ -52,8 +52,8 @@ class RenderOptions:
         In pixels.
     camera : Camera
     glow, axes, labels : bool
-        Whether bright voxels have a halo; whether the grid's box and axes are drawn; whether the
-        axes have their names and lengths.
+        Whether there is bloom; whether the grid's box and axes are drawn; whether the axes have
+        their names and lengths.
 
     """
 
@@ -64,7 +64,7 @@ class RenderOptions:
     labels: bool = True
 
     def with_view(self, angle: tuple[float, float] | None, zoom: float = 1.0) -> RenderOptions:
-        """Give the options from a yaw and a pitch, in radians, and nearer by a factor."""
+        """Return the options with another yaw and a pitch, in radians, and nearer by a factor."""
         yaw, pitch = angle or (self.camera.yaw, self.camera.pitch)
         return replace(self, camera=replace(self.camera, yaw=yaw, pitch=pitch).zoomed(zoom))
 
@@ -72,16 +72,16 @@ class RenderOptions:
 def render_page(
     page: NDArray[np.integer],
     grid: Grid,
-    format: PixelFormat,  # noqa: A002 - the word of the command line
+    format: PixelFormat,  # noqa: A002 - as the option --format
     options: RenderOptions = RenderOptions(),
     palette: Colors | None = None,
 ) -> Image.Image:
-    """Draw a page.
+    """Render a page.
 
     Parameters
     ----------
     page : ndarray
-        What `Display.read` and `Frame.array` give, indexed [z, y, x].
+        As from `Display.read` or `Frame.array`, indexed [z, y, x].
     grid : Grid
     format : PixelFormat
     options : Look
@@ -101,7 +101,7 @@ def render_page(
 def render_voxels(
     lit: LitVoxels, grid: Grid, options: RenderOptions, exposure: float | None = None
 ) -> Image.Image:
-    """Draw lit voxels.
+    """Render lit voxels.
 
     Parameters
     ----------
@@ -109,8 +109,7 @@ def render_voxels(
     grid : Grid
     options : Look
     exposure : float, optional
-        What light is multiplied by; by default as much as shows it best. A film has one for all
-        its pictures, by `meter`.
+        Factor on the light; by default that of `auto_exposure`. A film has one for all pictures.
 
     """
     image = _background(grid, options)
@@ -128,7 +127,7 @@ def render_voxels(
 
 
 def _screen_blended(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:
-    """Shine light on a part of an image, and give the image."""
+    """Blend light onto a part of an image by the screen mode; return the image."""
     box = left, top, left + light.width, top + light.height
     image.paste(ImageChops.screen(image.crop(box), light), box)
     return image
@@ -136,7 +135,7 @@ def _screen_blended(image: Image.Image, light: Image.Image, left: int, top: int)
 
 @np.errstate(under="ignore")
 def auto_exposure(light: Light) -> float:
-    """Find the exposure that shows light best: most of what is lit clearly, little of it burnt."""
+    """Return the exposure that shows most of the light clearly and little of it saturated."""
     apart = max(1, round((light[0].size / _METER_PIXELS) ** 0.5))
     most = light[:, ::apart, ::apart].max(axis=0)
     most = most[most > most.max(initial=0.0) / 50]
@@ -153,7 +152,7 @@ def _background(grid: Grid, options: RenderOptions) -> Image.Image:
 
 @np.errstate(all="ignore")  # light that underflows is dark
 def _tone_mapped(light: Light) -> Light:
-    """Bring light of any strength below 1, keeping its hue; the brightest turns towards white."""
+    """Map light of any strength below 1, keeping its hue; the brightest turns towards white."""
     most = light.max(axis=0)
     toned = 1 - np.exp(-most)
     white = toned * toned * toned
@@ -163,16 +162,13 @@ def _tone_mapped(light: Light) -> Light:
 
 
 def _to_srgb(light: Light) -> Image.Image:
-    """Encode linear light of 0 to 1."""
+    """Encode linear light of 0 to 1 as sRGB."""
     steps = (light * np.float32(_SRGB_STEPS - 1)).astype(np.uint16)
     return Image.merge("RGB", [Image.fromarray(plane) for plane in _SRGB_TABLE.take(steps)])
 
 
 def _bloom(sharp: Image.Image) -> tuple[Image.Image, int, int]:
-    """Give the light that scatters around what is bright: a narrow and a wide blur of it.
-
-    And where it lies in the picture, left and top; it is dark around it.
-    """
+    """Return the bloom, a narrow and a wide blur of the picture, and its left and top there."""
     coarse = np.asarray(sharp.reduce(_BLOOM_SCALE), dtype=np.float32).transpose(2, 0, 1)
     scattered = np.zeros_like(coarse)
     for variance, share in _BLOOM_BLURS:
@@ -181,7 +177,7 @@ def _bloom(sharp: Image.Image) -> tuple[Image.Image, int, int]:
     planes = np.rint(scattered * gain).astype(np.uint8)
     small = Image.merge("RGB", [Image.fromarray(plane) for plane in planes])
     left, top, right, bottom = small.getbbox() or (0, 0, 1, 1)
-    # What is enlarged reaches two pixels farther.
+    # Resampling reaches two pixels farther.
     box = (
         max(0, left - 2),
         max(0, top - 2),
@@ -191,6 +187,6 @@ def _bloom(sharp: Image.Image) -> tuple[Image.Image, int, int]:
     size = (box[2] - box[0]) * _BLOOM_SCALE, (box[3] - box[1]) * _BLOOM_SCALE
     left, top = box[0] * _BLOOM_SCALE, box[1] * _BLOOM_SCALE
     large = small.resize(size, _SMOOTH, box)
-    # The last coarse pixels may stand over the picture's edge.
+    # The last coarse pixels may reach beyond the picture's edge.
     inside = min(large.width, sharp.width - left), min(large.height, sharp.height - top)
     return large.crop((0, 0, *inside)), left, top

@@ -1,4 +1,4 @@
-"""Pillow, which pictures are drawn with, or a word on how to get it."""
+"""Import of Pillow, with an error that says how to install it."""
 
 from voxdisplay.errors import MissingExtra
 

@@ -1,6 +1,6 @@
-"""A page into a file: a picture, a film, or a page for a browser, by the file's suffix.
+"""Writing a page to a file: picture, film or HTML, by the file's suffix.
 
-Files are replaced whole or not at all. Knows what formats there are, not how they are made.
+Files are replaced atomically. Knows which formats there are, not how they are encoded.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class ExportJob:
-    """A page and how it is to be taken.
+    """A page and the options of its export.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class ExportJob:
     options : Look
     title : str
     seconds, fps : float
-        Of a film: how long one turn takes, and pictures a second.
+        Of a film: duration of one turn, and pictures per second.
     palette : (256, 3) uint8 array or None
         Of an index8 page; None for the default one.
 
@@ -52,28 +52,28 @@ class ExportJob:
     palette: Colors | None = None
 
     def turntable(self, progress: Progress | None) -> Turntable:
-        """Give the pictures of one turn."""
+        """Return the pictures of one turn."""
         lit = lit_voxels(self.page, self.grid, self.format, self.palette)
         count = max(1, round(self.seconds * self.fps))
         return Turntable(lit, self.grid, self.options, count, progress)
 
 
 def save(path: Path, shot: ExportJob, progress: Progress | None = None) -> None:
-    """Write a file of the kind that its suffix names; one of `WRITERS`.
+    """Write a file of the kind that its suffix names, one of `WRITERS`.
 
     Parameters
     ----------
     path : Path
     shot : Shot
     progress : callable, optional
-        Called with (pictures drawn, pictures in all) of a film.
+        Called with (pictures rendered, pictures in all) of a film.
 
     Raises
     ------
     OSError
         If it cannot be written.
     MissingExtra
-        If a library is missing for it.
+        If an optional library for it is not installed.
 
     """
     writer = WRITERS[path.suffix.lower()]

@@ -1,7 +1,7 @@
-"""The stage on which the voxels float: a dark ground, the grid's box, its floor and its axes.
+"""Background of a picture: the grid's bounding box, floor lines and axes on dark ground.
 
-x is red, y green, z blue, as everywhere; each axis starts at voxel (0, 0, 0) and points where its
-coordinate grows. Knows no voxel.
+x is red, y green, z blue; each axis starts at voxel (0, 0, 0) and points to where its coordinate
+grows. Knows no voxel.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ AXIS_COLORS: tuple[Rgb, Rgb, Rgb] = ((255, 84, 84), (72, 214, 112), (92, 148, 25
 _EDGE: Rgb = (92, 104, 128)
 _FLOOR: Rgb = (60, 70, 92)
 _TEXT: Rgb = (150, 160, 180)
-# How far an axis reaches beyond the box, in longest sides: a flat grid's axes stay apart.
+# Length of an axis beyond the box, in longest sides: a flat grid's axes stay apart.
 _AXIS_OVERHANG = 0.075
-# The floor has at most so many cells along the longest side.
+# Floor cells along the longest side, at most.
 _MAX_FLOOR_CELLS = 8
-# Lines are drawn on a raster this much finer, and reduced: Pillow draws hard edges.
+# Lines are drawn larger by this factor and reduced: Pillow does not antialias.
 _SUPERSAMPLING = 3
-# A line fades with its distance in so many steps.
+# Segments of a line, each of one brightness by its distance.
 _FADE_STEPS = 12
 
 
 @functools.lru_cache(maxsize=2)
 def draw_stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
-    """Draw the stage. Do not draw on it: it is kept for the next picture."""
+    """Return the background. It is cached: do not draw on it."""
     pen = _Pen(grid, camera, size)
     pen.lines(_floor_lines(grid), _FLOOR, 0.9)
     pen.lines(_box_edges(grid), _EDGE, 1.0)
@@ -49,12 +49,12 @@ def draw_stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: boo
 
 
 def axis_tips(grid: Grid) -> Floats:
-    """Give the points where the three axes end: rows x, y, z."""
+    """Return the end points of the three axes, (3, 3): rows x, y, z."""
     return np.diag(np.array(grid) + _AXIS_OVERHANG * max(grid))
 
 
 def _box_edges(grid: Grid) -> list[tuple[Floats, Floats]]:
-    """Give the nine edges of the box that are no axes."""
+    """Return the nine edges of the box that are no axes."""
     corners = [np.array(corner) * grid for corner in itertools.product((0.0, 1.0), repeat=3)]
     return [
         (one, other)
@@ -64,7 +64,7 @@ def _box_edges(grid: Grid) -> list[tuple[Floats, Floats]]:
 
 
 def _floor_lines(grid: Grid) -> list[tuple[Floats, Floats]]:
-    """Give lines on the floor, z = 0, a power of two voxels apart."""
+    """Return lines on the floor, z = 0, a power of two voxels apart."""
     nx, ny, _ = grid
     step = 1
     while max(grid) > _MAX_FLOOR_CELLS * step:
@@ -75,13 +75,13 @@ def _floor_lines(grid: Grid) -> list[tuple[Floats, Floats]]:
 
 
 class _Pen:
-    """Draws lines between points of voxel space, fainter the farther away."""
+    """Draws lines between points of voxel space, fainter with distance."""
 
     def __init__(self, grid: Grid, camera: Camera, size: tuple[int, int]) -> None:
         self._grid, self._camera, self._size = grid, camera, size
         self._unit = _SUPERSAMPLING * max(1.0, min(size) / 600)
         self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
-        # Only as much of the picture as there are lines on, and the heads of arrows.
+        # Only the part of the picture that has lines and arrow heads.
         ends = np.vstack((axis_tips(grid), list(itertools.product(*((0, side) for side in grid)))))
         places = np.stack(camera.project(ends, grid, size)[:2])
         room = 3 + 3 * self._unit / _SUPERSAMPLING
@@ -97,7 +97,7 @@ class _Pen:
         return (np.stack((x, y), axis=1) - self.corner) * _SUPERSAMPLING, scale / self._middle
 
     def lines(self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float) -> None:
-        """Draw lines whose brightness shows their distance, in a few pieces each."""
+        """Draw lines in segments whose brightness shows their distance."""
         if not ends:
             return
         starts, stops = np.array(ends).swapaxes(0, 1)[:, :, None]
@@ -122,7 +122,7 @@ class _Pen:
         along = points[1] - points[0]
         length = float(np.hypot(*along))
         if length < thick:
-            return  # it points at the eye
+            return  # it points at the camera
         along /= length
         across = np.array([-along[1], along[0]])
         neck = points[1] - along * 5.5 * thick
@@ -132,7 +132,7 @@ class _Pen:
 
 
 def _draw_labels(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None:
-    """Write at each axis its name and how many voxels it has."""
+    """Write the name and length of each axis at its tip."""
     draw = ImageDraw.Draw(image)
     height = max(9.0, min(image.size) / 40)
     font = ImageFont.load_default(height)
@@ -144,7 +144,7 @@ def _draw_labels(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -
         left, top, right, bottom = draw.textbbox((0, 0), f"{name}{side}", font=font)
         right += height * 0.45
         box = np.array([right - left, bottom - top])
-        # The text's middle goes beyond the tip, as far as its box needs in that direction.
+        # The text's centre lies beyond the tip by what its box needs in that direction.
         middle = points[axis + 1] + along * (np.abs(along) @ box / 2 + 0.5 * height)
         corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
         draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis])

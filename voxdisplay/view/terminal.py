@@ -1,7 +1,7 @@
-"""A view in a terminal, that keys turn: for displays at the other end of ssh.
+"""Interactive view in a terminal, turned by keys; it works over ssh.
 
-Draws when something has changed, and leaves the terminal as it was, however it ends. Needs a Unix
-terminal. Where the pages come from is not known here.
+Redraws on changes only, and restores the terminal however it ends. Needs a Unix terminal. Knows no
+source of pages.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from voxdisplay.view.camera import Camera
 from voxdisplay.view.half_blocks import CAMERA, half_blocks, has_true_color
 from voxdisplay.view.lit_voxels import LitVoxels
 
-# Without a key, how soon a changed window size is seen, and how often a turning view is drawn.
+# Longest wait for a key: for a changed window size to be seen, and between steps of spinning.
 _IDLE_WAIT_S, _SPIN_WAIT_S = 0.25, 0.05
 _KEY_STEP, _SPIN_STEP, _KEY_ZOOM = 0.1, 0.03, 1.1
-# Re-reading takes a fifth of the time at most, and happens once a second at most.
+# Pages are read once a second at most, and reading takes a fifth of the time at most.
 _MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR = 1.0, 5.0
 
 # Takes descriptors above 1023, unlike select, and waits on /dev/tty, unlike epoll and kqueue.
@@ -34,7 +34,7 @@ _SELECTOR = getattr(selectors, "PollSelector", selectors.SelectSelector)
 
 _ENTER_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[2J"
 _LEAVE_SCREEN = "\x1b[0m\x1b[?25h\x1b[?1049l"
-# The terminal shows what comes between the two at once, if it knows them.
+# Synchronized update: terminals that know it show what is between the two at once.
 _BEGIN_UPDATE, _END_UPDATE = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
 _KEY = re.compile(rb"\x1b[\[O][A-D]|[^\x1b]")
 _CAMERA_KEYS: dict[bytes, Callable[[Camera], Camera]] = {
@@ -47,22 +47,22 @@ _CAMERA_KEYS: dict[bytes, Callable[[Camera], Camera]] = {
     b"0": lambda _: CAMERA,
 }
 _QUIT_KEYS = (b"q", b"\x03", b"\x04")
-_HELP = "arrows turn  + - zoom  space spins  0 as at first  q quits"
+_HELP = "arrows turn  + - zoom  space spins  0 resets  q quits"
 
 
 @dataclass
 class TerminalView:
-    """What is shown, and from where.
+    """State of the view: voxels, camera and keys.
 
     Attributes
     ----------
     grid : Grid
     title : str
-        The first words of the last line.
+        Shown first in the status line.
     read : callable
-        Gives the lit voxels.
+        Returns the lit voxels.
     changes : bool
-        Whether to read again from time to time.
+        True to read again from time to time.
 
     """
 
@@ -80,7 +80,7 @@ class TerminalView:
         self.read_page()
 
     def read_page(self) -> None:
-        """Read the voxels, and decide when to do it again."""
+        """Read the voxels, and schedule the next reading."""
         began_s = time.monotonic()
         self._lit = self.read()
         took_s = time.monotonic() - began_s
@@ -90,11 +90,11 @@ class TerminalView:
 
     @property
     def read_due(self) -> bool:
-        """Whether it is time to read again."""
+        """True if it is time to read again."""
         return self.changes and time.monotonic() >= self._next_read_s
 
     def handle_keys(self, keys: bytes) -> None:
-        """Do what keys say; what is no key of this view does nothing."""
+        """Apply the keys in some input; other bytes do nothing."""
         for found in _KEY.findall(keys):
             key = found[-1:] if len(found) > 1 else found.lower()
             if key in _CAMERA_KEYS:
@@ -105,7 +105,7 @@ class TerminalView:
                 self.done = True
 
     def lines(self, columns: int, rows: int, *, full: bool) -> list[str]:
-        """Draw it, with a line that says what it is and which keys there are."""
+        """Return the picture as lines of text, the last one a status line with the keys."""
         picture = half_blocks(
             self._lit, self.grid, columns, max(1, rows - 1), camera=self.camera, full=full
         )
@@ -114,18 +114,18 @@ class TerminalView:
 
 
 def run(view: TerminalView) -> None:
-    """Show a view until somebody quits.
+    """Show a view until the user quits.
 
     Raises
     ------
     ValueError
-        If there is no terminal, or it cannot show the characters.
+        If there is no terminal, or its encoding is not UTF-8.
     KeyboardInterrupt
-        On Ctrl-C and when the process is told to end; the terminal has been restored.
+        On Ctrl-C, SIGTERM and SIGHUP; the terminal has been restored.
 
     """
     if not sys.stdout.isatty():
-        raise ValueError("the standard output is no terminal")
+        raise ValueError("standard output is no terminal")
     if "utf" not in (sys.stdout.encoding or "").lower():
         raise ValueError(f"the terminal's encoding is {sys.stdout.encoding}, not UTF-8")
     with _cbreak_keyboard() as keyboard, _alternate_screen():
@@ -163,7 +163,7 @@ def _write(text: str) -> None:
 
 @contextlib.contextmanager
 def _cbreak_keyboard() -> Iterator[int]:
-    """Give a terminal's keys as they are pressed, unechoed; put it back as it was."""
+    """Yield the descriptor of a keyboard in cbreak mode, without echo; restore it."""
     try:
         import termios  # noqa: PLC0415 - not everywhere
         import tty  # noqa: PLC0415
@@ -178,7 +178,7 @@ def _cbreak_keyboard() -> Iterator[int]:
     try:
         tty.setcbreak(keyboard)
         mode = termios.tcgetattr(keyboard)
-        mode[6][termios.VSUSP] = b"\0"  # nobody could put the screen back when it is stopped
+        mode[6][termios.VSUSP] = b"\0"  # Ctrl-Z would leave the screen as it is
         termios.tcsetattr(keyboard, termios.TCSADRAIN, mode)
         yield keyboard
     finally:
@@ -190,7 +190,7 @@ def _cbreak_keyboard() -> Iterator[int]:
 
 @contextlib.contextmanager
 def _alternate_screen() -> Iterator[None]:
-    """Take the terminal's other screen; give it back, also when told to end."""
+    """Switch to the terminal's alternate screen; switch back, on signals, too."""
     before = {
         number: signal.signal(number, _raise_interrupt)
         for number in (signal.SIGTERM, signal.SIGHUP)

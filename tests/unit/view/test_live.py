@@ -159,7 +159,7 @@ def test_what_is_no_tap_is_refused(tmp_path):
         peer, _ = listener.accept()
         with peer:
             peer.sendall(b"HTTP/1.1 400 Bad Request\r\nServer: none, and more of it")
-            with pytest.raises(TransportClosed, match="another language"):
+            with pytest.raises(TransportClosed, match="no tap of this version"):
                 source.next()
         source.close()
 

@@ -1,6 +1,6 @@
-"""The front page of a display, live in a browser.
+"""Live view of a display's front page in a browser.
 
-A source (`sources`) brings what *is* on display, a message (`message`) carries it, a server
-(`server`) hands the newest one to every browser that has room for it, and one page (``page.html``)
-draws it. Nothing of this knows what a host meant to show.
+A source (`sources`) reads what is on display, a message (`message`) carries it, a server
+(`server`) sends the newest one to every browser that is ready for it, and one page (``page.html``)
+renders it. Knows nothing of what a host meant to show.
 """

@@ -1,4 +1,4 @@
-"""Where a server listens, as people write it."""
+"""Parsing of listen addresses."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import re
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """Read HOST:PORT, with an IPv6 number in brackets.
+    """Return host and port of HOST:PORT, with an IPv6 number in brackets.
 
     Raises
     ------
     ValueError
-        If it is none.
+        If it is no such address.
 
     """
     match = re.fullmatch(r"\[?([^\[\]]+?)\]?:(\d{1,5})", text)

@@ -1,4 +1,4 @@
-"""What travels to a browser: one picture, as lit voxels and their pixel values.
+"""Message to a browser: one picture as lit voxels with their pixel values.
 
 A message is a u32 (the offset of the data, a multiple of 8), a JSON object filled up with spaces,
 and planes of bytes, all little-endian::
@@ -9,7 +9,7 @@ and planes of bytes, all little-endian::
                  rgb888 (red, green, blue)
     palette      for index8: three planes of 256, red, green and blue of each pixel value
 
-Lit voxels are in scan order, so that deflate finds them easy. The JSON has ``number``, ``title``,
+Lit voxels are in scan order, which deflates well. The JSON has ``number``, ``title``,
 ``size``, ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap``, ``wide``, and
 ``own``: which entries are not those of the default palette.
 """
@@ -35,22 +35,22 @@ _OFFSET = struct.Struct("<I")
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What a display shows at a snapshot.
+    """Page of a display at one time, with what is known of it.
 
     Attributes
     ----------
     page : ndarray
-        As of `Display.read`, indexed [z, y, x].
+        As from `Display.read`, indexed [z, y, x].
     grid : Grid
     format : PixelFormat
     number : int
-        Which picture it is, as its source counts them.
+        Number of the picture, counted by its source.
     title : str
-        What is written over it.
+        Heading of the picture.
     digest : int or None
-        What the device says of the page (protocol.md, section 8).
+        Digest of the page by the device (protocol.md, section 8).
     counters : mapping of str to int
-        What else the source knows, by names for people.
+        Further figures of the source, by names for users.
     palette : (256, 3) uint8 array or None
         Of an index8 page; None for the default one.
 
@@ -67,7 +67,7 @@ class Snapshot:
 
 
 def encode(snapshot: Snapshot) -> bytes:
-    """Write a message."""
+    """Return the message for a snapshot."""
     grid = snapshot.grid
     voxels = lit_voxels(snapshot.page, grid, snapshot.format).positions
     wide = max(grid) > 256
@@ -100,7 +100,7 @@ def encode(snapshot: Snapshot) -> bytes:
 
 
 def _planes(snapshot: Snapshot, voxels: NDArray[np.integer], palette: Palette) -> bytes:
-    """Give the pixel values of voxels, byte by byte, and what they mean."""
+    """Return the planes of pixel values, and the palette of index8."""
     if snapshot.format is PixelFormat.MONO1:
         return b""
     x, y, z = voxels.T

@@ -1,7 +1,7 @@
-"""The page that browsers get, and what it may do: nothing but what it does.
+"""The page for browsers and its content security policy, which allows only what it needs.
 
-It is one file, ``page.html``, without a build step and without anything from elsewhere. Served by
-`server` it asks for frames there; written into a file by `voxdisplay.view.html_export` it has them.
+The page is one file, ``page.html``, without a build step and without third-party parts. Served by
+`server` it receives frames from there; in a file of `voxdisplay.view.html_export` it contains them.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from importlib.resources import files
 
 @functools.cache
 def page_html() -> str:
-    """Give the page."""
+    """Return the page."""
     return files(__package__).joinpath("page.html").read_text(encoding="utf-8")
 
 
 @functools.cache
 def content_security_policy(connect: str = "'none'") -> str:
-    """Give the content security policy under which the page works.
+    """Return the content security policy of the page.
 
     Parameters
     ----------
     connect : str
-        Where it may connect to.
+        Sources that it may connect to.
 
     """
     return "; ".join(
@@ -43,7 +43,7 @@ def content_security_policy(connect: str = "'none'") -> str:
 
 
 def _hash(tag: str) -> str:
-    """Name the one inline script or style that is ours."""
+    """Return the hash source of the page's inline script or style."""
     match = re.search(rf"<{tag}>(.*?)</{tag}>", page_html(), re.DOTALL)
-    assert match  # noqa: S101 - the page is ours too
+    assert match  # noqa: S101 - it has one of each
     return f"'sha256-{base64.b64encode(hashlib.sha256(match[1].encode()).digest()).decode()}'"

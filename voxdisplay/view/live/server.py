@@ -1,11 +1,8 @@
-"""Hands the newest picture to browsers: HTTP for the page, a WebSocket for the frames.
+"""Server of the live view: HTTP for the page, a WebSocket for the frames.
 
-A browser has at most two frames under way; it asks for another by saying that it has painted one.
-So a slow one gets fewer, a hidden one none, and neither is noticed by the others. Only browsers
-that came to this server by its own name are answered: not pages of other sites, and not names
-that an attacker lets point here.
-
-It knows no source but by `Source`, and pictures only as messages.
+A browser has at most two frames in flight; it acknowledges each that it has painted. So a slow one
+gets fewer and a hidden one none, without an effect on others. Which pages are answered at all is
+the business of `origins`. Knows sources only as `Source`, and pictures only as messages.
 """
 
 from __future__ import annotations
@@ -38,9 +35,9 @@ except ModuleNotFoundError as error:
     ) from error
 
 _MAX_IN_FLIGHT = 2
-_IDLE_CHECK_S = 1.0  # how often it is seen to, when nobody looks, that the source is still there
-_STOP_TIMEOUT_S = 2.0  # how long the source may take to end
-_MAX_MESSAGE_BYTES = 64  # a browser has little to say
+_IDLE_CHECK_S = 1.0  # interval of checks that the source is alive while nobody watches
+_STOP_TIMEOUT_S = 2.0  # for the source's thread to end
+_MAX_MESSAGE_BYTES = 64  # from a browser: acknowledgements
 _NO_UPGRADE = (
     "the page's WebSocket did not get through: what is between must pass on the headers Upgrade "
     "and Connection, by HTTP/1.1"
@@ -48,20 +45,20 @@ _NO_UPGRADE = (
 
 
 class _LatestSnapshot:
-    """The newest picture. Those that it has replaced are forgotten."""
+    """The newest picture; older ones are not kept."""
 
     def __init__(self) -> None:
         self.serial = 0
         self.message = b""
         self.snapshot: Snapshot | None = None
-        self.wanted = threading.Event()  # for the source's thread: somebody waits
+        self.wanted = threading.Event()  # for the source's thread: a browser waits
         self._key: Hashable = None
-        self._fresh = False  # nothing else can have been on display since
+        self._fresh = False  # read since a browser began to wait
         self._waiting = 0
         self._changed = asyncio.Event()
 
     async def wait_for_newer(self, serial: int) -> int:
-        """Wait for a picture other than one; give its serial."""
+        """Wait for a picture other than that of a serial number; return its serial number."""
         self._waiting += 1
         self.wanted.set()
         try:
@@ -74,7 +71,7 @@ class _LatestSnapshot:
         return self.serial
 
     def update(self, key: Hashable, snapshot: Snapshot, message: bytes) -> None:
-        """Take what is on display now."""
+        """Store what is on display now."""
         self._fresh = True
         if key != self._key:
             self._key, self.snapshot, self.message = key, snapshot, message
@@ -83,17 +80,17 @@ class _LatestSnapshot:
         self._changed = asyncio.Event()
 
     def mark_stale(self) -> None:
-        """Take note that nobody looks at the display for a while."""
+        """Note that the display is not watched: the picture may be out of date."""
         self._fresh = False
 
 
 class LiveServer:
-    """Serves one source to any number of browsers. Use it by `open_server`.
+    """Serves one source to any number of browsers; made by `open_server`.
 
     Attributes
     ----------
     url : str
-        Where a browser finds it.
+        Address for a browser.
 
     """
 
@@ -109,7 +106,7 @@ class LiveServer:
         )
 
     async def wait_until_ended(self) -> None:
-        """Wait until the source has no more pictures, and raise what it raised."""
+        """Wait until the source has no more pictures; raise its error."""
         await asyncio.shield(self._ended)
 
     # -- the source, in its thread
@@ -138,7 +135,7 @@ class LiveServer:
     # -- browsers
 
     async def _handle_request(self, _: ServerConnection, request: Request) -> Response | None:
-        """Answer an HTTP request; None lets it become a WebSocket."""
+        """Return the response to an HTTP request; None lets it become a WebSocket."""
         host = request.headers.get("Host", "")
         if refusal := self._origins.host_refusal(host):
             return _text_response(HTTPStatus.FORBIDDEN, refusal)
@@ -175,13 +172,13 @@ class LiveServer:
         return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, snapshot))
 
     async def _serve_browser(self, browser: ServerConnection) -> None:
-        """Send frames, as the browser has room for them."""
+        """Send frames as the browser acknowledges them."""
         room = asyncio.BoundedSemaphore(_MAX_IN_FLIGHT)
         sending = asyncio.create_task(self._send_snapshots(browser, room))
         try:
             async for _ in browser:
                 room.release()
-        except (ConnectionClosed, ValueError):  # it went, or says that it has painted what is not
+        except (ConnectionClosed, ValueError):  # it left, or acknowledged what it was not sent
             pass
         finally:
             sending.cancel()
@@ -202,12 +199,12 @@ class LiveServer:
 async def open_server(
     source: Source, host: str, port: int, allow_origins: Iterable[str] = ()
 ) -> AsyncIterator[LiveServer]:
-    """Serve a source.
+    """Serve a source until the context ends.
 
     Parameters
     ----------
     source : Source
-        It is closed in the end.
+        It is closed at the end.
     host, port
         Address to listen at; port 0 is any that is free.
     allow_origins : iterable of str

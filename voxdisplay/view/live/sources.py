@@ -1,7 +1,7 @@
-"""Where pictures come from: the emulator's tap, a display that can be read back, or one that stays.
+"""Sources of pictures: the emulator's tap, a display that is read back, or one still picture.
 
-A source waits, in a thread that is its own, until the display shows something else; it is asked
-only while somebody looks. Knows no browser.
+A source waits, in a thread of its own, until the display shows something else; it is used only
+while somebody watches. Knows no browser.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from voxdisplay.raster.pixel_format import PixelFormat, Pixels
 from voxdisplay.view.live.message import Snapshot
 
 _POLL_S = 0.05
-# A display that gives no digest is read as a whole to find out whether it shows something else.
+# A display without a digest is read whole to find out whether it shows something else.
 _FULL_READ_POLL_S = 0.5
 _CONNECT_S = 5.0
 
 
 class Source(Protocol):
-    """Brings pictures."""
+    """Interface of every source of pictures."""
 
     def next(self) -> tuple[Hashable, Snapshot]:
-        """Wait for another picture than the last one; give it and what tells it from others.
+        """Wait for another picture than the last one; return a key that identifies it, and it.
 
         Raises
         ------
         VoxDisplayError
-            If there will be none any more.
+            If there will be no more.
 
         """
 
     def resend(self) -> None:
-        """Let the next picture be what is on display now, even if it is the last one again."""
+        """Make `next` return what is on display now, even if it was returned before."""
 
     def check_alive(self) -> None:
-        """Find out, without waiting, whether there can be pictures still.
+        """Check, without waiting, that there can be further pictures.
 
         Raises
         ------
@@ -55,7 +55,7 @@ class Source(Protocol):
         """
 
     def close(self) -> None:
-        """Give back what is held; from another thread, it ends a `next` that waits."""
+        """Release resources; called from another thread, it ends a `next` that waits."""
 
 
 class TapSource:
@@ -64,14 +64,14 @@ class TapSource:
     Parameters
     ----------
     host, port
-        Where the tap listens.
+        Address of the tap.
     title : str
-        What is written over its pictures.
+        Heading of its pictures.
 
     Raises
     ------
     OpenError
-        If nothing listens there.
+        If nothing accepts connections there.
 
     """
 
@@ -103,7 +103,9 @@ class TapSource:
             magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
             format_ = PixelFormat.from_wire(number)
             if magic != self._MAGIC or format_ is None:
-                raise TransportClosed(f"{self._name} speaks another language: {magic!r}")
+                raise TransportClosed(
+                    f"{self._name} is no tap of this version: it began with {magic!r}"
+                )
             grid = Grid(nx, ny, nz)
             data = self._receive(grid.voxels * format_.bytes)
             palette = None
@@ -153,28 +155,28 @@ class TapSource:
 
 
 class ReadableDisplay(Protocol):
-    """A display, as far as it is looked at: see `Display`."""
+    """The part of `Display` that a source uses."""
 
     port: str
 
     def digest(self) -> int | None:
-        """Ask what is on display."""
+        """Return the digest of the front page."""
 
     def read(self) -> Pixels:
-        """Read the front page back."""
+        """Return the front page."""
 
 
 class DisplaySource:
-    """A display that is open: asked for its digest, and read back when that has changed.
+    """An open display: its digest is polled, and its page read back when that has changed.
 
     Parameters
     ----------
     display : Readable
-        It is the source's from now on: no other thread may use it.
+        It belongs to the source: no other thread may use it.
     grid : Grid
     format : PixelFormat
     counters : callable
-        Gives what the link has counted, by names for people.
+        Returns counters of the link, by names for users.
 
     """
 
@@ -182,16 +184,14 @@ class DisplaySource:
         self,
         display: ReadableDisplay,
         grid: Grid,
-        format: PixelFormat,  # noqa: A002 - the word of the command line
+        format: PixelFormat,  # noqa: A002 - as the option --format
         counters: Callable[[], dict[str, int]] = dict,
     ) -> None:
         self._display = display
         self._grid, self._format = grid, format
         self._counters = counters
         self._last: Snapshot | None = None
-        self._delivered = (
-            False  # whether the last picture has been given since it was asked for anew
-        )
+        self._delivered = False  # `_last` was returned by `next` since `resend`
         self._closing = threading.Event()
 
     def resend(self) -> None:
@@ -211,7 +211,7 @@ class DisplaySource:
                 raise TransportClosed(f"{self._display.port} is closed")
 
     def _read_page(self, digest: int | None) -> None:
-        """Read the page back, and note it if it is another."""
+        """Read the page back; keep it if it differs."""
         page, last = self._display.read(), self._last
         if last and digest is None and np.array_equal(page, last.page):
             return
@@ -230,7 +230,7 @@ class DisplaySource:
 
 
 class StaticSource:
-    """One picture that stays."""
+    """One picture that does not change."""
 
     def __init__(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
@@ -250,7 +250,7 @@ class StaticSource:
         return self._snapshot.number, self._snapshot
 
     def check_alive(self) -> None:
-        """See `Source.check_alive`: it stays."""
+        """See `Source.check_alive`. There is nothing to check."""
 
     def close(self) -> None:
         """See `Source.close`."""
