@@ -59,15 +59,15 @@ def print_stdout(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print a line to stderr, unless the command is quiet."""
+    """Print a line to stderr, unless the command is quiet; what it quotes is made printable."""
     if not is_quiet():
-        print_stderr(text)
+        print_stderr(printable_lines(text))
 
 
 def print_stderr(text: str) -> None:
-    """Print lines to stderr, if stderr can still be written; what they quote is printable."""
+    """Print lines to stderr, if stderr can still be written."""
     try:
-        _write(sys.stderr, printable_lines(text))
+        _write(sys.stderr, text)
     except OSError as failure:
         # What Python flushes at its end then goes to the null device, without a complaint: of a
         # closed terminal all, of a full disk only what was to be printed here.

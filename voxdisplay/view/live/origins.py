@@ -1,4 +1,4 @@
-"""Which pages may watch: check of the headers Host and Origin against cross-site requests.
+"""Origin check of the live view: the headers Host and Origin, against cross-site requests.
 
 A page of another site can open a WebSocket here, and a name of an attacker can point here (DNS
 rebinding). So only pages of this server are answered, by its own name or by a number, and those
