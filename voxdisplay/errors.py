@@ -49,7 +49,7 @@ class VoxDisplayError(Exception):
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(printable_lines(str(message)))
-        self.hint = hint and printable_lines(str(hint))
+        self.hint = None if hint is None else printable_lines(str(hint))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The default calls the class with the finished message: it lacks what else its __init__

@@ -7,7 +7,6 @@ not know packets in flight, and leaves the encoding to `wire.encoding_selection`
 from __future__ import annotations
 
 import os
-import reprlib
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
+from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
 from voxdisplay.raster.color import Color, as_colors, colors_at, interpolate_colors
@@ -104,8 +104,8 @@ class Frame:
         palette: NDArray[np.uint8] | None = None,
         own_palette: bool = False,
     ) -> None:
-        self.grid = _as_grid(grid)
-        self.format = PixelFormat(format)
+        self.grid = Grid.of(grid)
+        self.format = format if isinstance(format, PixelFormat) else PixelFormat(_text(format))
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
         self._shared = False  # with a copy
         self._items: list[OrderedVoxels] = []
@@ -115,6 +115,7 @@ class Frame:
         if palette is not None and self.format is not PixelFormat.INDEX8:
             raise ValueError(f"a {self.format.value} display has no palette: leave it out")
         self._palette: Palette | None = None  # the default one, or none
+        own_palette = flag("own_palette", own_palette)
         if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
             self._palette = Palette(palette, grows=palette is None)
 
@@ -219,9 +220,17 @@ class Frame:
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
-        curves, colors = zip(*items, strict=True) if (items := list(items)) else ((), ())
-        sequences = voxelization.voxelize_many(curves)
-        return [self.draw(*pair) for pair in zip(sequences, colors, strict=True)]
+        if not isinstance(items, Iterable) or getattr(items, "ndim", None) == 0:
+            raise wrong_kind("items", "an iterable of (curve, color)", items)
+        pairs = list(items)
+        for pair in pairs:
+            if not isinstance(pair, tuple | list) or len(pair) != 2:
+                raise wrong_kind("items", "an iterable of (curve, color)", pair)
+        sequences = voxelization.voxelize_many(curve for curve, _ in pairs)
+        return [
+            self.draw(sequence, color)
+            for sequence, (_, color) in zip(sequences, pairs, strict=True)
+        ]
 
     def _add(
         self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
@@ -264,7 +273,7 @@ class Frame:
             If shape, type or a mono1 value is another; the message says what is wanted.
 
         """
-        array = np.asarray(array)
+        array = _as_array("array", array)
         self.format.validate(array, self.grid.array_shape)
         self._prepare_change()
         self._raster[...] = array.reshape(self._raster.shape)
@@ -448,6 +457,11 @@ class Frame:
 
     def changed_indices(self, base: Frame) -> NDArray[np.int64]:
         """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
+        instance("base", base, Frame, "a frame")
+        if (base.grid, base.format) != (self.grid, self.format):
+            raise ValueError(
+                f"base: a frame of {self.grid} {self.format.value} is wanted, not {base}"
+            )
         mine, other = self._raster, base._raster
         if mine is other:
             return np.empty(0, dtype=np.int64)
@@ -459,7 +473,8 @@ class Frame:
     def _encoder_config(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
     ) -> EncoderConfig:
-        bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in set(features))
+        whole_number("max_payload", max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
+        bits = _feature_bits(features)
         config = EncoderConfig(self.grid, self.format, max_payload, bits, bytes_per_s)
         if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
             raise ValueError("this frame has a palette of its own, and the device keeps its own")
@@ -504,32 +519,39 @@ def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[n
     return np.setdiff1d(index, items.index) if items else index
 
 
-def _as_grid(grid: Any) -> Grid:
-    """Return three positive whole numbers as a `Grid`."""
-    sides = list(grid) if isinstance(grid, tuple | list | np.ndarray) else None
-    if sides is None or len(sides) != 3 or not all(isinstance(n, int | np.integer) for n in sides):
-        raise TypeError(
-            f"grid: three whole numbers (nx, ny, nz) are wanted, not {reprlib.repr(grid)}"
-        )
-    found = Grid(*map(int, sides))
-    if not all(1 <= n <= spec.LIMIT_MAX_SIDE for n in sides):
-        raise ValueError(f"grid: sides are 1 to {spec.LIMIT_MAX_SIDE}, not {found}")
-    if found.voxels > spec.LIMIT_MAX_VOXELS:
-        raise ValueError(f"grid: {found} are more than {spec.LIMIT_MAX_VOXELS} voxels")
-    return found
+def _text(format_: Any) -> str:
+    names = ", ".join(repr(each.value) for each in PixelFormat)
+    instance("format", format_, str, f"one of {names}")
+    return str(format_)
+
+
+def _feature_bits(features: Collection[str]) -> int:
+    """Return the names of features as bits of INFO."""
+    known = {
+        name.removeprefix("FEATURE_").lower(): bit
+        for name, bit in vars(spec).items()
+        if name.startswith("FEATURE_")
+    }
+    if not isinstance(features, tuple | list | set | frozenset | dict):
+        raise wrong_kind("features", "a collection of names", features)
+    for name in features:
+        choice("features", name, tuple(known))
+    return sum(1 << known[name] for name in set(features))
+
+
+def _as_array(name: str, value: object) -> NDArray[Any]:
+    try:
+        return np.asarray(value)
+    except ValueError:  # rows of different lengths
+        raise ValueError(f"{name}: its rows have different lengths") from None
 
 
 def _as_voxels(drawable: object) -> NDArray[np.integer]:
-    try:
-        voxels = np.asarray(drawable)
-    except ValueError:  # rows of different lengths
-        voxels = np.empty(0, dtype=object)
-    is_list = isinstance(drawable, list | tuple) or hasattr(drawable, "__array__")
-    if not is_list or isinstance(drawable, Frame):
-        raise TypeError(
-            f"drawable: draw() takes a curve, a sequence, an (N, 3) array of voxels or a scene, "
-            f"not {type(drawable).__name__} {reprlib.repr(drawable)}"
-        )
+    is_array = isinstance(drawable, list | tuple) or hasattr(drawable, "__array__")
+    if not is_array or isinstance(drawable, Frame | type):
+        wanted = "a curve, a sequence, an (N, 3) array of voxels or a scene"
+        raise wrong_kind("drawable", wanted, drawable)
+    voxels = _as_array("drawable", drawable)
     if voxels.ndim != 2 or voxels.shape[1] != 3 or voxels.dtype.kind not in "iu":
         raise ValueError(
             f"drawable: voxels are an (N, 3) array of whole numbers, columns x, y, z; "

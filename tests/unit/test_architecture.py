@@ -20,7 +20,7 @@ PACKAGE, EMULATOR = map(folder_of, ("voxdisplay", "firmware_sim"))
 
 PICTURE = Path(__file__).parents[2] / "docs" / "architecture.md"
 # What all may import, and who may import all.
-EVERYWHERE = {"errors", "printable_text"}
+EVERYWHERE = {"argument_checks", "errors", "printable_text"}
 TOP = {"__init__", "__main__", "cli"}
 
 

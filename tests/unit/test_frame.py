@@ -177,12 +177,14 @@ def test_the_default_colour_is_white():
     ids=lambda what: type(what).__name__,
 )  # fmt: skip
 def test_draw_names_what_it_takes(what):
-    with pytest.raises(TypeError, match=r"drawable: draw\(\) takes a curve, a sequence, .*scene"):
+    with pytest.raises(
+        TypeError, match="drawable: a curve, a sequence, an .* or a scene is wanted, not"
+    ):
         Frame((3, 5, 7)).draw(what)
 
 
 def test_draw_refuses_rows_of_different_lengths():
-    with pytest.raises(ValueError, match="columns x, y, z"):
+    with pytest.raises(ValueError, match="drawable: its rows have different lengths"):
         Frame((3, 5, 7)).draw([[1, 2, 3], [1, 2]])
 
 
@@ -205,7 +207,7 @@ def test_a_scene_of_another_size_is_fitted_or_kept():
     scene, fitted, kept = read_scene(TWO), Frame((20, 20, 5)), Frame((20, 20, 5))
     assert fitted.draw(scene).clipped == 0
     assert kept.draw(scene, fit="none").clipped > 0
-    with pytest.raises(ValueError, match="contain or none"):
+    with pytest.raises(ValueError, match="fit: one of 'contain', 'none'"):
         kept.draw(scene, fit="cover")
 
 
@@ -284,5 +286,6 @@ def test_a_grid_that_no_display_has(grid):
 
 @pytest.mark.parametrize("format_", ["rgb", "", None, 3, b"mono1"])
 def test_what_is_no_format(format_):
-    with pytest.raises(ValueError, match="format: one of mono1, index8, rgb565, rgb888 is wanted"):
+    kind = ValueError if isinstance(format_, str) else TypeError
+    with pytest.raises(kind, match="format: one of .*mono1.*index8.*rgb565.*rgb888.* is wanted"):
         Frame((3, 5, 7), format_)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, SupportsFloat
 
 import numpy as np
 
+from voxdisplay import argument_checks
 from voxdisplay.errors import CurveError
 
 if TYPE_CHECKING:
@@ -38,7 +39,12 @@ class ArgumentError(CurveError):
 
 def finite(name: str, value: SupportsFloat) -> float:
     """Give a finite float, or raise ArgumentError."""
-    number = float(value)
+    try:
+        number = argument_checks.number(name, value)
+    except TypeError:
+        raise ArgumentError(name, f"is not a number: {argument_checks.described(value)}") from None
+    except ValueError:
+        raise ArgumentError(name, "is too large") from None
     if not math.isfinite(number):
         raise ArgumentError(name, f"is not finite: {number}")
     if abs(number) > MAX_MAGNITUDE:
@@ -65,6 +71,8 @@ def whole(name: str, value: SupportsFloat) -> int:
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
     """Give a finite float64 array of a shape, where None is any length, or raise ArgumentError."""
     try:
+        if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+            raise TypeError  # noqa: TRY301 - as of a list of complex numbers
         numbers = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ArgumentError(name, "is not an array of numbers") from None

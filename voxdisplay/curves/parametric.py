@@ -103,7 +103,7 @@ class Parametric(Curve):
         dz: Formula | None = None,
         derivative: Function | None = None,
     ) -> None:
-        values = resolve_params(params or {})
+        values = resolve_params({} if params is None else params)
         self._formulas: list[Expression] = []
         self._always_defined = False
         self.t_range = _range(t, values)
@@ -199,7 +199,8 @@ class Parametric(Curve):
 
 
 def _range(t: Bounds, values: Mapping[str, float]) -> tuple[float, float]:
-    if isinstance(t, str) or len(t) != 2:
+    is_pair = isinstance(t, Sequence | np.ndarray) and not isinstance(t, str | bytes)
+    if not is_pair or getattr(t, "ndim", 1) != 1 or len(t) != 2:
         raise arguments.ArgumentError("t", f"must be two numbers (a, b), not {excerpt(t)}")
     low, high = (constant(bound, values) for bound in t)
     return arguments.parameter_range("t", low, high)

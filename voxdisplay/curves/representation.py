@@ -21,12 +21,15 @@ def short_repr(value: object) -> str:
         return str(bool(value))
     if isinstance(value, float | int | np.number):
         return f"{float(value):.6g}"
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return short_repr(value[()])
     if isinstance(value, tuple | list | np.ndarray):
         entries = [short_repr(entry) for entry in value[:MAX_ROWS]]
         rest = len(value) - MAX_ROWS
         if rest > 0:
             entries.append(f"... {rest} more")
-        brackets = "()" if isinstance(value, tuple) or np.ndim(value) == 1 else "[]"
+        is_point = isinstance(value, tuple) or not any(np.iterable(entry) for entry in value)
+        brackets = "()" if is_point else "[]"
         return brackets[0] + ", ".join(entries) + brackets[1]
     if callable(value):
         return str(getattr(value, "__qualname__", None) or type(value).__qualname__)

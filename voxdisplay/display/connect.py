@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Literal, TextIO
 
+from voxdisplay.argument_checks import duration, flag, function, whole_number, wrong_kind
 from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.display import TIMEOUT_S, Display
@@ -15,6 +16,8 @@ from voxdisplay.transport import Transport
 
 DEFAULT_PORT: Final = "sim:"
 PORT_VARIABLE: Final = "VOXDISPLAY_PORT"
+
+_MAX_BAUD = 2**31 - 1  # what the system's calls take
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
@@ -67,7 +70,13 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
 
     """
     opened = _as_port(port)
-    note_or_not = note or (lambda _text: None)
+    if not (isinstance(baud, str) and baud == "auto"):
+        whole_number("baud", baud, 1, _MAX_BAUD)
+    timeout_s, reconnect_s = duration("timeout_s", timeout_s), duration("reconnect_s", reconnect_s)
+    no_reset = flag("no_reset", no_reset)
+    note_or_not = function("note", note) or (lambda _text: None)
+    if capture is not None and not callable(getattr(capture, "write", None)):
+        raise wrong_kind("capture", "a text file or None", capture)
 
     def attempt() -> Display:
         if isinstance(opened, str):

@@ -16,6 +16,7 @@ from typing import Literal, NoReturn, Self, TextIO, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import flag
 from voxdisplay.display.connection import Clock, Connection
 from voxdisplay.display.device_info import DeviceInfo
 from voxdisplay.display.fair_lock import FairLock
@@ -133,7 +134,7 @@ class Display:
             palette and the device has its own.
 
         """
-        if keep:
+        if flag("keep", keep):
             if palette is not None:
                 raise ValueError("a frame that keeps what is on display keeps its palette, too")
             with self._turn() as operations:
@@ -194,6 +195,7 @@ class Display:
             If the pipe failed.
 
         """
+        wait = flag("wait", wait)
         with self._turn() as operations:
             self._check_frame(frame)
             if not wait:
@@ -271,6 +273,7 @@ class Display:
             If the device cannot read.
 
         """
+        back = flag("back", back)
         with self._turn() as operations:
             if not operations.can("read"):
                 raise IncompatibleDevice(
@@ -302,6 +305,7 @@ class Display:
             If the device cannot read.
 
         """
+        self._check_frame(frame)
         page = self.read(progress=progress)
         if differs := describe_difference(frame.array(), page):
             raise DesyncError(f"what was read back is not the frame: {differs}")

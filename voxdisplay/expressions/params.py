@@ -6,15 +6,13 @@ Each is a number, or an expression in constants and other params. Must not know 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING
 
+from voxdisplay.argument_checks import described
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.operations import FUNCTIONS
 from voxdisplay.expressions.parse import CONSTANTS, VARIABLE, constant, excerpt, names_in
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 MAX_PARAMS = 1000
 """Most params of one scene or curve."""
@@ -39,10 +37,12 @@ def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
         on each other in a circle.
 
     """
+    if not isinstance(params, Mapping):
+        raise CurveError(f"params are a mapping of names to values, not {described(params)}")
     if len(params) > MAX_PARAMS:
         raise CurveError(f"{len(params)} params are more than {MAX_PARAMS}")
     for name in params:
-        if not _NAME.fullmatch(name):
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise CurveError(f"{excerpt(name)} cannot be the name of a param", hint=_NAME_HINT)
         if name in RESERVED:
             raise CurveError(f"a param cannot be called {name!r}: that has a meaning already")

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn, cast
 
 import numpy as np
 
+from voxdisplay.argument_checks import described, number
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.operations import (
     ADD,
@@ -81,7 +82,13 @@ def parse(
     if isinstance(source, str):
         expression = _Parser(source, names or {}, variable=variable).parse()
     else:
-        expression = Expression(str(source), (float(source),))
+        try:
+            value = number("", source)
+        except (TypeError, ValueError):
+            raise CurveError(
+                f"an expression is a text or a finite number, not {described(source)}"
+            ) from None
+        expression = Expression(str(source), (value,))
     if expression.constant is not None and not math.isfinite(expression.constant):
         raise CurveError(f"{excerpt(source)} is not finite: {expression.constant}")
     return expression

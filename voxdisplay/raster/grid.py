@@ -1,21 +1,24 @@
-"""The shape of a display: how (x, y, z) and ``[z, y, x]`` belong together.
+"""Voxel grid of a display: sizes, scan order, and the change from (x, y, z) to ``[z, y, x]``.
 
-This module and ``frame.py`` are the only places where the axes turn round. It knows nothing of
-curves, colours or the wire.
+Only this module and ``frame.py`` change the order of axes. Must not know curves or colours.
 """
 
 from __future__ import annotations
 
 import math
 import re
+import reprlib
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import instance, wrong_kind
+from voxdisplay.wire import spec
+
 
 class Grid(NamedTuple):
-    """A display's shape in voxels: nx x ny x nz.
+    """Size of a display in voxels: nx x ny x nz.
 
     Voxel (x, y, z) is the cube [x, x+1) x [y, y+1) x [z, z+1); arrays over a grid are indexed
     ``[z, y, x]``, so that a flat array runs along x fastest, which is scan order on the wire
@@ -27,6 +30,30 @@ class Grid(NamedTuple):
     nz: int
 
     @classmethod
+    def of(cls, sides: object) -> Grid:
+        """Return three whole numbers (nx, ny, nz) as a grid.
+
+        Raises
+        ------
+        TypeError
+            If they are anything else.
+        ValueError
+            If no display can have these sides.
+
+        """
+        listed = list(sides) if isinstance(sides, tuple | list) else []
+        if isinstance(sides, np.ndarray) and sides.ndim == 1:
+            listed = list(sides)
+        if len(listed) != 3 or not all(isinstance(side, int | np.integer) for side in listed):
+            raise wrong_kind("grid", "three whole numbers (nx, ny, nz)", sides)
+        grid = cls(*map(int, listed))
+        if not all(1 <= side <= spec.LIMIT_MAX_SIDE for side in grid):
+            raise ValueError(f"grid: sides are 1 to {spec.LIMIT_MAX_SIDE}, not {grid}")
+        if grid.voxels > spec.LIMIT_MAX_VOXELS:
+            raise ValueError(f"grid: {grid} has more than {spec.LIMIT_MAX_VOXELS} voxels")
+        return grid
+
+    @classmethod
     def parse(cls, text: str) -> Grid:
         """Parse ``"17x64x40"`` or ``"17,64,40"``.
 
@@ -36,10 +63,13 @@ class Grid(NamedTuple):
             If the text is not three positive whole numbers joined by ``x`` or by commas.
 
         """
+        instance("text", text, str, "a text such as '128x128x128'")
         sides = r"([0-9]{1,5})\s*[x,]\s*([0-9]{1,5})\s*[x,]\s*([0-9]{1,5})"
         match = re.fullmatch(sides, text.strip().lower())
         if not match or "0" in (parts := [part.lstrip("0") or "0" for part in match.groups()]):
-            raise ValueError(f"{text!r} is not a size of a display: write it like 128x128x128")
+            raise ValueError(
+                f"{reprlib.repr(text)} is not a size of a display: write it like 128x128x128"
+            )
         return cls(*map(int, parts))
 
     def __str__(self) -> str:
@@ -56,7 +86,7 @@ class Grid(NamedTuple):
         return self.nz, self.ny, self.nx
 
     def inside(self, voxels: NDArray[np.integer]) -> NDArray[np.bool_]:
-        """Tell which voxels the grid has.
+        """Return which voxels are inside the grid.
 
         Parameters
         ----------
@@ -71,7 +101,7 @@ class Grid(NamedTuple):
         return np.asarray(((voxels >= 0) & (voxels < np.asarray(self))).all(axis=1))
 
     def index_of(self, voxels: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Give the scan-order index of voxels: x + nx * (y + ny * z).
+        """Return the scan-order indices of voxels: x + nx * (y + ny * z).
 
         Parameters
         ----------
@@ -87,7 +117,7 @@ class Grid(NamedTuple):
         return np.asarray(x + self.nx * (y + self.ny * z))
 
     def voxels_at(self, index: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Give the voxels, (N, 3) int32 with columns x, y, z, of scan-order indices, (N,)."""
+        """Return the voxels, (n, 3) int32, columns x, y, z, at scan-order indices, (n,)."""
         # Several times as fast as divmod.
         rest = index // self.nx
         z = rest // self.ny

@@ -111,10 +111,13 @@ def _unpacked_rgb(codes: NDArray[np.int64]) -> Colors:
 
 
 def _validated(colors: Colors) -> Colors:
-    colors = np.asarray(colors)
+    try:
+        colors = np.asarray(colors)
+    except ValueError:  # rows of different lengths
+        colors = np.empty(0, dtype=object)
     if colors.shape != DEFAULT.shape or colors.dtype != np.uint8:
         raise ValueError(
-            f"a palette is a (256, 3) array of uint8, red, green and blue of each pixel value; "
+            f"palette: it is a (256, 3) array of uint8, red, green and blue of each pixel value; "
             f"this is {colors.shape} of {colors.dtype}"
         )
     return colors

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from voxdisplay import voxelization
+from voxdisplay.argument_checks import choice, instance
 from voxdisplay.curves import Transformed
 from voxdisplay.errors import CurveError, SceneError
 from voxdisplay.frame import Drawing, Frame
@@ -121,6 +122,7 @@ class Scene:
             As of `voxelize`.
 
         """
+        instance("frame", frame, Frame, "a frame")
         fitted, _ = self.fitted(frame.grid, fit)
         drawings = [
             frame.draw(sequence, item.color)
@@ -161,8 +163,8 @@ class Scene:
             One line that says what was changed.
 
         """
-        if mode not in {"contain", "none"}:
-            raise ValueError(f"unknown fit {mode!r}: contain or none")
+        choice("fit", mode, ("contain", "none"))
+        grid = Grid.of(grid)
         if mode == "none" or self.size is None or self.size == grid:
             return self, None
         size, room = np.array(self.size, dtype=np.float64), np.array(grid, dtype=np.float64)

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.errors import SceneError, did_you_mean
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
@@ -33,12 +34,12 @@ MAX_VOXELS = 1 << 31
 _MANY_OBJECTS = 'several objects are written as {"objects": [{...}, {...}]}'
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read a scene file.
 
     Parameters
     ----------
-    path : str or Path
+    path : str or path
         ``"-"`` is standard input; files of points are then looked for in the current directory.
 
     Raises
@@ -47,6 +48,8 @@ def load_scene(path: str | Path) -> Scene:
         If the file cannot be read, or as `read_scene`.
 
     """
+    if not isinstance(path, str | os.PathLike):
+        raise wrong_kind("path", "a str or path", path)
     if str(path) == "-":
         return _read(sys.stdin.buffer.read(MAX_BYTES + 1), Path(), "standard input")
     path = Path(path)
@@ -77,7 +80,7 @@ def _similar(path: Path) -> str | None:
     return did_you_mean(path.name, names)
 
 
-def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
+def read_scene(data: bytes | str, *, folder: str | os.PathLike[str] | None = None) -> Scene:
     """Read a scene from the text of a scene file.
 
     Parameters
@@ -85,7 +88,7 @@ def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
     data : bytes or str
         JSON, perhaps with ``//`` comments; bytes are UTF-8. Either a scene, or one object, which
         is a scene of that object.
-    folder : Path, optional
+    folder : str or path, optional
         Where the files are that the scene names. Without it, it may name none.
 
     Raises
@@ -94,7 +97,11 @@ def read_scene(data: bytes | str, *, folder: Path | None = None) -> Scene:
         If anything is wrong with it: ``.path``, ``.line`` and ``.column`` are where.
 
     """
-    return _read(data, folder, None)
+    if not isinstance(data, str | bytes):
+        raise wrong_kind("data", "the text of a scene, str or bytes,", data)
+    if folder is not None and not isinstance(folder, str | os.PathLike):
+        raise wrong_kind("folder", "a path or None", folder)
+    return _read(data, None if folder is None else Path(folder), None)
 
 
 def _read(data: bytes | str, folder: Path | None, file: str | None) -> Scene:

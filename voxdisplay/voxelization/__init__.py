@@ -9,7 +9,9 @@ the extra `fast`, much work is done compiled, with the same voxels
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
+from voxdisplay.argument_checks import choice, flag, instance, wrong_kind
 from voxdisplay.curves.curve import Curve
 from voxdisplay.voxelization import measure, tangent_march
 from voxdisplay.voxelization.digitise import digitise
@@ -100,15 +102,25 @@ def voxelize_many(
     certified: bool = False,
 ) -> list[Sequence]:
     """Find the voxels along many curves: as `voxelize`, but much faster than one by one."""
+    curves = _as_curves(curves)
+    choice("method", method, ("grid-plane", "march"))
+    certified = flag("certified", certified)
     if method == "grid-plane":
         if pitch is not None or reach is not None:
             raise ValueError("pitch and reach are the march's: they go with method='march'")
         return digitise(curves, certified=certified)
-    if method == "march":
-        if certified:
-            raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
-        return [
-            tangent_march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
-            for curve in curves
-        ]
-    raise ValueError(f"there is no method {method!r}: take 'grid-plane' or 'march'")
+    if certified:
+        raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
+    return [
+        tangent_march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
+        for curve in curves
+    ]
+
+
+def _as_curves(curves: Any) -> list[Curve]:
+    if not isinstance(curves, Iterable) or getattr(curves, "ndim", 1) == 0:
+        raise wrong_kind("curves", "an iterable of curves", curves)
+    listed = list(curves)
+    for curve in listed:
+        instance("curve", curve, Curve, "a Curve")
+    return listed

@@ -19,6 +19,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import choice, number
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
@@ -164,10 +165,9 @@ def follow(
 
 def search_steps(variant: int, pitch: float | None, reach: float | None) -> tuple[float, float]:
     """Give pitch and reach of a variant's search, checked; defaults for those that are None."""
-    if variant not in PITCHES:
-        raise ValueError(f"there is no variant {variant!r}: take 1, 2 or 3")
-    pitch = PITCHES[variant] if pitch is None else float(pitch)
-    reach = REACH if reach is None else float(reach)
+    choice("variant", variant, tuple(PITCHES))
+    pitch = PITCHES[variant] if pitch is None else number("pitch", pitch)
+    reach = REACH if reach is None else number("reach", reach)
     for name, value in (("pitch", pitch), ("reach", reach)):
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} must be positive and finite, not {value:g}")

@@ -93,7 +93,7 @@ def test_pixel_0_is_dark_whatever_its_entry_says():
 
 @pytest.mark.parametrize("colors", [np.zeros((256, 4), np.uint8), np.zeros((256, 3)), np.zeros(3)])
 def test_what_is_no_palette(colors):
-    with pytest.raises(ValueError, match=r"a palette is a \(256, 3\) array"):
+    with pytest.raises(ValueError, match=r"palette: it is a \(256, 3\) array"):
         Palette(colors)
     with pytest.raises(ValueError, match="has no palette"):
         Frame(GRID, "rgb888", palette=DEFAULT)

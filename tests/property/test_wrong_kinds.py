@@ -1,0 +1,209 @@
+"""Arguments of a wrong kind: refused by an error of this package's own, never by one from inside.
+
+Every public function, class and method is called with every argument in turn replaced by values of
+other kinds. Such a call may succeed; if it raises, then by a ``raise`` statement of the package.
+"""
+
+import ast
+import inspect
+import itertools
+import math
+import traceback
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voxdisplay as vd
+
+PACKAGE = Path(vd.__file__).parent
+
+WRONG = {
+    "None": None,
+    "True": True,
+    "whole number": 7,
+    "negative": -3,
+    "huge": 1 << 80,
+    "fraction": 1.5,
+    "nan": math.nan,
+    "infinity": -math.inf,
+    "complex": 1 + 2j,
+    "numpy number": np.float32(2.5),
+    "text": "xyz",
+    "empty text": "",
+    "control characters": "\x1b[2J\0\n",
+    "bytes": b"xyz",
+    "empty list": [],
+    "list": [1, 2],
+    "triple": (1, 2, 3),
+    "texts": ["a", "b", "c"],
+    "ragged": [[1, 2, 3], [1, 2]],
+    "Nones": [None, None, None],
+    "points": [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)],
+    "dict": {"a": 1},
+    "set": {1, 2, 3},
+    "iterator": iter(()),
+    "object": object(),
+    "class": vd.Circle,
+    "function": lambda *_: None,
+    "raises": lambda *_: 1 // 0,
+    "path": Path("nowhere.xyz"),
+    "array of floats": np.linspace(0, 1, 6).reshape(2, 3),
+    "array of texts": np.array(["a", "b"]),
+    "array of objects": np.array([None, object()]),
+    "empty array": np.empty((0, 3)),
+    "number in an array": np.array(3.0),
+    "curve": vd.Circle((5, 5, 5), 3),
+    "frame": vd.Frame((3, 5, 7)),
+}
+
+POINTS = [(1, 1, 1), (5, 2, 3), (4, 5, 6), (7, 7, 7)]
+SCENE = """{"size": [9, 9, 9], "objects": [
+ {"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}]}"""
+# Arguments of a call that succeeds, by the name of what is called.
+CALLS = {
+    "Arc": {"center": (5, 5, 5), "radius": 3, "start": 0, "end": 1, "normal": (0, 0, 1)},
+    "BSpline": {"points": POINTS, "degree": 2, "knots": None, "weights": [1, 2, 2, 1]},
+    "Bezier": {"points": POINTS},
+    "CatmullRom": {"points": POINTS},
+    "Circle": {"center": (5, 5, 5), "radius": 3, "normal": (0, 0, 1)},
+    "Ellipse": {"center": (5, 5, 5), "axes": [(3, 0, 0), (0, 2, 0)]},
+    "Helix": {"center": (5, 5, 1), "radius": 3, "pitch": 2, "turns": 2, "axis": (0, 0, 1)},
+    "Lissajous": {"center": (5, 5, 5), "amplitude": (3, 2, 1), "frequency": (1, 2, 3)},
+    "Parametric": {"x": "5 + r*t", "y": "t", "z": 3, "t": (0, 3), "params": {"r": 1}, "dx": "r"},
+    "Points": {"points": POINTS},
+    "Polyline": {"points": POINTS},
+    "Segment": {},
+    "TorusKnot": {"p": 2, "q": 3, "center": (5, 5, 5), "major": 3, "minor": 1},
+    "Frame": {"grid": (3, 5, 7), "format": "index8", "palette": None, "own_palette": False},
+    "load_scene": {"path": "nowhere.json"},
+    "read_scene": {"data": SCENE, "folder": None},
+    "voxelize": {"curve": WRONG["curve"], "method": "grid-plane", "variant": 3, "tangent": None,
+                 "pitch": None, "reach": None, "certified": False},
+    "voxelize_many": {"curves": [WRONG["curve"]], "method": "march", "variant": 3},
+    "open": {"port": "sim:?size=8x8x8", "baud": 115200, "timeout_s": 1.0, "reconnect_s": 0.0,
+             "no_reset": False, "note": None, "capture": None},
+    "CurveError": {"message": "what", "axis": "x", "hint": "do"},
+    "DesyncError": {"message": "what", "hint": "do"},
+    "DeviceError": {"message": "what", "code": 7, "hint": "do"},
+    "IncompatibleDevice": {"message": "what", "code": 7, "hint": "do"},
+    "LocalProtocolError": {"message": "what", "hint": "do"},
+    "MissingExtra": {"message": "what", "hint": "do"},
+    "OpenError": {"message": "what", "port": "/dev/x", "hint": "do"},
+    "ProtocolError": {"message": "what", "hint": "do"},
+    "RemoteProtocolError": {"message": "what", "section": "7", "offset": 3, "raw": b""},
+    "SceneError": {"message": "what", "path": "$.x", "hint": "do"},
+    "TransportClosed": {"message": "what", "hint": "do"},
+    "TransportError": {"message": "what", "hint": "do"},
+    "TransportTimeout": {"message": "what", "hint": "do"},
+    "VoxDisplayError": {"message": "what", "hint": "do"},
+}  # fmt: skip
+# Made by the package, plain records, an enumeration, or abstract: users do not call them.
+RECORDS = {"Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "Receipt", "Report",
+           "Scene", "Sequence"}  # fmt: skip
+CALLS["Segment"] = dict(zip(inspect.signature(vd.Segment).parameters, POINTS, strict=False))
+
+
+def test_every_public_name_is_called():
+    assert set(CALLS) | RECORDS == set(vd.__all__)
+
+
+@cache
+def raise_lines(path):
+    """Lines of a source file that belong to ``raise`` statements."""
+    tree = ast.parse(Path(path).read_text(encoding="utf-8"))
+    return {
+        line
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Raise)
+        for line in range(node.lineno, node.end_lineno + 1)
+    }
+
+
+def assert_raised_on_purpose(error, what):
+    """The error comes from a ``raise`` statement of the package, or from the call itself."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    if Path(frame.filename) == Path(__file__):
+        assert isinstance(error, TypeError), f"{what}: {error!r}"
+        assert "argument" in str(error)
+        return
+    inside = PACKAGE in Path(frame.filename).parents
+    assert inside, f"{what}: {type(error).__name__} {error} from {frame.filename}:{frame.lineno}"
+    assert frame.lineno in raise_lines(frame.filename), (
+        f"{what}: {type(error).__name__} {error} at {frame.filename}:{frame.lineno}: {frame.line}"
+    )
+    assert isinstance(error, TypeError | ValueError | OSError | vd.VoxDisplayError)
+    assert str(error).isprintable() or "\n" in str(error)
+
+
+def call(what, function, arguments):
+    try:
+        result = function(**arguments)
+    except Exception as error:  # noqa: BLE001 - any is judged
+        assert_raised_on_purpose(error, what)
+        return None
+    return result
+
+
+def replaced(arguments):
+    """The arguments with each in turn of every wrong kind."""
+    for name, kind in itertools.product(arguments, WRONG):
+        yield f"{name} = {kind}", arguments | {name: WRONG[kind]}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_functions_and_classes(name):
+    function = getattr(vd, name)
+    for what, arguments in replaced(CALLS[name]):
+        result = call(f"{name}({what})", function, arguments)
+        if isinstance(result, vd.Display):
+            result.close()
+        elif isinstance(result, vd.Curve | vd.Frame | vd.Scene | vd.VoxDisplayError):
+            assert isinstance(repr(result), str)
+
+
+def drawn_frame():
+    frame = vd.Frame((3, 5, 7), "rgb888")
+    frame.draw([(1, 2, 3), (1, 3, 4)], "red")
+    return frame
+
+
+METHODS = {
+    "Frame.draw": {"drawable": [(1, 2, 3)], "color": "red", "fit": "contain"},
+    "Frame.draw_all": {"items": [(WRONG["curve"], "red")]},
+    "Frame.set": {"array": np.zeros((7, 5, 3, 3), dtype=np.uint8)},
+    "Frame.save": {"path": "x.html"},
+    "Frame.payloads": {"max_payload": 64, "features": ()},
+    "Frame.difference": {"base": vd.Frame((3, 5, 7)), "max_payload": 64, "features": ()},
+    "Frame.changed_indices": {"base": vd.Frame((3, 5, 7))},
+    "Grid.parse": {"text": "3x5x7"},
+    "Grid.of": {"sides": (3, 5, 7)},
+    "Scene.fitted": {"grid": (3, 5, 7), "mode": "contain"},
+    "Scene.draw_on": {"frame": vd.Frame((3, 5, 7)), "fit": "contain"},
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_methods(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    owner, method = name.split(".")
+    for what, arguments in replaced(METHODS[name]):
+        values = {"Frame": drawn_frame(), "Grid": vd.Grid, "Scene": vd.read_scene(SCENE)}
+        call(f"{name}({what})", getattr(values[owner], method), arguments)
+
+
+def test_methods_of_a_display():
+    with vd.open("sim:?size=3x5x7") as display:
+        frame = display.frame()
+        for function, arguments in {
+            display.frame: {"keep": False, "palette": None},
+            display.present: {"frame": frame, "wait": True},
+            display.read: {"back": False},
+            display.verify: {"frame": frame},
+        }.items():
+            for what, wrong in replaced(arguments):
+                call(f"{function.__qualname__}({what})", function, wrong)
+        frame.draw([(1, 2, 3)])
+        display.present(frame)
+        assert np.array_equal(display.read(), frame.array())
