@@ -178,7 +178,7 @@ def test_the_default_colour_is_white():
 )  # fmt: skip
 def test_draw_names_what_it_takes(what):
     with pytest.raises(
-        TypeError, match="drawable: a curve, a sequence, an .* or a scene is wanted, not"
+        TypeError, match=r"drawable: a curve, a sequence, an .* or a scene is wanted, not"
     ):
         Frame((3, 5, 7)).draw(what)
 
@@ -287,5 +287,5 @@ def test_a_grid_that_no_display_has(grid):
 @pytest.mark.parametrize("format_", ["rgb", "", None, 3, b"mono1"])
 def test_what_is_no_format(format_):
     kind = ValueError if isinstance(format_, str) else TypeError
-    with pytest.raises(kind, match="format: one of .*mono1.*index8.*rgb565.*rgb888.* is wanted"):
+    with pytest.raises(kind, match=r"format: one of .*mono1.*index8.*rgb565.*rgb888.* is wanted"):
         Frame((3, 5, 7), format_)
