@@ -1,7 +1,7 @@
-"""What a scene file may say: one Struct for each type of object, and the curve it means.
+"""Object types of scene files: one Struct for each, with its keys and the curve that it makes.
 
-The JSON Schema is derived from these. Knows the keys and their types; the values are checked by
-the curves. In angles, ``deg`` is a constant: ``"90*deg"``.
+Descriptions and types of the keys are those of the JSON Schema. Values are checked by the curves;
+it must not know files. In angles, ``deg`` is a constant: ``"90*deg"``.
 """
 
 from typing import Annotated, Literal, get_args
@@ -12,81 +12,62 @@ from msgspec import Meta, Struct, field
 from voxdisplay import curves
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.params import MAX_PARAMS
-from voxdisplay.expressions.parse import MAX_LENGTH
 from voxdisplay.scene.evaluation_context import EvaluationContext
+from voxdisplay.scene.values import (
+    Color,
+    Formula,
+    Number,
+    Numbers,
+    Range,
+    Size,
+    Vector,
+    Vectors,
+)
 
-MAX_SIDE = 65535
-
-# "expected" is what an error says of a value of another kind.
-Number = Annotated[
-    float | Annotated[str, Meta(max_length=MAX_LENGTH)],
-    Meta(
-        description="A number, or an expression in numbers, constants and the scene's params.",
-        extra={"expected": "a number or an expression"},
-    ),
+Center = Annotated[Vector, Meta(title="Centre", description="The centre [x, y, z], in voxels.")]
+Radius = Annotated[Number, Meta(title="Radius", description="The radius, in voxels.")]
+Normal = Annotated[
+    Vector,
+    Meta(title="Normal", description="Direction across the curve's plane, of any length."),
 ]
-Formula = Annotated[
-    float | Annotated[str, Meta(max_length=MAX_LENGTH)],
-    Meta(
-        description="An expression in t, numbers, constants and the scene's params.",
-        extra={"expected": "a number or an expression of t"},
-    ),
-]
-Vector = Annotated[
-    tuple[Number, Number, Number], Meta(extra={"expected": "three numbers [x, y, z]"})
-]
-Range = Annotated[tuple[Number, Number], Meta(extra={"expected": "two numbers [from, to]"})]
-Side = Annotated[
-    Annotated[float, Meta(ge=1, le=MAX_SIDE, multiple_of=1)]
-    | Annotated[str, Meta(max_length=MAX_LENGTH)],
-    Meta(extra={"expected": "a whole number or an expression"}),
-]
-Size = Annotated[
-    tuple[Side, Side, Side], Meta(extra={"expected": "three whole numbers [nx, ny, nz]"})
-]
-Channel = Annotated[int, Meta(ge=0, le=255)]
-OneColor = Annotated[
-    str | Channel | Annotated[list[Channel], Meta(min_length=3, max_length=3)],
-    Meta(extra={"expected": "a colour"}),
-]
-Color = Annotated[
-    str | Annotated[list[OneColor], Meta(min_length=1)],
-    Meta(
-        description="#rgb, #rrggbb, a CSS colour name or [red, green, blue], 0 to 255; or a list "
-        "of colours, spread along the curve. Three whole numbers are one colour.",
-        extra={"expected": "a colour or a list of colours"},
-    ),
-]
+Axis = Annotated[Vector, Meta(title="Axis", description="Direction of the axis, of any length.")]
 
 
 class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """What all objects can say."""
+    """Keys of all object types."""
 
     color: Color = "white"
-    closed: bool | None = None
+    closed: Annotated[
+        bool | None,
+        Meta(
+            title="Closed",
+            description="Whether the end is joined to the beginning. When left out, it is found "
+            "from the end points.",
+        ),
+    ] = None
 
     def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
-        """Make the object's curves; raise SceneError or CurveError."""
+        """Return the object's curves; raise SceneError or CurveError."""
         return [self.build_curve(context)]
 
     def build_curve(self, context: EvaluationContext) -> curves.Curve:
-        """Make the curve of an object that has one; raise SceneError or CurveError."""
+        """Return the curve of an object that has one; raise SceneError or CurveError."""
         raise NotImplementedError
 
 
 class Parametric(SceneObject, tag="parametric", frozen=True):
     """A curve given by three expressions of t, a <= t <= b, and optionally their derivatives."""
 
-    x: Formula
-    y: Formula
-    z: Formula
-    t: Range
-    dx: Formula | None = None
-    dy: Formula | None = None
-    dz: Formula | None = None
+    x: Annotated[Formula, Meta(title="x of t", description="The coordinate x, in voxels.")]
+    y: Annotated[Formula, Meta(title="y of t", description="The coordinate y, in voxels.")]
+    z: Annotated[Formula, Meta(title="z of t", description="The coordinate z, in voxels.")]
+    t: Annotated[Range, Meta(title="Range of t", description="First and last value of t.")]
+    dx: Annotated[Formula | None, Meta(title="dx/dt", description="Derivative of x by t.")] = None
+    dy: Annotated[Formula | None, Meta(title="dy/dt", description="Derivative of y by t.")] = None
+    dz: Annotated[Formula | None, Meta(title="dz/dt", description="Derivative of z by t.")] = None
 
     def build_curve(self, context: EvaluationContext) -> curves.Parametric:
-        """Make the curve."""
+        """Return the curve."""
         x, y, z = (context.formula(key, getattr(self, key)) for key in ("x", "y", "z"))
         dx, dy, dz = (
             None if source is None else context.formula(key, source)
@@ -99,11 +80,13 @@ class Parametric(SceneObject, tag="parametric", frozen=True):
 class Segment(SceneObject, tag="segment", frozen=True):
     """A straight line."""
 
-    start: Vector = field(name="from")
-    end: Vector = field(name="to")
+    start: Annotated[Vector, Meta(title="From", description="The first point.")] = field(
+        name="from"
+    )
+    end: Annotated[Vector, Meta(title="To", description="The last point.")] = field(name="to")
 
     def build_curve(self, context: EvaluationContext) -> curves.Segment:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Segment(
             context.numbers("from", self.start), context.numbers("to", self.end), closed=self.closed
         )
@@ -112,10 +95,10 @@ class Segment(SceneObject, tag="segment", frozen=True):
 class Polyline(SceneObject, tag="polyline", frozen=True):
     """Straight lines from point to point, and back to the first if closed is true."""
 
-    points: list[Vector]
+    points: Annotated[Vectors, Meta(description="The corners [x, y, z], two or more.")]
 
     def build_curve(self, context: EvaluationContext) -> curves.Polyline:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Polyline(context.points("points", self.points), closed=self.closed)
 
 
@@ -125,14 +108,14 @@ class Arc(SceneObject, tag="arc", frozen=True):
     With the normal [0, 0, 1], angle 0 is +x and "90*deg" is +y.
     """
 
-    center: Vector
-    radius: Number
-    start: Number
-    end: Number
-    normal: Vector = (0.0, 0.0, 1.0)
+    center: Center
+    radius: Radius
+    start: Annotated[Number, Meta(title="Start", description="Angle of the start, in radians.")]
+    end: Annotated[Number, Meta(title="End", description="Angle of the end, in radians.")]
+    normal: Normal = (0.0, 0.0, 1.0)
 
     def build_curve(self, context: EvaluationContext) -> curves.Arc:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Arc(
             context.numbers("center", self.center),
             context.number("radius", self.radius),
@@ -146,12 +129,12 @@ class Arc(SceneObject, tag="arc", frozen=True):
 class Circle(SceneObject, tag="circle", frozen=True):
     """A circle in the plane across normal."""
 
-    center: Vector
-    radius: Number
-    normal: Vector = (0.0, 0.0, 1.0)
+    center: Center
+    radius: Radius
+    normal: Normal = (0.0, 0.0, 1.0)
 
     def build_curve(self, context: EvaluationContext) -> curves.Circle:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Circle(
             context.numbers("center", self.center),
             context.number("radius", self.radius),
@@ -163,11 +146,18 @@ class Circle(SceneObject, tag="circle", frozen=True):
 class Ellipse(SceneObject, tag="ellipse", frozen=True):
     """An ellipse, of two half axes: vectors from its center."""
 
-    center: Vector
-    axes: tuple[Vector, Vector]
+    center: Center
+    axes: Annotated[
+        tuple[Vector, Vector],
+        Meta(
+            title="Half axes",
+            description="Two vectors from the centre to the ellipse, at right angles.",
+            extra={"expected": "two vectors [[x, y, z], [x, y, z]]"},
+        ),
+    ]
 
     def build_curve(self, context: EvaluationContext) -> curves.Ellipse:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Ellipse(
             context.numbers("center", self.center),
             context.points("axes", self.axes),
@@ -178,15 +168,22 @@ class Ellipse(SceneObject, tag="ellipse", frozen=True):
 class Helix(SceneObject, tag="helix", frozen=True):
     """A helix: begins beside center at the angle start, and advances by pitch in each turn."""
 
-    center: Vector
-    radius: Number
-    pitch: Number
-    turns: Number
-    axis: Vector = (0.0, 0.0, 1.0)
-    start: Number = 0.0
+    center: Annotated[Vector, Meta(title="Centre", description="The axis begins here.")]
+    radius: Radius
+    pitch: Annotated[
+        Number,
+        Meta(title="Pitch", description="Advance in one turn, in voxels; it may be negative."),
+    ]
+    turns: Annotated[
+        Number, Meta(title="Turns", description="How many turns, not only whole ones.")
+    ]
+    axis: Axis = (0.0, 0.0, 1.0)
+    start: Annotated[Number, Meta(title="Start", description="Angle of the start, in radians.")] = (
+        0.0
+    )
 
     def build_curve(self, context: EvaluationContext) -> curves.Helix:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Helix(
             context.numbers("center", self.center),
             context.number("radius", self.radius),
@@ -201,13 +198,19 @@ class Helix(SceneObject, tag="helix", frozen=True):
 class Lissajous(SceneObject, tag="lissajous", frozen=True):
     """center + amplitude * sin(frequency * t + phase), 0 <= t <= tau, for x, y and z."""
 
-    center: Vector
-    amplitude: Vector
-    frequency: Vector
-    phase: Vector = (0.0, 0.0, 0.0)
+    center: Center
+    amplitude: Annotated[
+        Vector, Meta(title="Amplitude", description="Amplitudes in x, y and z, in voxels.")
+    ]
+    frequency: Annotated[
+        Vector, Meta(title="Frequency", description="Oscillations in x, y and z for t = 0 to tau.")
+    ]
+    phase: Annotated[
+        Vector, Meta(title="Phase", description="Phases in x, y and z at t = 0, in radians.")
+    ] = (0.0, 0.0, 0.0)
 
     def build_curve(self, context: EvaluationContext) -> curves.Lissajous:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Lissajous(
             context.numbers("center", self.center),
             context.numbers("amplitude", self.amplitude),
@@ -223,15 +226,20 @@ class TorusKnot(SceneObject, tag="torus_knot", frozen=True):
     major is the radius of the middle circle of the torus, minor that of its tube.
     """
 
-    p: Number
-    q: Number
-    center: Vector
-    major: Number
-    minor: Number
-    axis: Vector = (0.0, 0.0, 1.0)
+    p: Annotated[Number, Meta(title="p", description="How often around the axis; whole.")]
+    q: Annotated[Number, Meta(title="q", description="How often around the tube; whole.")]
+    center: Center
+    major: Annotated[
+        Number,
+        Meta(title="Major radius", description="Radius of the torus's middle circle, in voxels."),
+    ]
+    minor: Annotated[
+        Number, Meta(title="Minor radius", description="Radius of the torus's tube, in voxels.")
+    ]
+    axis: Axis = (0.0, 0.0, 1.0)
 
     def build_curve(self, context: EvaluationContext) -> curves.TorusKnot:
-        """Make the curve."""
+        """Return the curve."""
         return curves.TorusKnot(
             context.number("p", self.p),
             context.number("q", self.q),
@@ -246,23 +254,31 @@ class TorusKnot(SceneObject, tag="torus_knot", frozen=True):
 class Bezier(SceneObject, tag="bezier", frozen=True):
     """A Bezier curve; its degree is one less than its control points."""
 
-    points: list[Vector]
+    points: Annotated[Vectors, Meta(description="The control points [x, y, z].")]
 
     def build_curve(self, context: EvaluationContext) -> curves.Bezier:
-        """Make the curve."""
+        """Return the curve."""
         return curves.Bezier(context.points("points", self.points), closed=self.closed)
 
 
 class BSpline(SceneObject, tag="bspline", frozen=True):
     """A B-spline; with weights, a NURBS curve. There is one knot for each point, and degree + 1."""
 
-    points: list[Vector]
-    degree: Number = 3.0
-    knots: list[Number] | None = None
-    weights: list[Number] | None = None
+    points: Annotated[Vectors, Meta(description="The control points [x, y, z].")]
+    degree: Annotated[
+        Number, Meta(title="Degree", description="Degree of the polynomials; 3 is cubic.")
+    ] = 3.0
+    knots: Annotated[
+        Numbers | None,
+        Meta(title="Knots", description="The knots, ascending; when left out, evenly spaced."),
+    ] = None
+    weights: Annotated[
+        Numbers | None,
+        Meta(title="Weights", description="One weight for each point: a NURBS curve."),
+    ] = None
 
     def build_curve(self, context: EvaluationContext) -> curves.BSpline:
-        """Make the curve."""
+        """Return the curve."""
         return curves.BSpline(
             context.points("points", self.points),
             context.number("degree", self.degree),
@@ -275,10 +291,10 @@ class BSpline(SceneObject, tag="bspline", frozen=True):
 class CatmullRom(SceneObject, tag="catmull_rom", frozen=True):
     """A smooth curve through points, and on to the first if closed is true."""
 
-    points: list[Vector]
+    points: Annotated[Vectors, Meta(description="Points [x, y, z] that the curve passes through.")]
 
     def build_curve(self, context: EvaluationContext) -> curves.CatmullRom:
-        """Make the curve."""
+        """Return the curve."""
         return curves.CatmullRom(context.points("points", self.points), closed=self.closed)
 
 
@@ -289,12 +305,28 @@ class Points(SceneObject, tag="points", frozen=True):
     shape (n, 3). With "gaps": "split", rows that are empty or not finite split it into strands.
     """
 
-    points: list[Vector] | None = None
-    file: str | None = None
-    gaps: Literal["split"] | None = None
+    points: Annotated[
+        Vectors | None,
+        Meta(title="Points", description="The points [x, y, z], in place of a file."),
+    ] = None
+    file: Annotated[
+        str | None,
+        Meta(
+            title="File",
+            description="Path of a file of points, relative to the scene's folder and inside it.",
+        ),
+    ] = None
+    gaps: Annotated[
+        Literal["split"] | None,
+        Meta(
+            title="Gaps",
+            description="split: rows of the file that are empty or not finite separate strands. "
+            "When left out, they are errors.",
+        ),
+    ] = None
 
     def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
-        """Make one curve for each strand."""
+        """Return one curve for each strand."""
         if self.points is not None and self.file is None:
             if self.gaps:
                 raise CurveError("the key 'gaps' belongs to the key 'file'")
@@ -326,12 +358,35 @@ TYPES = {str(scene_object.__struct_config__.tag): scene_object for scene_object 
 
 
 class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """A scene: objects, in the order in which they are drawn.
+    """A scene: objects in drawing order.
 
     Coordinates are in voxels: voxel (i, j, k) is the cube [i, i+1) x [j, j+1) x [k, k+1).
     """
 
-    objects: list[Object]
-    size: Size | None = None
-    params: Annotated[dict[str, Number], Meta(max_length=MAX_PARAMS)] = {}
-    schema: str = field(name="$schema", default="")
+    objects: Annotated[
+        list[Object],
+        Meta(
+            title="Objects",
+            description="What is shown, in drawing order.",
+            extra={"expected": "a list of objects [{...}, ...]"},
+        ),
+    ]
+    size: Annotated[
+        Size | None,
+        Meta(
+            title="Size",
+            description="The volume [nx, ny, nz] that the scene was composed for, in voxels. When "
+            "left out, it is the display's own; on a display of another size the scene is scaled.",
+        ),
+    ] = None
+    params: Annotated[
+        dict[str, Number],
+        Meta(
+            max_length=MAX_PARAMS,
+            title="Params",
+            description="Names for numbers and expressions, which all expressions may use.",
+        ),
+    ] = {}
+    schema: Annotated[
+        str, Meta(title="Schema", description="Address of this schema, for editors.")
+    ] = field(name="$schema", default="")

@@ -25,7 +25,8 @@ from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.mismatch import described, find_mismatch
 from voxdisplay.scene.model import Scene, SceneItem
-from voxdisplay.scene.objects import MAX_SIDE, TYPES, Object, SceneFile, SceneObject
+from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
+from voxdisplay.scene.values import MAX_SIDE
 
 MAX_BYTES = 16 << 20
 """Largest scene file. Long lists of points fit better in a file of their own."""

@@ -1,10 +1,14 @@
-"""JSON Schema of scene files, generated from the Structs of `objects`.
+"""JSON Schema of scene files, generated from the annotations of `objects`.
 
 It is published as ``voxdisplay/scene.schema.json``, for editors; reading a scene does not use it.
 ``python -m voxdisplay.scene.schema > voxdisplay/scene.schema.json`` renews it.
 
 msgspec can generate a schema too, but its text depends on its version. Here each part is made
 from the annotations alone, so that every version of every dependency gives the same file.
+
+A mistake must be answered by what is wrong, not by "not valid under any of the given schemas": no
+part has anyOf or oneOf. Object types are told apart by if and then, and values of several JSON
+types have a list of types. No text stands beside $ref, where editors overlook it.
 """
 
 from __future__ import annotations
@@ -13,14 +17,25 @@ import inspect
 import json
 import sys
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
-from voxdisplay.scene.objects import TYPES, Color, Formula, Number, Object, SceneFile, Vector
+from voxdisplay.scene.mismatch import field_types
+from voxdisplay.scene.objects import TYPES, SceneFile
+from voxdisplay.scene.values import Color, Formula, Number, OneColor, Side, Vector
+
+ID = "urn:voxdisplay:scene"
 
 # Parts that recur, and are written once.
-_SHARED = {"Number": Number, "Vector": Vector, "Formula": Formula, "Color": Color}
+_SHARED = {
+    "Number": Number,
+    "Vector": Vector,
+    "Formula": Formula,
+    "Side": Side,
+    "OneColor": OneColor,
+    "Color": Color,
+}
 _SCALARS = {
     bool: {"type": "boolean"},
     int: {"type": "integer"},
@@ -35,21 +50,33 @@ _LIMITS = {
     "min_length": {"string": "minLength", "array": "minItems", "object": "minProperties"},
     "max_length": {"string": "maxLength", "array": "maxItems", "object": "maxProperties"},
 }
+_TYPE_KEY = {
+    "title": "Type",
+    "description": "The type of the object, which says what other keys it has.",
+    "type": "string",
+}
+_SCHEMA_KEY = field_types(SceneFile)["$schema"]
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema: of a scene if there is a key ``objects``, else of one object."""
-    structs = {"SceneFile": SceneFile} | {kind.__name__: kind for kind in TYPES.values()}
+    """Return the JSON Schema: of one object if there is a key ``type``, else of a scene."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": ID,
         "title": "voxdisplay scene",
+        "description": "A scene of curves for a volumetric display, or one object.",
         "type": "object",
-        # Not anyOf, which would answer a mistake with the complaints of every type.
-        "if": {"required": ["objects"]},
-        "then": _reference("SceneFile"),
-        "else": _part(Object),
-        "$defs": {name: _part(kind, named=False) for name, kind in _SHARED.items()}
-        | {name: _struct(kind) for name, kind in structs.items()},
+        # Offered by editors where a file has neither key yet.
+        "properties": {"type": _TYPE_KEY | {"enum": list(TYPES)}},
+        "if": {"required": ["type"], "not": {"required": ["objects"]}},
+        "then": _reference("Object"),
+        "else": _reference("Scene"),
+        "$defs": {
+            "Scene": _struct(SceneFile),
+            "Object": _object(),
+            **{name: _part(kind, refer=False) for name, kind in _SHARED.items()},
+            **{kind.__name__: _struct(kind) for kind in TYPES.values()},
+        },
     }
 
 
@@ -57,23 +84,45 @@ def _reference(name: str) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{name}"}
 
 
+def _object() -> dict[str, Any]:
+    """Return the schema of an object of any type, with a branch for each type."""
+    return {
+        "title": "Object",
+        "description": "One object of a scene.",
+        "type": "object",
+        "properties": {"type": _TYPE_KEY | {"enum": list(TYPES)}},
+        "required": ["type"],
+        "allOf": [
+            {
+                "if": {"properties": {"type": {"const": tag}}, "required": ["type"]},
+                "then": _reference(kind.__name__),
+            }
+            for tag, kind in TYPES.items()
+        ],
+    }
+
+
 def _struct(kind: type[msgspec.Struct]) -> dict[str, Any]:
     """Return the schema of the objects that a Struct is made of."""
-    hints = get_type_hints(kind, include_extras=True)
-    fields = msgspec.structs.fields(kind)
+    kinds = field_types(kind)
     tag = kind.__struct_config__.tag
-    properties = {"type": {"enum": [tag]}} if tag else {}
+    title = str(tag).replace("_", " ").capitalize() if tag else "Scene"
+    properties: dict[str, Any] = {"type": _TYPE_KEY | {"const": tag}} if tag else {}
     required = ["type"] if tag else []
-    for field in fields:
-        part = _part(hints[field.name])
+    for field in msgspec.structs.fields(kind):
+        part = _part(kinds[field.encode_name])
         if field.required:
             required.append(field.encode_name)
         else:
             made = field.default is msgspec.NODEFAULT
-            part["default"] = field.default_factory() if made else field.default
+            default = field.default_factory() if made else field.default
+            if default:  # an editor would insert null, {} or ""
+                part["default"] = default
         properties[field.encode_name] = part
+    if tag:  # a file of one object may have the key, too
+        properties["$schema"] = _part(_SCHEMA_KEY)
     return {
-        "title": kind.__name__,
+        "title": title,
         "description": inspect.cleandoc(kind.__doc__ or ""),
         "type": "object",
         "properties": properties,
@@ -82,61 +131,62 @@ def _struct(kind: type[msgspec.Struct]) -> dict[str, Any]:
     }
 
 
-def _part(kind: Any, *, named: bool = True) -> dict[str, Any]:
+def _part(kind: Any, *, refer: bool = True) -> dict[str, Any]:
     """Return the schema of the values that an annotation allows."""
-    if named:
-        for name, shared in _SHARED.items():
-            if kind == shared:
-                return _reference(name)
+    if get_origin(kind) is Annotated:
+        name = next((name for name, shared in _SHARED.items() if kind == shared), None)
+        if name and refer:
+            return _reference(name)
+        return _described(_part(get_args(kind)[0]), kind.__metadata__)
     if kind in _SCALARS:
         return dict(_SCALARS[kind])
-    arguments = get_args(kind)
-    origin = get_origin(kind)
-    if origin is None:
-        return _reference(kind.__name__)
-    if origin is Annotated:
-        return _limited(_part(arguments[0]), kind.__metadata__)
+    origin, arguments = get_origin(kind), get_args(kind)
     if origin in {Union, UnionType}:
         return _union(arguments)
-    return _container(origin, arguments)
-
-
-def _container(origin: Any, arguments: tuple[Any, ...]) -> dict[str, Any]:
     if origin is list:
         return {"type": "array", "items": _part(arguments[0])}
-    if origin is tuple:
-        return {
-            "type": "array",
-            "minItems": len(arguments),
-            "maxItems": len(arguments),
-            "prefixItems": [_part(each) for each in arguments],
-            "items": False,
-        }
-    if origin is Literal:
-        return {"enum": list(arguments)}
+    if origin is tuple and len(set(arguments)) == 1:
+        count = len(arguments)
+        return {"type": "array", "items": _part(arguments[0])} | dict.fromkeys(
+            ("minItems", "maxItems"), count
+        )
     if origin is dict:
         return {"type": "object", "additionalProperties": _part(arguments[1])}
-    raise TypeError(f"no schema for {origin}")
+    if origin is Literal:
+        return {"type": "string", "enum": list(arguments)}
+    raise TypeError(f"no schema for {kind}")
 
 
 def _union(kinds: tuple[Any, ...]) -> dict[str, Any]:
-    parts: dict[str, Any] = {"anyOf": [_part(kind) for kind in kinds]}
+    """Return one schema of several JSON types, whose other keywords do not clash."""
     if set(kinds) <= set(TYPES.values()):
-        mapping = {tag: _reference(kind.__name__)["$ref"] for tag, kind in TYPES.items()}
-        parts["discriminator"] = {"propertyName": "type", "mapping": mapping}
-    return parts
+        # Only the object that is the file may have the key $schema.
+        return {"allOf": [_reference("Object"), {"properties": {"$schema": False}}]}
+    merged: dict[str, Any] = {"type": []}
+    for kind in kinds:
+        part = _part(kind, refer=False)
+        types = part.pop("type")
+        merged["type"] += types if isinstance(types, list) else [types]
+        if "enum" in merged and part == {}:
+            merged["enum"] = [*merged["enum"], None]
+        if merged.keys() & (part.keys() - {"title", "description"}):
+            raise TypeError(f"{kinds} have limits that clash")
+        merged |= part
+    return merged
 
 
-def _limited(part: dict[str, Any], metadata: tuple[msgspec.Meta, ...]) -> dict[str, Any]:
-    """Add the limits and the text of annotations."""
+def _described(part: dict[str, Any], metadata: tuple[msgspec.Meta, ...]) -> dict[str, Any]:
+    """Add the titles, descriptions and limits of annotations; the last title counts."""
+    text: dict[str, Any] = {}
     for meta in metadata:
-        if meta.description:
-            part["description"] = meta.description
+        text |= {"title": meta.title} if meta.title else {}
+        text |= {"description": meta.description} if meta.description else {}
         for limit, keywords in _LIMITS.items():
             value = getattr(meta, limit)
             if value is not None:
                 part[keywords.get("*") or keywords[part["type"]]] = value
-    return part
+    part = {key: value for key, value in part.items() if key not in text}
+    return text | part
 
 
 def text() -> str:

@@ -201,7 +201,12 @@ class TestMistakes:
             ([], "$", "not an empty list", "several objects"),
             (3, "$", "an object {...}, not the number 3", None),
             (None, "$", "not null", None),
-            ({"objects": {}}, "$.objects", "expected a list [...], found an object", None),
+            (
+                {"objects": {}},
+                "$.objects",
+                "expected a list of objects [{...}, ...], found an object",
+                None,
+            ),
             (
                 {"objects": [3]},
                 "$.objects[0]",
@@ -408,6 +413,59 @@ class TestSchema:
     def test_what_is_refused_is_invalid(self, data: Any) -> None:
         assert not self.VALIDATOR.is_valid(data)
         refused(data)
+
+    @pytest.mark.parametrize(
+        ("data", "path", "message"),
+        [
+            (SEGMENT | {"colour": "red"}, "$", "'colour' was unexpected"),
+            (
+                {"objects": [SEGMENT, SEGMENT | {"colr": 1}]},
+                "$.objects[1]",
+                "'colr' was unexpected",
+            ),
+            (SEGMENT | {"to": [1, 2, True]}, "$.to[2]", "True is not of type 'number', 'string'"),
+            (SEGMENT | {"to": [1, 2]}, "$.to", "[1, 2] is too short"),
+            (SEGMENT | {"closed": 1}, "$.closed", "1 is not of type 'boolean', 'null'"),
+            (SEGMENT | {"color": ["red", [1, 2]]}, "$.color[1]", "[1, 2] is too short"),
+            (SEGMENT | {"type": "segmnt"}, "$.type", "'segmnt' is not one of ['parametric'"),
+            ({"objects": [{"type": "cube"}]}, "$.objects[0].type", "'cube' is not one of"),
+            ({"objects": [{"from": [1, 2, 3]}]}, "$.objects[0]", "'type' is a required property"),
+            ({"type": "segment", "from": [1, 2, 3]}, "$", "'to' is a required property"),
+            ({"type": "points", "gaps": "x"}, "$.gaps", "'x' is not one of ['split'"),
+            ({"objects": [], "size": 64}, "$.size", "64 is not of type 'array', 'null'"),
+            ({"objects": [], "size": [1, 2, 0.5]}, "$.size[2]", "0.5"),
+            ({}, "$", "'objects' is a required property"),
+            ([], "$", "[] is not of type 'object'"),
+            ({"objects": [SEGMENT | {"$schema": "s"}]}, "$.objects[0]", "does not allow 's'"),
+        ],
+    )
+    def test_a_validator_reports_the_mistake_itself(
+        self, data: Any, path: str, message: str
+    ) -> None:
+        error = jsonschema.exceptions.best_match(self.VALIDATOR.iter_errors(data))
+        assert error is not None
+        assert error.json_path == path
+        assert message in error.message
+
+    def test_no_part_has_alternatives(self) -> None:
+        assert not any(f'"{word}"' in self.PUBLISHED for word in ("anyOf", "oneOf"))
+
+    def test_every_type_and_key_has_a_title_and_a_description(self) -> None:
+        published = json.loads(self.PUBLISHED)
+        assert published["$id"]
+        for name, part in published["$defs"].items():
+            assert part["title"], name
+            assert part["description"], name
+            for key, value in part.get("properties", {}).items():
+                found = value
+                while "$ref" in found:
+                    assert set(found) <= {"$ref", "default"}, "editors overlook other text"
+                    found = published["$defs"][found["$ref"].rpartition("/")[2]]
+                assert found["title"], (name, key)
+                assert found["description"], (name, key)
+
+    def test_files_of_one_object_may_name_the_schema(self) -> None:
+        self.VALIDATOR.validate(SEGMENT | {"$schema": "scene.schema.json"})
 
     def test_every_curve_has_a_type(self) -> None:
         kinds = {type(scene_of(scene_object).items[0].curve) for scene_object in ONE_OF_EACH}
