@@ -115,6 +115,7 @@ def test_files_that_cannot_be_read(run, tmp_path):
         (["push", "x", "--reconnect", "inf"], ["--reconnect"]),
         (["voxelize", PAPER, "-o", "x.obj"], [".npy"]),
         (["voxelize", PAPER, "--clip", "0x5x7"], ["128x128x128"]),
+        (["plan", PAPER, "--size", "99999x9x9"], ["--size", "65535"]),
         (["voxelize", PAPER, "-o", "/nowhere/x.csv"], ["/nowhere/x.csv"]),
         (["voxelize", PAPER, "--pitch", "0.5"], ["--pitch", "--method march"]),
         (["voxelize", PAPER, "--reach", "0.5"], ["--reach", "--method march"]),

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import document
 import pytest
@@ -183,6 +184,14 @@ def test_a_file_that_is_not_there(tmp_path):
         said = annotate(path)
         assert said.returncode == 2
         assert str(path) in said.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no /dev/zero")
+def test_a_line_without_an_end_is_refused():
+    """More than the longest line is not read: memory would be filled by it."""
+    said = annotate("/dev/zero")
+    assert said.returncode == 2
+    assert "/dev/zero, line 1" in said.stderr
 
 
 def test_text_of_a_device_does_not_steer_the_terminal(tmp_path, captured):

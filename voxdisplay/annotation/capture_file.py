@@ -15,6 +15,7 @@ from voxdisplay.transport.capture import VERSION
 
 HOST: Final = "host"
 DEVICE: Final = "device"
+_MAX_LINE: Final = 1 << 24  # characters; a longer line is not JSON any more
 
 
 class CaptureError(ValueError):
@@ -81,7 +82,7 @@ def read_portions(path: Path) -> Iterator[Portion]:
     with path.open(encoding="utf-8") as file:
         number = 0
         try:
-            for number, line in enumerate(file, 1):
+            for number, line in enumerate(iter(lambda: file.readline(_MAX_LINE), ""), 1):
                 entry = json.loads(line)
                 if number == 1 or "voxdisplay_capture" in entry:
                     _check_version(path, entry["voxdisplay_capture"])

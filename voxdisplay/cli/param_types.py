@@ -32,6 +32,7 @@ PIXEL_FORMATS: Final = ("mono1", "index8", "rgb565", "rgb888")
 # The keys of voxdisplay.view.save.WRITERS, which is not imported for them.
 IMAGE_SUFFIXES: Final = (".png", ".gif", ".mp4", ".html")
 _MIN_SIDE_PX, _MAX_SIDE_PX = 16, 4096
+_MAX_SIDE: Final = 0xFFFF  # voxels, protocol.md, section 2
 
 
 class RangeType(ParamType[float]):
@@ -125,10 +126,13 @@ class SizeType(ParamType["Grid"]):
         if isinstance(value, Grid):
             return value
         try:
-            return Grid.parse(str(value))
+            grid = Grid.parse(str(value))
         except ValueError as error:
             is_two = re.fullmatch(r"[0-9]+[x,][0-9]+", str(value))
             self.fail(str(error) + (self._for_two if is_two else ""), param, ctx)
+        if max(grid) > _MAX_SIDE:
+            self.fail(f"{value!r} is too large: sides are 1 to {_MAX_SIDE} voxels", param, ctx)
+        return grid
 
 
 class PixelSizeType(ParamType[tuple[int, int]]):
