@@ -33,6 +33,13 @@ frame.draw(np.zeros((4, 3), dtype=int), np.zeros((4, 3), dtype=np.uint8))
 frame.save(Path("x.png"))
 with vd.open("sim:") as display:
     assert_type(display, vd.Display)
+    assert_type(display.present(frame), vd.Receipt)
+    assert_type(display.present(frame, wait=True).elapsed_s, float)
+    display.present(frame, wait=False)
+    for wait in (True, False):
+        assert_type(display.present(frame, wait=wait), vd.Receipt | None)
+vd.open()
+vd.open(Path("/dev/ttyUSB0"), no_reset=True).close(flush=False)
 """
 MISTAKES = """\
 import voxdisplay as vd
@@ -41,6 +48,8 @@ vd.Cirle((5, 5, 5), 3)
 vd.Frame((3, 5, 7)).drow([(1, 2, 3)])
 vd.Frame((3, 5, 7)).draw([(1, 2, 3)], color=3)
 vd.voxelize()
+vd.open().present(vd.Frame((3, 5, 7)), wait=False).elapsed_s
+vd.open(3)
 """
 
 

@@ -74,7 +74,8 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
         whole_number("baud", baud, 1, _MAX_BAUD)
     timeout_s, reconnect_s = duration("timeout_s", timeout_s), duration("reconnect_s", reconnect_s)
     no_reset = flag("no_reset", no_reset)
-    note_or_not = function("note", note) or (lambda _text: None)
+    function("note", note)
+    note_or_not = _ignore if note is None else note  # a callable may be falsy
     if capture is not None and not callable(getattr(capture, "write", None)):
         raise wrong_kind("capture", "a text file or None", capture)
 
@@ -88,7 +89,7 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
             if reconnect_s:
                 rate = getattr(transport, "baud", DEFAULT_BAUD)
                 reconnector = Reconnector(
-                    transport.port, reconnect_s, baud=rate, note=note, reset=not no_reset
+                    transport.port, reconnect_s, baud=rate, note=note_or_not, reset=not no_reset
                 )
             return Display(
                 transport,
@@ -105,6 +106,10 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     if reconnect_s and isinstance(opened, str):
         return open_when_available(attempt, reconnect_s, note_or_not)
     return attempt()
+
+
+def _ignore(text: str) -> None:
+    del text
 
 
 def _as_port(port: Any) -> str | Transport:

@@ -21,7 +21,7 @@ from voxdisplay.display.connection import Clock, Connection
 from voxdisplay.display.device_info import DeviceInfo
 from voxdisplay.display.fair_lock import FairLock
 from voxdisplay.display.operations import Operations, Progress
-from voxdisplay.display.receipt import Receipt, describe_difference
+from voxdisplay.display.receipt import Receipt, count_noun, describe_difference
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import (
     DesyncError,
@@ -83,8 +83,8 @@ class Display:
 
     def __repr__(self) -> str:
         """Return it in one line: ``<Display sim: 128x128x128 rgb888, 3 frames shown>``."""
-        info, frames = self.info, self._operations.queue.frames
-        state = "closed" if self._connection.closed else f"{frames} frames shown"
+        info, shown = self.info, count_noun(self._operations.queue.frames, "frame")
+        state = "closed" if self._connection.closed else f"{shown} shown"
         name = f" {info.name!r}" if info.name else ""
         return f"<Display {self.port}{name} {info.grid} {info.format.value}, {state}>"
 
@@ -379,7 +379,7 @@ class Display:
         except VoxDisplayError as error:
             reason = str(error)
         text = f"the last frame was not shown before {self.port} was closed: {reason}"
-        if self._note:
+        if self._note is not None:
             self._note(text)
         else:
             warnings.warn(text, RuntimeWarning, stacklevel=4)

@@ -47,12 +47,18 @@ class Receipt:
 
     def __repr__(self) -> str:
         """Return it in one line: ``<Receipt of frame 3: 168 voxels, 412 bytes, 12.3 ms, ...>``."""
-        parts = [f"{self.voxels} voxels", f"{self.wire_bytes} bytes in {self.packets} packets"]
+        parts = [count_noun(self.voxels, "voxel")]
+        parts += [f"{count_noun(self.wire_bytes, 'byte')} in {count_noun(self.packets, 'packet')}"]
         parts += [f"{1000 * self.elapsed_s:.1f} ms"]
         parts += [f"{self.retransmitted} retransmitted"] if self.retransmitted else []
         parts += ["no digest" if self.digest is None else f"digest {self.digest:08x}"]
         parts += ["repaired"] if self.repaired else []
         return f"<Receipt of frame {self.frame}: {', '.join(parts)}>"
+
+
+def count_noun(count: int, noun: str) -> str:
+    """Return a count with its noun: "1 voxel", "2 voxels"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def describe_wrong_digest(digest: int, expected: int) -> str:

@@ -114,13 +114,13 @@ class Reconnector:
         within_s: float,
         *,
         baud: int = 115200,
-        note: Callable[[str], None] | None = None,
+        note: Callable[[str], None] = lambda _text: None,
         reset: bool = True,
     ) -> None:
         self._port = port
         self._within_s = within_s
         self._baud = baud
-        self._note = note or (lambda _text: None)
+        self._note = note
         self._reset = reset
         self._found = find_port(port)  # known as long as the device is there
         self._lost_s: float | None = None
