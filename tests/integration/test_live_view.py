@@ -124,7 +124,7 @@ def middle(picture):
     return (columns * light).sum() / total, (rows * light).sum() / total
 
 
-BARE = "show.box = show.glow = false, forget(), pointer = null"
+BARE = "show.box = show.glow = false, hideProbe(), pointer = null"
 
 
 # -- what is drawn
@@ -138,10 +138,13 @@ def test_a_voxel_lies_where_the_camera_says(renderer, tab, tmp_path):
         exported(tmp_path, [page_of(v) for v in voxels]) + f"?r={renderer}", width=860, height=400
     )
     page.wait(f"painted && history.length === {len(voxels)}")
-    page.run(f"run(false), {BARE}")
-    assert page.run("renderer.constructor.name") == {"2d": "Adder", "gl": "Pipeline"}[renderer]
+    page.run(f"setPlaying(false), {BARE}")
+    assert (
+        page.run("renderer.constructor.name")
+        == {"2d": "CpuRenderer", "gl": "GpuRenderer"}[renderer]
+    )
     for number, voxel in enumerate(voxels):
-        page.run(f"go({number})")
+        page.run(f"seek({number})")
         picture = page.canvas()
         height, width = picture.shape[:2]
         x, y, scale = Camera().project([np.array(voxel) + 0.5], SIZE, (width, height))
@@ -154,8 +157,8 @@ def test_the_page_projects_as_the_camera_does(tab, tmp_path):
     page.wait("painted")
     points = np.random.default_rng(5).uniform(0, 7, (20, 3))
     for yaw, pitch, distance in ((0.3, -0.2, 1.5), (2.0, 1.1, 4.0), (-3.0, 0.0, 9.0)):
-        page.run(f"look({{yaw: {yaw}, pitch: {pitch}, distance: {distance}}})")
-        got = page.run(f"{points.tolist()}.map(p => project(p, lens([3, 5, 7], 640, 480)))")
+        page.run(f"setCamera({{yaw: {yaw}, pitch: {pitch}, distance: {distance}}})")
+        got = page.run(f"{points.tolist()}.map(p => project(p, projection([3, 5, 7], 640, 480)))")
         want = Camera(yaw, pitch, distance).project(points, SIZE, (640, 480))
         assert np.allclose(np.array(got).T, want)
 
@@ -224,7 +227,7 @@ def test_a_picture_that_is_not_what_the_device_says_is_marked(tab, live):
     show(display, (1, 2, 3))
     page = tab(url)
     page.wait("current()?.n")
-    page.run("current().positions[0][0] = 2, current().proved = null, tell()")
+    page.run("current().positions[0][0] = 2, current().proved = null, updateStatus()")
     assert "✗" in page.run("$('fact-Digest').textContent")
 
 
@@ -245,11 +248,11 @@ def test_frames_are_kept_and_stepped_through(tab, live):
     page.key(".")
     assert page.run("current().number") == first + 3
     page.key("Home")
-    assert page.run("at") == 0
+    assert page.run("cursor") == 0
     page.key("End")
-    page.wait(f"running && current().number === {first + 5}")
+    page.wait(f"playing && current().number === {first + 5}")
     page.run("$('scrub').value = 1, $('scrub').dispatchEvent(new Event('input'))")
-    assert page.run("!running && at === 1")
+    assert page.run("!playing && cursor === 1")
 
 
 def test_two_browsers_of_which_one_never_paints(tab, live):
@@ -385,18 +388,18 @@ def test_view_reads_a_display_back(tab, emulator):
 def test_keys_do_what_they_say(tab, tmp_path):
     page = tab(exported(tmp_path, [page_of((0, 0, 0), (1, 2, 3), (2, 4, 6))]))
     page.wait("painted")
-    before = page.run("({...eye})")
+    before = page.run("({...camera})")
     page.key("ArrowRight")
     page.key("ArrowUp")
     page.key("ArrowLeft", shift=True)
     page.key("+")
-    after = page.run("({...eye})")
+    after = page.run("({...camera})")
     assert after["yaw"] > before["yaw"]
     assert after["pitch"] > before["pitch"]
     assert after["x"] < 0
     assert after["distance"] < before["distance"]
     page.key("0")
-    assert page.run("({...eye})") == before
+    assert page.run("({...camera})") == before
     for key, axis in (("x", 0), ("y", 1), ("z", 2)):
         page.key(key)
         assert page.run(f"slices[{axis}]") == [SIZE[axis] // 2] * 2
@@ -408,7 +411,7 @@ def test_keys_do_what_they_say(tab, tmp_path):
     page.key("b")
     assert page.run("[show.glow, show.box, $('glow').ariaPressed]") == [False, False, "false"]
     page.key("v")
-    assert "x 1  y 2  z 3" in page.run("$('said').textContent")
+    assert "x 1  y 2  z 3" in page.run("$('announcement').textContent")
     page.run("$('scrub').focus()")
     page.key("b")
     assert page.run("show.box") is False  # letters belong to what has the focus
@@ -422,7 +425,7 @@ def test_a_slice_is_all_that_is_drawn(tab, tmp_path):
             exported(tmp_path, [page_of((0, 0, 0), (1, 2, 3), (2, 4, 6))]) + f"?r={renderer}"
         )
         page.wait("painted")
-        page.run(f"{BARE}, slice(2, 6, 6)")
+        page.run(f"{BARE}, setSlice(2, 6, 6)")
         picture = page.canvas()
         x, y, _ = Camera().project([(2.5, 4.5, 6.5)], SIZE, picture.shape[1::-1])
         assert middle(picture) == pytest.approx((x[0], y[0]), abs=2)
@@ -439,13 +442,13 @@ def test_the_pointer_turns_moves_zooms_and_names_voxels(tab, tmp_path):
     page.mouse("mouseMoved", rim[0] + 5, rim[1] + 5)
     page.wait("$('probe').hidden")
     for button, held, changed in (("left", 1, "yaw"), ("right", 2, "x")):
-        before = page.run("({...eye})")
+        before = page.run("({...camera})")
         page.mouse("mousePressed", 300, 300, button=button, buttons=held, clickCount=1)
         page.mouse("mouseMoved", 340, 320, button=button, buttons=held)
         page.mouse("mouseReleased", 340, 320, button=button, clickCount=1)
-        assert page.run("({...eye})")[changed] > before[changed]
+        assert page.run("({...camera})")[changed] > before[changed]
     page.mouse("mouseWheel", 300, 300, deltaX=0, deltaY=-200)
-    page.wait("eye.distance < START.distance")
+    page.wait("camera.distance < START.distance")
 
 
 def test_fingers_turn_and_pinch(tab, tmp_path):
@@ -461,11 +464,11 @@ def test_fingers_turn_and_pinch(tab, tmp_path):
     touch("touchStart", (100, 200))
     touch("touchMove", (140, 200))
     touch("touchEnd")
-    assert page.run("eye.yaw - START.yaw") == pytest.approx(0.32)
+    assert page.run("camera.yaw - START.yaw") == pytest.approx(0.32)
     touch("touchStart", (150, 200), (210, 200))
     touch("touchMove", (120, 200), (240, 200))
     touch("touchEnd")
-    assert page.run("eye.distance") < 1.5
+    assert page.run("camera.distance") < 1.5
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
@@ -487,14 +490,14 @@ def test_an_exported_page_plays_and_asks_for_nothing(tab, tmp_path):
     pages = [page_of((0, 0, number)) for number in range(5)]
     url = exported(tmp_path, pages, title="a </script><b>&")
     page = tab(url)
-    page.wait("painted > 3 && at > 1")
+    page.wait("painted > 3 && cursor > 1")
     assert page.run("[history.length, document.title]") == [5, "a </script><b>&"]
     assert page.requests == [url]
     still = tab(url, motion="reduce")
     still.wait("history.length === 5")
-    assert still.run("running") is False
+    assert still.run("playing") is False
     still.key(".")
-    assert still.run("at") == 1
+    assert still.run("cursor") == 1
 
 
 def test_a_picture_and_a_film_are_kept(tab, tmp_path):
