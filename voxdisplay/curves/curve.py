@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ class Curve(ABC):
     closed: bool | None = None
     family: Hashable = None
     point_count: int | None = None
-    _arguments: Mapping[str, object] = {}
+    _arguments: Mapping[str, object] = MappingProxyType({})
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)

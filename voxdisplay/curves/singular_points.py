@@ -66,7 +66,7 @@ class SingularPoint:
     jump: bool = False
 
     def __str__(self) -> str:
-        drawn = "jumps there" if self.jump else "is drawn through, as both sides meet"
+        drawn = "jumps there" if self.jump else "is drawn with its limit there"
         return f"{self.axis} has no value at t = {self.t!r}, and {drawn}"
 
 

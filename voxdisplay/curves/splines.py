@@ -1,6 +1,6 @@
-"""Smooth curves through or along given points: Bezier, B-spline (and NURBS), Catmull-Rom.
+"""Splines: Bezier curve, B-spline (and NURBS), Catmull-Rom spline. Knows formulas only.
 
-All have exact derivatives and enclosures. Points are (n, 3) arrays, in voxels. Knows formulas only.
+All have exact derivatives and enclosures. Points are (n, 3) arrays, in voxels.
 """
 
 from __future__ import annotations
@@ -104,12 +104,14 @@ class BSpline(Curve):
     points : (n, 3) array
         The control points, n > degree.
     degree : int, optional
-    knots : (n + degree + 1,) array, optional
-        Not descending; t runs from ``knots[degree]`` to ``knots[n]``. A knot inside that range
-        may stand ``degree`` times at most, so that the curve has no gap. Default: 0, 1, 2, ... with
-        the ends repeated, so that the curve begins at the first point and ends at the last.
+    knots : (n + degree + 1,) or (n + degree - 1,) array, optional
+        Not descending; t runs from ``knots[degree]`` to ``knots[n]``. Two less are taken as CAD
+        programs write them, without the first and the last, which have no influence. A knot inside
+        the range that stands ``degree + 1`` times makes the curve jump, unless the two control
+        points that meet there are the same. Default: 0, 1, 2, ... with the ends repeated, so that
+        the curve begins at the first point and ends at the last.
     weights : (n,) array, optional
-        Positive. Default: all alike.
+        Not negative; a control point of weight 0 has no influence. Default: all alike.
     closed : bool, optional
         True without knots: the curve is periodic, as smooth where it closes as anywhere.
 
@@ -134,8 +136,16 @@ class BSpline(Curve):
         _check_degree("degree", p)
         control = arguments.points("points", points, least=p + 1)
         self._rational = weights is not None
+        self._arguments = {
+            "points": control,
+            "degree": p,
+            "knots": knots,
+            "weights": weights,
+            "closed": closed,
+        }
         if weights is not None:
-            control = _weighted(control, weights)
+            control = _homogeneous(control, weights)
+            self.always_defined = bool((control[:, 3] > 0).all())
         if knots is None and closed:
             control = np.concatenate((control, control[:p]))
             self._knots = np.arange(-p, len(control) + 1.0)
@@ -147,6 +157,8 @@ class BSpline(Curve):
         self._points = control
         n = len(control)
         self.t_range = (float(self._knots[p]), float(self._knots[n]))
+        if not self.always_defined:
+            _check_spans(control[:, 3], self._knots, p)
         values, counts = np.unique(self._knots[p + 1 : n], return_counts=True)
         self.breaks = values[counts >= p]
         # The derivative is a B-spline too, of one degree less. Where its denominator is 0, it has
@@ -162,7 +174,7 @@ class BSpline(Curve):
 
     @np.errstate(all="ignore")
     def derivative(self, t: Floats) -> Floats:
-        """Give dP/dt at t, (n,), as a (3, n) float64 array; at a kink, of what comes after it."""
+        """Return dP/dt at t, (n,), as a (3, n) float64 array; at a kink, of the side after it."""
         slopes = _de_boor(self._slopes, self._knots[1:-1], self._degree - 1, t)
         if not self._rational:
             return slopes
@@ -188,35 +200,65 @@ class BSpline(Curve):
         return box.lo, box.hi
 
 
-def _weighted(points: Floats, weights: ArrayLike) -> Floats:
-    """Give homogeneous coordinates, (n, 4): x w, y w, z w, w."""
+def _homogeneous(points: Floats, weights: ArrayLike) -> Floats:
+    """Return homogeneous coordinates, (n, 4): x w, y w, z w, w."""
     factors = arguments.array("weights", weights, (len(points),))
-    if (factors <= 0).any():
-        raise arguments.ArgumentError("weights", f"must be positive, not {factors.min():g}")
+    if (factors < 0).any():
+        raise arguments.ArgumentError(
+            "weights",
+            f"must not be negative, as {factors.min():g}",
+            hint="a weight pulls the curve to its point; 0 takes the point out",
+        )
     return np.column_stack((points * factors[:, None], factors))
+
+
+def _check_spans(weights: Floats, knots: Floats, p: int) -> None:
+    """Raise ArgumentError if weights leave a curve without a point between two knots."""
+    n = len(weights)
+    for k in range(p, n):
+        if knots[k] < knots[k + 1] and not weights[k - p : k + 1].any():
+            raise arguments.ArgumentError(
+                "weights",
+                f"are 0 for all points from {k - p} to {k}, so that the curve has no point from "
+                f"t = {knots[k]:g} to {knots[k + 1]:g}",
+                hint="give one of these points a positive weight",
+            )
 
 
 def _checked_knots(knots: ArrayLike, n: int, p: int) -> Floats:
     values = arguments.array("knots", knots, (None,))
+    if len(values) == n + p - 1 and len(values):
+        values = np.concatenate((values[:1], values, values[-1:]))
     if len(values) != n + p + 1:
         raise arguments.ArgumentError(
-            "knots", f"are {len(values)}, not {n + p + 1}: {n} points + degree {p} + 1"
+            "knots",
+            f"are {len(values)}, not {n + p + 1}: {n} points + degree {p} + 1",
+            hint=f"write each knot as often as it counts; {n + p - 1} are taken, too, as of CAD "
+            "programs that leave out the first and the last",
         )
     if (np.diff(values) < 0).any():
         raise arguments.ArgumentError("knots", "must not descend")
     if values[p] == values[n]:
-        raise arguments.ArgumentError("knots", "leave no range for t")
+        raise arguments.ArgumentError(
+            "knots",
+            "leave no range for t",
+            hint=f"t runs from knot {p} to knot {n}, counted from 0, which are the same",
+        )
     inside = values[(values > values[p]) & (values < values[n])]
     often, counts = np.unique(inside, return_counts=True)
-    if (counts > p).any():
+    if (counts > p + 1).any():
+        worst = int(np.argmax(counts > p + 1))
         raise arguments.ArgumentError(
-            "knots", f"have {often[counts > p][0]:g} more than {p} times, which tears the curve"
+            "knots",
+            f"have {often[worst]:g} {counts[worst]} times, and {p + 1} is the most",
+            hint=f"leave out {counts[worst] - p - 1} of them and as many points, which have no "
+            "influence",
         )
     return values
 
 
 def _de_boor(points: Floats, knots: Floats, p: int, t: Floats) -> Floats:
-    """Evaluate a B-spline, (dimensions, n), by de Boor's algorithm, for all t at once."""
+    """Return points, (dimensions, n), of a B-spline at t, (n,), by de Boor's algorithm."""
     # The span of each t: the last k with knots[k] <= t < knots[k + 1]; at the end, the last one
     # that has a length.
     last = np.searchsorted(knots, knots[len(points)], side="left") - 1
@@ -252,6 +294,7 @@ class CatmullRom(Curve):
     def __init__(self, points: ArrayLike, *, closed: bool | None = None) -> None:
         self.closed = closed
         nodes = arguments.points("points", points, least=2)
+        self._arguments = {"points": nodes, "closed": closed}
         if closed:
             nodes = np.concatenate((nodes, nodes[:1]))
         nodes = nodes[np.r_[True, (np.diff(nodes, axis=0) != 0).any(axis=1)]]
@@ -311,7 +354,7 @@ class CatmullRom(Curve):
         return control_box(Interval(low, high), knots, t_lo, t_hi)
 
     def _span(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-        """Give, for each t, its two nodes, their slopes, their distance in t, the place between."""
+        """Return the two nodes around each t, their slopes, their distance in t, and its share."""
         i = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
         h = self._t[i + 1] - self._t[i]
         nodes, slopes = self._nodes.T, self._slopes.T
