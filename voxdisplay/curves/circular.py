@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+# Ranges of fewer radians are quickly sampled: they need no bound.
+_SHORT = 1e3
+
+
 class _Helical(Curve):
     """P(t) = center + cos(t) a + sin(t) b + t rise: uniform rotation and translation."""
 
@@ -44,6 +48,21 @@ class _Helical(Curve):
         self._center = arguments.vector("center", center)[:, None]
         self._a, self._b = a[:, None], b[:, None]
         self._rise = np.zeros((3, 1)) if rise is None else rise[:, None]
+
+    @property
+    def min_length(self) -> float:
+        """Lower bound of the length in max norm: the variation of the coordinate that varies most.
+
+        In each whole turn a_k cos t + b_k sin t varies by 4 hypot(a_k, b_k), and with a drift by
+        no less, because half a turn later its slope is the opposite.
+        """
+        length = self.t_range[1] - self.t_range[0]
+        if length < _SHORT:  # as most are; a bound of 0 is no worse for them
+            return 0.0
+        turns = np.floor(length / math.tau)
+        with np.errstate(all="ignore"):
+            variation = 4 * turns * np.hypot(self._a, self._b)
+            return float(np.maximum(variation, np.abs(self._rise) * length).max())
 
     @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:

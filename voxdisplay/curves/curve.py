@@ -80,6 +80,11 @@ class Curve(ABC):
         return None
 
     @property
+    def min_length(self) -> float:
+        """Lower bound of the length in max norm, in voxels; 0 if the formula has none."""
+        return 0.0
+
+    @property
     def always_defined(self) -> bool:
         """True if the formula has a value for every t: it divides by nothing that may be 0."""
         return False
@@ -156,4 +161,11 @@ class Curve(ABC):
         return None
 
 
-_OF_THE_FORMULA = ("degree", "always_defined", "thread_safe", "batch_evaluator", "enclosure")
+_OF_THE_FORMULA = (
+    "min_length",
+    "degree",
+    "always_defined",
+    "thread_safe",
+    "batch_evaluator",
+    "enclosure",
+)

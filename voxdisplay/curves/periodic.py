@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+# Lower frequencies are quickly sampled: they need no bound.
+_SLOW = 100.0
+
+
 class Lissajous(Curve):
     """P(t) = center + amplitude * sin(frequency * t + phase), 0 <= t <= 2 pi.
 
@@ -51,6 +55,7 @@ class Lissajous(Curve):
         self._center = arguments.vector("center", center)[:, None]
         self._amplitude = arguments.vector("amplitude", amplitude)[:, None]
         self._frequency = arguments.vector("frequency", frequency)[:, None]
+        self._fastest = max(map(abs, self._frequency[:, 0].tolist()))
         self._phase = arguments.vector("phase", phase)[:, None]
         self._arguments = {
             "center": self._center[:, 0],
@@ -59,6 +64,15 @@ class Lissajous(Curve):
             "phase": self._phase[:, 0],
             "closed": closed,
         }
+
+    @property
+    def min_length(self) -> float:
+        """Lower bound of the length in max norm: 4 amplitudes for each whole period of an axis."""
+        if self._fastest < _SLOW:
+            return 0.0
+        with np.errstate(all="ignore"):
+            periods = np.floor(np.abs(self._frequency))
+            return float((4 * np.abs(self._amplitude) * periods).max())
 
     @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
@@ -130,6 +144,12 @@ class TorusKnot(Curve):
             "minor": minor,
             "axis": axis,
         }
+
+    @property
+    def min_length(self) -> float:
+        """Lower bound of the length in max norm: |P'| is at least that along either circle."""
+        longest = max(abs(self._p) * self._major, abs(self._q) * self._minor)
+        return math.tau * longest / math.sqrt(3)
 
     @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:

@@ -118,6 +118,11 @@ class CompletedCurve(Curve):
         self._arguments = {"curve": curve, "singular_points": self.singular_points}
 
     @property
+    def min_length(self) -> float:
+        """`Curve.min_length` of the curve inside."""
+        return self.curve.min_length
+
+    @property
     def thread_safe(self) -> bool:
         """`Curve.thread_safe` of the curve inside."""
         return self.curve.thread_safe

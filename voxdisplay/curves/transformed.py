@@ -49,6 +49,11 @@ class Transformed(Curve):
         return self.curve.degree
 
     @property
+    def min_length(self) -> float:
+        """`Curve.min_length` of the curve inside, scaled."""
+        return self.scale * self.curve.min_length
+
+    @property
     def always_defined(self) -> bool:
         """`Curve.always_defined` of the curve inside."""
         return self.curve.always_defined

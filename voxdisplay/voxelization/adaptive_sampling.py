@@ -16,10 +16,13 @@ from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.curves.curve import NO_BREAKS
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.curve_batch import AXES, CurveBatch, Samples
+from voxdisplay.voxelization.length_estimate import estimated_min_length
 
 # More than this is no picture on a display (256^3 has 17 million voxels in all) but a mistake.
 MAX_VOXELS = 10_000_000
 MAX_SAMPLES = 4_000_000
+# From so many samples of a curve on, its length is estimated before it gets more.
+MANY_SAMPLES = 1 << 13
 # A knot interval may be this long (voxels, along its longest axis) and bend this far off its
 # chord (voxels). No guarantee rests on these: they only decide how small a feature is seen.
 MAX_CHORD = 3.0
@@ -83,10 +86,13 @@ def sample_adaptively(batch: CurveBatch) -> Samples:
 
 def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
     """Split steps of samples, one piece for each curve, as far as `knots` says."""
+    estimated: set[int] = set()
     while True:
         parts, chord = subdivision_counts(samples, batch.resolution)
         if not (parts > 1).any():
             return samples
+        if parts.sum() > MANY_SAMPLES:
+            _check_estimates(batch, samples, parts, estimated)
         _check_limits(batch, samples, parts, chord)
         samples = batch.subdivide(samples, parts)
 
@@ -111,6 +117,7 @@ def limit_chords(batch: CurveBatch, samples: Samples, longest: float) -> Samples
 
 def initial_samples(batch: CurveBatch) -> Samples:
     """Sample curves, one piece for each, before anything is known of them."""
+    check_lengths(batch)
     degrees = batch.degrees
     index = np.arange(len(degrees))
     if degrees.count(degrees[0]) == len(degrees):  # as most often, and it takes half the time
@@ -170,6 +177,35 @@ def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floa
     return parts, chord
 
 
+def _check_estimates(batch: CurveBatch, samples: Samples, parts: Ints, estimated: set[int]) -> None:
+    """Stop at curves that look too long as soon as they need many samples; each once."""
+    count = np.add.reduceat(parts * samples.joined, samples.bounds[:-1])
+    for index in np.flatnonzero(count > MANY_SAMPLES).tolist():
+        if index not in estimated:
+            estimated.add(index)
+            length, step = estimated_min_length(batch.curves[index])
+            if length > MAX_VOXELS and step < MIN_JUMP / 2:
+                raise _roughness_error(batch, index)
+            if length > MAX_VOXELS:
+                raise _length_error(batch, index, length)
+
+
+def check_lengths(batch: CurveBatch) -> None:
+    """Raise CurveError if a curve is too long by the bound that its formula has."""
+    lengths = batch.min_lengths
+    if max(lengths) > MAX_VOXELS:
+        index = int(np.argmax(np.array(lengths) > MAX_VOXELS))
+        raise _length_error(batch, index, lengths[index])
+
+
+def _length_error(batch: CurveBatch, index: int, length: float) -> CurveError:
+    return CurveError(
+        f"{batch.message_prefix(index)}the curve is too long: "
+        f"{length:.3g} voxels at least, and {MAX_VOXELS} is the limit",
+        hint="shorten the range of t, scale the curve down, or slow its oscillation",
+    )
+
+
 def _check_limits(batch: CurveBatch, samples: Samples, parts: Ints, chord: Floats) -> None:
     """Stop before the work gets out of hand: ``parts`` is what comes next."""
     if parts.sum() <= MAX_SAMPLES // 16 and chord.sum() <= MAX_VOXELS:
@@ -190,11 +226,7 @@ def _check_limits(batch: CurveBatch, samples: Samples, parts: Ints, chord: Float
     if chord[worst] > max(0.1 * length[index], 1e3):
         raise _divergence_error(batch, index, samples, worst)
     if length[index] > MAX_VOXELS:
-        raise CurveError(
-            f"{batch.message_prefix(index)}the curve is too long: "
-            f"{length[index]:.3g} voxels at least, and {MAX_VOXELS} is the limit",
-            hint="shorten the range of t, scale the curve down, or slow its oscillation",
-        )
+        raise _length_error(batch, index, float(length[index]))
     raise _roughness_error(batch, index)
 
 

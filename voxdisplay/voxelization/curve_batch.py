@@ -140,6 +140,11 @@ class CurveBatch:
         return all(self._evaluator.map_curves(attrgetter("thread_safe")))
 
     @property
+    def min_lengths(self) -> list[float]:
+        """`Curve.min_length` of each curve."""
+        return [curve.min_length for curve in self.curves]
+
+    @property
     def degrees(self) -> list[int | None]:
         """Those of the curves, see `Curve.degree`."""
         return self._evaluator.map_curves(attrgetter("degree"))

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.singular_points import complete
 from voxdisplay.voxelization.index_ranges import expand_ranges
+from voxdisplay.voxelization.length_estimate import estimated_min_length
 from voxdisplay.voxelization.spatial_hash import COLUMNS, SpatialHash
 
 Voxels = NDArray[np.integer]
@@ -22,6 +24,8 @@ SEGMENT = 0.5
 SAG = 0.01
 # No distance is looked for along a polyline of more segments than this.
 MAX_SEGMENTS = 50_000_000
+# No more samples than this, for a sequence of no voxels and for each voxel, are spent on SAG.
+MIN_SAG_SAMPLES, SAG_SAMPLES_PER_VOXEL = 1 << 15, 256
 # A candidate segment may be this much further away than the nearest, and hold the nearest point.
 SLACK = 4 * SAG
 GOLDEN = (5**0.5 - 1) / 2
@@ -176,8 +180,9 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
         of a fine polyline, then a golden-section search on the curve itself.
 
     """
+    curve = complete(curve)
     centres = np.asarray(voxels, dtype=float).T + 0.5
-    t, begin, solid = _polyline(curve, hints)
+    t, begin, solid = _polyline(curve, _sag_budget(voxels), hints)
     after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
     t_end, end = t[after], begin[:, after]
     middle = (begin + end) / 2
@@ -220,8 +225,9 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     """
     if not len(voxels):
         return float("inf")
+    curve = complete(curve)
     centres = np.asarray(voxels, dtype=float).T + 0.5
-    _, points, _ = _polyline(curve)
+    _, points, _ = _polyline(curve, _sag_budget(voxels))
     best = np.full(points.shape[1], np.inf)
     todo = np.arange(best.size)
     size = 1.5
@@ -236,8 +242,23 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     return float(best.max())
 
 
-def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats, Bools]:
+def _sag_budget(voxels: Voxels) -> int:
+    """Return how many samples of a curve may be spent on its bends between voxels this many."""
+    return MIN_SAG_SAMPLES + SAG_SAMPLES_PER_VOXEL * len(voxels)
+
+
+def _polyline(
+    curve: Curve, budget: int, hints: Floats | None = None
+) -> tuple[Floats, Floats, Bools]:
     """Sample a curve finely, and at any hints.
+
+    Parameters
+    ----------
+    curve : Curve
+    budget : int
+        With more samples than this, segments are split for their length alone: a curve whose
+        formula is noise at every scale bends however short they are.
+    hints : (n,) float64 array, optional
 
     Returns
     -------
@@ -255,6 +276,7 @@ def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats
     t = t[(t >= first) & (t <= last)]
     points = _position(curve, t)
     settled = np.zeros(t.size - 1, dtype=bool)
+    unchecked = MIN_SAG_SAMPLES
     while not settled.all():
         index = np.flatnonzero(~settled)
         middle = (t[index] + t[index + 1]) / 2
@@ -262,14 +284,17 @@ def _polyline(curve: Curve, hints: Floats | None = None) -> tuple[Floats, Floats
         length = points[:, index + 1] - points[:, index]
         sag = there - (points[:, index] + points[:, index + 1]) / 2
         fine = (length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT
-        fine &= (sag * sag).sum(axis=0) <= SAG * SAG
+        if t.size <= budget:
+            fine &= (sag * sag).sum(axis=0) <= SAG * SAG
         fine |= t[index + 1] - t[index] < resolution
         t = np.insert(t, index + 1, middle)
         points = np.insert(points, index + 1, there, axis=1)
         settled = np.insert(settled, index, fine)
         settled[index + np.arange(1, index.size + 1)] = fine
-        if t.size > MAX_SEGMENTS:
-            raise ValueError("the curve is too long or too rough to measure distances from it")
+        if t.size > unchecked:
+            unchecked = MAX_SEGMENTS
+            if t.size > MAX_SEGMENTS or estimated_min_length(curve)[0] > MAX_SEGMENTS * SEGMENT:
+                raise ValueError("the curve is too long or too rough to measure distances from it")
     length = np.diff(points, axis=1)
     return t, points, np.asarray((length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT)
 

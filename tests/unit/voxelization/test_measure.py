@@ -134,7 +134,7 @@ def test_own_figures_of_a_marched_curve() -> None:
 
 
 def test_a_curve_without_points_is_not_measured() -> None:
-    with pytest.raises(ValueError, match=r"no point at t = 0\.0"):
+    with pytest.raises(ValueError, match=r"z = -inf at t = 0\.0 is not finite"):
         measure.distances(np.zeros((1, 3), dtype=int), Function(lambda t: (t, t, np.log(t))))
 
 
