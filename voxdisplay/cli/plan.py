@@ -94,7 +94,7 @@ def plan_command(
     grid, kind, receiver = loaded.size or vd.Grid(128, 128, 128), "rgb888", Receiver()
     if port:
         info, baud = _ask(port, baud)
-        grid, kind, receiver = info.grid, info.format.value, Receiver.of(info)
+        grid, kind, receiver = info.grid, info.format.value, Receiver.of_device(info)
     elif baud == "auto":
         raise click.UsageError("--baud auto finds the rate of a display: name its --port")
     if features is not None:
@@ -102,7 +102,7 @@ def plan_command(
     own = "palette" in receiver.features
     frame = vd.Frame(size or grid, format_ or kind, own_palette=own)
     draw_scene(fit_scene(loaded, frame.grid, fit), frame)
-    lines = (Line.serial(baud),) if baud else COMMON_LINES
+    lines = (Line.of_baud(baud),) if baud else COMMON_LINES
     plans = [plan(frame, line, receiver) for line in lines]
     if as_json:
         print_json(_facts(frame, plans))

@@ -142,7 +142,7 @@ class _CheckResult:
         self.differing_voxels += int((differs.any(axis=-1) if differs.ndim == 4 else differs).sum())
         for finding in compare_axes(meant, page, step.axes):
             before = self._axes.get(finding.axis)
-            if before is None or before.right is None or finding.right is False:
+            if before is None or before.correct is None or finding.correct is False:
                 self._axes[finding.axis] = finding
 
     @property
@@ -156,7 +156,7 @@ class _CheckResult:
             "right": self.right,
             "differing_voxels": self.differing_voxels,
             "axes": {
-                axis: {"right": finding.right, "shown": finding.shown}
+                axis: {"right": finding.correct, "shown": finding.found}
                 for axis, finding in self._axes.items()
             },
         }
@@ -174,17 +174,17 @@ class _CheckResult:
 
 
 def _verdict(finding: AxisFinding) -> str:
-    if finding.right is None:
+    if finding.correct is None:
         return "unknown: on this display the pattern looks the same either way"
-    if finding.right:
+    if finding.correct:
         return "yes"
-    if finding.shown is None:
+    if finding.found is None:
         return "no: what was read back is no pattern that is swapped or mirrored"
     how = [
-        *(["swapped"] if finding.axis not in finding.shown else []),
-        *(["mirrored"] if finding.shown.startswith("-") else []),
+        *(["swapped"] if finding.axis not in finding.found else []),
+        *(["mirrored"] if finding.found.startswith("-") else []),
     ]
-    return f"no: {' and '.join(how)}, it is shown along {finding.shown}"
+    return f"no: {' and '.join(how)}, it is shown along {finding.found}"
 
 
 def _show(

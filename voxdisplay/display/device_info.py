@@ -1,4 +1,4 @@
-"""What a device says of itself, and what it refuses, in a user's words. Knows no link."""
+"""`DeviceInfo` from INFO, and `DeviceError` from ERROR. Must not know the link."""
 
 from __future__ import annotations
 
@@ -20,24 +20,27 @@ _CODES = {
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What a display says of itself.
+    """Properties that a display has announced.
 
     Attributes
     ----------
     grid : Grid
-        Its shape.
+        Shape of its volume.
     format : PixelFormat
     protocol : str
         Version, such as ``"1.0"``.
     name, firmware, serial : str
+        Printable texts; empty where it has none.
     refresh_hz : float
         Refresh ticks per second; 0: it shows a frame at once.
-    max_payload_bytes, rx_buffer_bytes : int
-        Longest payload of a packet; room for what is on its way.
+    max_payload_bytes : int
+        Longest payload of a packet.
+    rx_buffer_bytes : int
+        Size of its receive buffer.
     features : tuple of str
-        What it announced, in lower case.
+        Announced features (protocol.md, section 5), in lower case.
     boot : int
-        Another number after each start of the device.
+        Boot id: another after each start of the device.
 
     """
 
@@ -55,12 +58,12 @@ class DeviceInfo:
 
 
 def device_info(info: Info) -> DeviceInfo:
-    """Read an INFO.
+    """Return the properties in an INFO.
 
     Raises
     ------
     IncompatibleDevice
-        If it is of another protocol major, or has a pixel format we do not know.
+        If it is of another protocol major, or has an unknown pixel format.
 
     """
     if info.major != spec.VERSION_MAJOR:
@@ -91,12 +94,12 @@ def device_info(info: Info) -> DeviceInfo:
 
 
 def check_compatible(before: DeviceInfo, now: DeviceInfo) -> None:
-    """Check that what was made for a device suits what is there now.
+    """Raise if frames that were made for a device do not suit the one that is there now.
 
     Raises
     ------
     IncompatibleDevice
-        If it has another grid or format, or does not take all that the other took.
+        If its grid or format differs, or it lacks a feature or room that the other had.
 
     """
     if (now.grid, now.format) != (before.grid, before.format):
@@ -111,11 +114,11 @@ def check_compatible(before: DeviceInfo, now: DeviceInfo) -> None:
 
 
 def device_error(error: Error) -> DeviceError:
-    """Give what is raised for an ERROR."""
+    """Return the error for an ERROR packet."""
     name = _CODES.get(error.code, "an unknown code")
     text = f": {printable(error.text)}" if error.text else ""
     return DeviceError(
         f"the device refused a packet: {name} ({error.code}) at byte {error.offset}{text}",
         code=error.code,
-        hint="protocol.md, section 11, says what it means; driver or device has a fault",
+        hint="driver or device has a fault; protocol.md, section 11, explains the code",
     )

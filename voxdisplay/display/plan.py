@@ -1,7 +1,7 @@
-"""What a frame costs on the wire, before it is sent, and how many a second a line carries.
+"""Wire cost of a frame before it is sent, and frame rates by line.
 
-Everything is counted on the packets themselves, coded as they would be for such a line and such a
-device. Knows no port, no session, and no device but by what it announces.
+Counted on the packets themselves, encoded as they would be for the line and the device. Must not
+know ports or sessions; a device is what it announces.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _BITS_PER_BYTE: Final = 10  # a start bit, eight, a stop bit
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line, and what it carries each way at most.
+    """A line, and its capacity in each direction.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class Line:
     bytes_per_s: float
 
     @classmethod
-    def serial(cls, baud: int) -> Line:
-        """Give a serial line: 8 data bits, no parity, 1 stop bit."""
+    def of_baud(cls, baud: int) -> Line:
+        """Return a serial line of 8 data bits, no parity and 1 stop bit."""
         return cls(f"{baud} Bd", baud / _BITS_PER_BYTE)
 
 
@@ -55,21 +55,21 @@ USB_LINES: Final = (
     Line("USB full speed", 19 * 64 * 1000.0),
     Line("USB high speed", 13 * 512 * 8000.0),
 )
-COMMON_LINES: Final = (*map(Line.serial, COMMON_BAUDS), *USB_LINES)
+COMMON_LINES: Final = (*map(Line.of_baud, COMMON_BAUDS), *USB_LINES)
 
 
 @dataclass(frozen=True, slots=True)
 class Receiver:
-    """What a device announces, as far as frames are coded by it.
+    """Properties of a device that the encoding of frames depends on.
 
     Attributes
     ----------
     features : tuple of str
-        As in `DeviceInfo.features`; by default all that there are.
+        As in `DeviceInfo.features`; by default all.
     payload_bytes : int
-        The longest payload that it is sent while nothing has been lost.
+        Longest payload that is sent as long as nothing was lost.
     refresh_hz : float
-        How many frames a second it shows at most; 0: any number.
+        Refresh ticks, and so frames, per second; 0: no limit.
 
     """
 
@@ -78,15 +78,15 @@ class Receiver:
     refresh_hz: float = 0.0
 
     @classmethod
-    def of(cls, said: DeviceInfo) -> Self:
-        """Give the receiver that a device is."""
-        longest = clamp_payload(INITIAL_PAYLOAD, said.max_payload_bytes, said.rx_buffer_bytes)
-        return cls(said.features, longest, said.refresh_hz)
+    def of_device(cls, info: DeviceInfo) -> Self:
+        """Return the properties of a device."""
+        longest = clamp_payload(INITIAL_PAYLOAD, info.max_payload_bytes, info.rx_buffer_bytes)
+        return cls(info.features, longest, info.refresh_hz)
 
 
 @dataclass(frozen=True, slots=True)
 class OpCost:
-    """How often an op occurs, and how many bytes all of these have together."""
+    """Occurrences of an op, and the bytes of all of them."""
 
     count: int
     bytes: int
@@ -94,13 +94,13 @@ class OpCost:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What it takes to show a frame.
+    """Wire cost of one frame.
 
     Attributes
     ----------
     line : Line
     receiver : Receiver
-        What it was coded for.
+        What it was encoded for.
     voxels : int
         Lit voxels.
     packets : int
@@ -127,14 +127,14 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """How long the line is busy with the frame; both ways go at the same time."""
+        """Time for which the line is busy with the frame; both directions are used at once."""
         return max(self.wire_bytes, self.answer_bytes) / self.line.bytes_per_s
 
     @property
     def frames_per_s(self) -> float:
-        """How many such frames the line carries, one behind the other, and the device shows.
+        """Frame rate that the line and the refresh of the device allow, one frame after another.
 
-        That is as many as there could be: a device may take longer to draw them than to get them.
+        It is an upper limit: a device may take longer to draw a frame than to receive it.
         """
         carried = 1 / self.seconds
         most = self.receiver.refresh_hz
@@ -142,16 +142,16 @@ class Plan:
 
 
 def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
-    """Find what it takes to show a frame.
+    """Return the wire cost of a frame.
 
     Parameters
     ----------
     frame : Frame
         Of the display's grid and format.
     line : Line
-        What it is sent over. It is coded as the driver does when it knows that line.
+        The line. The frame is encoded as the driver does when it knows that line.
     receiver : Receiver
-        Who gets it.
+        The device.
 
     """
     longest, speed = receiver.payload_bytes, line.bytes_per_s
@@ -190,5 +190,5 @@ def _ack_bytes() -> int:
 
 
 def _op_order(name: str) -> int:
-    """Give the place of an op in the table of section 7: that of its value; unknown ones last."""
+    """Return the sort key of an op: its value, as in the table of section 7; unknown ones last."""
     return int(getattr(spec, f"OP_{name}", 256))

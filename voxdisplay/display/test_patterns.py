@@ -1,8 +1,8 @@
-"""Test patterns, and what a page that was read back says of a display's axes.
+"""Test patterns, and the check of a display's axes on a page that was read back.
 
-An axis that a device swaps with another or mirrors is seen at once: x is red and has one tick at
+An axis that a device mirrors or swaps with another is seen at once: x is red and has one tick at
 its far end, y green with two, z blue with three; a corner has the colours of the axes on whose far
-end it lies. Knows frames and pages, and no device.
+end it lies. Must not know devices.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class PatternFrame:
     ----------
     frame : Frame
     axes : str
-        Of which axes the frame, read back, can tell: letters of ``"xyz"``.
-    telling : bool
-        Whether it is worth reading back: of a marching plane, only some steps are.
+        Axes that can be checked on it: letters of ``"xyz"``.
+    verify : bool
+        Whether to read it back: of a marching plane, a few positions are enough.
 
     """
 
@@ -54,15 +54,16 @@ def pattern_frames(
     format: PixelFormat,  # noqa: A002 - the word of the command line
     brightness: float,
 ) -> Iterator[PatternFrame]:
-    """Give the frames of a pattern, one of `NAMES`, in order.
+    """Yield the frames of a pattern.
 
     Parameters
     ----------
     name : str
+        One of `NAMES`.
     grid : Grid
     format : PixelFormat
     brightness : float
-        0 to 1. A format that has nothing so dark gives its darkest light.
+        0 to 1. A format that has nothing so dark shows its darkest light.
 
     """
     paint = _Painter(grid, format, brightness)
@@ -74,8 +75,8 @@ def pattern_frames(
         case "plane":
             for axis, side in enumerate(grid):
                 for at in range(side):
-                    telling = at in {0, side // 2, side - 1}
-                    yield PatternFrame(paint.plane(axis, at), "xyz"[axis], telling)
+                    verify = at in {0, side // 2, side - 1}
+                    yield PatternFrame(paint.plane(axis, at), "xyz"[axis], verify)
         case _:
             yield PatternFrame(paint.all(), "")
 
@@ -90,13 +91,13 @@ def axes_with_ticks(grid: Grid) -> str:
 
 
 class _Painter:
-    """Makes frames of patterns."""
+    """Maker of the frames of one grid, format and brightness."""
 
     def __init__(self, grid: Grid, format_: PixelFormat, brightness: float) -> None:
         self._grid, self._format, self._brightness = grid, format_, brightness
 
     def _dimmed(self, color: tuple[int, int, int]) -> NDArray[np.uint8]:
-        """Give the colour, as dark as asked, but not dark: (1, 3)."""
+        """Return a colour, dimmed but not black, as a (1, 3) array."""
         share = self._brightness
         while True:
             dim = np.floor(np.array([color]) * share + 0.5).astype(np.uint8)
@@ -116,7 +117,7 @@ class _Painter:
         return frame
 
     def _ticks(self, axis: int) -> Iterator[Voxels]:
-        """Give one tick at the far end of x, two of y, three of z, across the axis."""
+        """Yield the ticks across an axis at its far end: one for x, two for y, three for z."""
         if "xyz"[axis] not in axes_with_ticks(self._grid):
             return
         across = 0 if axis == 2 else 2
@@ -141,24 +142,24 @@ class _Painter:
         return frame
 
     def plane(self, axis: int, at: int) -> Frame:
-        array = self._dark()
+        array = self._blank()
         where: list[slice | int] = [slice(None)] * 3
         where[2 - axis] = at
         array[tuple(where)] = self._pixel(AXIS_COLORS[axis])
-        return self._framed(array)
+        return self._frame_of(array)
 
     def all(self) -> Frame:
-        array = self._dark()
+        array = self._blank()
         array[...] = self._pixel(_WHITE)
-        return self._framed(array)
+        return self._frame_of(array)
 
-    def _dark(self) -> Pixels:
+    def _blank(self) -> Pixels:
         return np.zeros(self._format.shape(self._grid.array_shape), dtype=self._format.dtype)
 
     def _pixel(self, color: tuple[int, int, int]) -> Pixels:
         return np.asarray(self._format.pixels(self._format.nearest(self._dimmed(color)))[0])
 
-    def _framed(self, array: Pixels) -> Frame:
+    def _frame_of(self, array: Pixels) -> Frame:
         frame = Frame(self._grid, self._format)
         frame.set(array)
         return frame
@@ -166,62 +167,65 @@ class _Painter:
 
 @dataclass(frozen=True, slots=True)
 class AxisFinding:
-    """What a page says of one axis.
+    """Result of the check of one axis.
 
     Attributes
     ----------
     axis : str
         ``"x"``, ``"y"`` or ``"z"``.
-    right : bool or None
-        Whether what lies along the axis was found where it should be; None when the pattern would
-        look the same if it were not.
-    shown : str or None
-        Where it was found: ``"+x"`` is right, ``"-x"`` mirrored, ``"+y"`` swapped; None when the
-        page is no mirrored or swapped pattern.
+    correct : bool or None
+        Whether the axis is where it should be; None when the pattern would look the same if it
+        were not.
+    found : str or None
+        Where the axis was found: for x, ``"+x"`` is correct, ``"-x"`` mirrored, ``"+y"`` swapped;
+        None when the page is no mirrored or swapped pattern.
 
     """
 
     axis: str
-    right: bool | None
-    shown: str | None
+    correct: bool | None
+    found: str | None
 
 
-def compare_axes(meant: Pixels, got: Pixels, axes: str) -> list[AxisFinding]:
-    """Compare a page that was read back with the pattern's.
+def compare_axes(expected: Pixels, found: Pixels, axes: str) -> list[AxisFinding]:
+    """Check the axes of a pattern on a page that was read back.
 
-    The page is compared with the pattern mirrored and swapped in all 48 ways, so that it can say
-    which of them the device has made of it.
+    The page is compared with the 48 mirrored and swapped versions of the pattern, to report which
+    of them the device displays.
 
     Parameters
     ----------
-    meant, got : ndarray
-        Indexed [z, y, x].
+    expected, found : ndarray
+        Pattern and page, indexed [z, y, x].
     axes : str
-        Letters of the axes that are asked for.
+        Letters of the axes to check.
 
     """
-    places, values = _lit(meant)
-    whole = len(_lit(got)[0]) == len(places)
-    matches = [way for way in _AXIS_MAPS if whole and _is_moved(places, values, meant, got, way)]
-    found = []
+    voxels, values = _lit_voxels(expected)
+    same_count = len(_lit_voxels(found)[0]) == len(voxels)
+    matches = [
+        axis_map
+        for axis_map in _AXIS_MAPS
+        if same_count and _is_transformed(voxels, values, expected, found, axis_map)
+    ]
+    findings = []
     for axis in axes:
         number = "xyz".index(axis)
-        ends = {(way[0][number], way[1][number]) for way in matches}
-        if not ends:
-            found.append(AxisFinding(axis, right=False, shown=None))
-        elif (number, False) not in ends:
-            onto, mirrored = min(ends)
-            found.append(
-                AxisFinding(axis, right=False, shown=("-" if mirrored else "+") + "xyz"[onto])
-            )
-        elif len(ends) > 1:
-            found.append(AxisFinding(axis, right=None, shown=None))
+        images = {(onto[number], mirrored[number]) for onto, mirrored in matches}
+        if not images:
+            findings.append(AxisFinding(axis, correct=False, found=None))
+        elif (number, False) not in images:
+            onto_axis, is_mirrored = min(images)
+            sign = "-" if is_mirrored else "+"
+            findings.append(AxisFinding(axis, correct=False, found=sign + "xyz"[onto_axis]))
+        elif len(images) > 1:
+            findings.append(AxisFinding(axis, correct=None, found=None))
         else:
-            found.append(AxisFinding(axis, right=True, shown=f"+{axis}"))
-    return found
+            findings.append(AxisFinding(axis, correct=True, found=f"+{axis}"))
+    return findings
 
 
-# Onto which axis each of x, y, z comes, and whether it is mirrored there.
+# Signed permutation of the axes: onto which axis each of x, y, z is mapped, and whether mirrored.
 _AxisMap = tuple[tuple[int, ...], tuple[bool, ...]]
 _AXIS_MAPS: list[_AxisMap] = [
     (onto, mirrored)
@@ -230,20 +234,21 @@ _AXIS_MAPS: list[_AxisMap] = [
 ]
 
 
-def _lit(page: Pixels) -> tuple[Voxels, Pixels]:
-    """Give what is lit: places, (n, 3) with columns x, y, z, and pixels."""
+def _lit_voxels(page: Pixels) -> tuple[Voxels, Pixels]:
+    """Return the lit voxels, (n, 3) with columns x, y, z, and their pixels."""
     lit = page.any(axis=-1) if page.ndim == 4 else page != 0
-    places = np.argwhere(lit)
-    return places[:, ::-1], page[lit]
+    return np.argwhere(lit)[:, ::-1], page[lit]
 
 
-def _is_moved(places: Voxels, values: Pixels, meant: Pixels, got: Pixels, way: _AxisMap) -> bool:
-    """Tell whether a page is another whose axes have been swapped and mirrored."""
-    sides, moved = meant.shape[2::-1], np.empty_like(places)
-    for axis, (onto, mirrored) in enumerate(zip(*way, strict=True)):
-        if got.shape[2 - onto] != sides[axis]:
+def _is_transformed(
+    voxels: Voxels, values: Pixels, expected: Pixels, found: Pixels, axis_map: _AxisMap
+) -> bool:
+    """Return whether all voxels are found with their values where the axis map puts them."""
+    sides, moved = expected.shape[2::-1], np.empty_like(voxels)
+    for axis, (onto, mirrored) in enumerate(zip(*axis_map, strict=True)):
+        if found.shape[2 - onto] != sides[axis]:
             return False
-        column = places[:, axis]
+        column = voxels[:, axis]
         moved[:, onto] = sides[axis] - 1 - column if mirrored else column
     x, y, z = moved.T
-    return bool((got[z, y, x] == values).all())
+    return bool((found[z, y, x] == values).all())

@@ -89,7 +89,7 @@ def test_pixels_of_one_bit():
 
 
 @pytest.mark.parametrize("density", [None, 0.0, 0.3])
-@pytest.mark.parametrize("line", [Line.serial(9600), Line.serial(1_000_000), USB_LINES[1]])
+@pytest.mark.parametrize("line", [Line.of_baud(9600), Line.of_baud(1_000_000), USB_LINES[1]])
 @pytest.mark.parametrize("features", [",".join(EVERY_FEATURE), "digest", "line,palette"])
 def test_it_is_what_it_then_costs(density, line, features):
     port = f"sim:?size=31x20x19&format=index8&refresh=0&max_payload=200&features={features}"
@@ -100,7 +100,7 @@ def test_it_is_what_it_then_costs(density, line, features):
             draw_curves(frame)
         else:
             frame = memory(frame.grid, "index8", density)
-        cost = plan(frame, line, Receiver.of(display.info))
+        cost = plan(frame, line, Receiver.of_device(display.info))
         receipt = display.present(frame)
     assert receipt.retransmitted == 0
     assert (cost.packets, cost.wire_bytes) == (receipt.packets, receipt.wire_bytes)
@@ -111,22 +111,25 @@ def test_it_is_what_it_then_costs(density, line, features):
 def test_payloads_are_as_long_as_the_link_makes_them():
     for longest, buffer in [(64, 200), (200, 16_384), (4096, 1 << 16), (4096, 4200)]:
         with vd.open(f"sim:?size=3x5x7&max_payload={longest}&rx_buffer={buffer}") as display:
-            assert Receiver.of(display.info).payload_bytes == display._connection.link.payload_bytes
+            assert (
+                Receiver.of_device(display.info).payload_bytes
+                == display._connection.link.payload_bytes
+            )
 
 
 def test_fast_lines_get_the_ops_that_are_found_soon():
     frame = vd.Frame((31, 20, 19))
     frame.draw(vd.Circle(center=(20, 9, 9), radius=8), "orange")
-    slow, fast = (plan(frame, Line.serial(baud)) for baud in (9600, 921_600))
+    slow, fast = (plan(frame, Line.of_baud(baud)) for baud in (9600, 921_600))
     assert "ARC" in slow.ops
     assert "ARC" not in fast.ops
     assert slow.wire_bytes < fast.wire_bytes
-    bare = plan(frame, Line.serial(9600), Receiver(features=()))
+    bare = plan(frame, Line.of_baud(9600), Receiver(features=()))
     assert bare.op_bytes == sum(map(len, frame.payloads(1024)))
 
 
 def test_a_dark_frame_costs_a_packet():
-    line = Line.serial(1000)
+    line = Line.of_baud(1000)
     cost = plan(vd.Frame((3, 5, 7)), line)
     assert (cost.packets, cost.op_bytes, cost.ops) == (1, 0, {})
     assert cost.wire_bytes == 9

@@ -86,8 +86,8 @@ def test_a_device_that_turns_the_axes_round_is_found_out(device, name, format_):
     memory, shown = DEVICES[device]
     meant = page(name, CUBE, format_)
     found = test_patterns.compare_axes(meant, memory(meant), "xyz")
-    assert tuple(finding.shown for finding in found) == shown
-    assert [f.right for f in found] == [f"+{a}" == s for a, s in zip("xyz", shown, strict=True)]
+    assert tuple(finding.found for finding in found) == shown
+    assert [f.correct for f in found] == [f"+{a}" == s for a, s in zip("xyz", shown, strict=True)]
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -95,25 +95,25 @@ def test_the_ticks_find_it_out_on_a_display_without_colours(device):
     memory, shown = DEVICES[device]
     meant = page("axes", CUBE, PixelFormat.MONO1)
     found = test_patterns.compare_axes(meant, memory(meant), "xyz")
-    assert tuple(finding.shown for finding in found) == shown
+    assert tuple(finding.found for finding in found) == shown
 
 
 def test_a_mirrored_axis_is_found_out_on_unequal_sides():
     meant = page("axes")
     found = test_patterns.compare_axes(meant, np.flip(meant, axis=1), "xyz")
-    assert [(f.right, f.shown) for f in found] == [(True, "+x"), (False, "-y"), (True, "+z")]
+    assert [(f.correct, f.found) for f in found] == [(True, "+x"), (False, "-y"), (True, "+z")]
 
 
 def test_a_page_that_is_something_else():
     meant = page("axes")
     for got in (np.zeros_like(meant), np.full_like(meant, 9), np.roll(meant, 1, axis=0)):
-        assert [(f.right, f.shown) for f in test_patterns.compare_axes(meant, got, "xyz")] == [
+        assert [(f.correct, f.found) for f in test_patterns.compare_axes(meant, got, "xyz")] == [
             (False, None)
         ] * 3
 
 
 def test_what_the_pattern_cannot_tell_is_not_claimed():
     meant = page("corners", GRID, PixelFormat.MONO1)
-    assert [f.right for f in test_patterns.compare_axes(meant, meant, "xyz")] == [None] * 3
+    assert [f.correct for f in test_patterns.compare_axes(meant, meant, "xyz")] == [None] * 3
     thin = page("axes", Grid(4, 1, 4))
-    assert [f.right for f in test_patterns.compare_axes(thin, thin, "xyz")] == [True, None, True]
+    assert [f.correct for f in test_patterns.compare_axes(thin, thin, "xyz")] == [True, None, True]
