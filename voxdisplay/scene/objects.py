@@ -262,7 +262,7 @@ class Bezier(SceneObject, tag="bezier", frozen=True):
 
 
 class BSpline(SceneObject, tag="bspline", frozen=True):
-    """A B-spline; with weights, a NURBS curve. There is one knot for each point, and degree + 1."""
+    """A B-spline; with weights, a NURBS curve."""
 
     points: Annotated[Vectors, Meta(description="The control points [x, y, z].")]
     degree: Annotated[
@@ -270,11 +270,18 @@ class BSpline(SceneObject, tag="bspline", frozen=True):
     ] = 3.0
     knots: Annotated[
         Numbers | None,
-        Meta(title="Knots", description="The knots, ascending; when left out, evenly spaced."),
+        Meta(
+            title="Knots",
+            description="The knots, ascending, as many as points + degree + 1, or + degree - 1 as "
+            "CAD programs write them; when left out, evenly spaced.",
+        ),
     ] = None
     weights: Annotated[
         Numbers | None,
-        Meta(title="Weights", description="One weight for each point: a NURBS curve."),
+        Meta(
+            title="Weights",
+            description="One weight for each point: a NURBS curve. 0 takes a point out.",
+        ),
     ] = None
 
     def build_curve(self, context: EvaluationContext) -> curves.BSpline:

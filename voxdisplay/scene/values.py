@@ -8,6 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from voxdisplay.expressions.operations import FUNCTIONS
 from voxdisplay.expressions.parse import MAX_LENGTH
 
 MAX_SIDE = 65535
@@ -26,7 +27,11 @@ Formula = Annotated[
     float | _Text,
     Meta(
         title="Expression of t",
-        description="An expression in t, numbers, constants and the scene's params.",
+        description=(
+            "An expression in t, numbers, constants (pi tau e deg), the scene's params and the "
+            f"functions {' '.join(sorted(FUNCTIONS))}. A condition is a comparison by one of "
+            "< <= > >= == !=, as in if(t < 1, a, b)."
+        ),
         extra={"expected": "a number or an expression of t"},
     ),
 ]

@@ -32,8 +32,8 @@ def estimated_min_length(curve: Curve) -> tuple[float, float]:
     length : float
         In voxels.
     chord : float
-        Mean chord of the steps that it was found with: a curve that is long by chords of less
-        than a voxel is rough.
+        Mean chord of the widest steps that show a quarter of it: a curve that is long by chords
+        of less than a voxel is rough.
 
     """
     first, last = curve.t_range
@@ -54,5 +54,5 @@ def estimated_min_length(curve: Curve) -> tuple[float, float]:
     chords = np.sort(np.where(np.isfinite(chords), chords, 0.0), axis=1)
     counted = chords[:, : int(_SHARE * _CHORDS)].sum(axis=1) / _CHORDS
     lengths = counted * length / steps
-    best = int(np.argmax(lengths))
-    return float(lengths[best]), float(counted[best])
+    most = lengths.max()
+    return float(most), float(counted[lengths >= most / 4].max())
