@@ -1,4 +1,4 @@
-"""A real Chromium, driven by its DevTools protocol.
+"""Driver of a real Chromium by the DevTools protocol.
 
 One browser serves the whole test session; each test gets tabs of its own. What a tab asks for and
 what goes wrong in it is kept.
@@ -115,13 +115,13 @@ class Tab:
         number = next(self._ids)
         self._socket.send(json.dumps({"id": number, "method": method, "params": parameters}))
         while True:
-            message = self._hear()
+            message = self._receive()
             if message.get("id") == number:
                 if "error" in message:
                     raise RuntimeError(f"{method}: {message['error']}")
                 return message["result"]
 
-    def _hear(self):
+    def _receive(self):
         message = json.loads(self._socket.recv(DEADLINE_S))
         given = message.get("params", {})
         match message.get("method"):
@@ -157,10 +157,10 @@ class Tab:
         self._loaded = False
         self.call("Page.navigate", url=url)
         while not self._loaded:
-            self._hear()
+            self._receive()
 
     def run(self, script):
-        """Evaluate a script, or wait for the promise that it gives."""
+        """Evaluate a script, and wait for its promise if it returns one."""
         answer = self.call(
             "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
         )
@@ -169,7 +169,7 @@ class Tab:
         return answer["result"].get("value")
 
     def wait(self, condition, *, errors=False):
-        """Wait until a condition, written in JavaScript, holds; give its value.
+        """Wait until a condition, written in JavaScript, holds; return its value.
 
         An error in the page ends it, unless some are expected.
         """
@@ -193,11 +193,11 @@ class Tab:
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
     def screenshot(self):
-        """Give the page as it is seen, PNG."""
+        """Return a PNG screenshot of the page."""
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def canvas(self):
-        """Give what is drawn: (height, width, 3) uint8."""
+        """Return the pixels of the canvas: (height, width, 3) uint8."""
         text = self.run("paint(), canvas.toDataURL('image/png')")
         data = base64.b64decode(text.partition(",")[2])
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))

@@ -1,7 +1,6 @@
-"""USB as two more carriers for the transport kit: in this process, and over USB/IP.
+"""USB transports and peers for the transport kit: in this process, and over USB/IP.
 
-See `carriers`: each gives the driver's transport and the peer. The peer is a plain pipe behind the
-endpoints.
+See `carriers`: each yields the driver's transport and the peer, a plain pipe behind the endpoints.
 """
 
 import contextlib

@@ -1,11 +1,11 @@
-"""A USB device for tests, whose every packet the test decides; in this process or its own.
+"""Scripted USB device: the test decides about every packet; in this process or its own.
 
     python usb_gadget.py
 
-exports it by USB/IP and prints a JSON object with the address. Then it obeys lines on stdin, each
-a JSON list of a command and its arguments, and answers each with a line of JSON.
+exports it by USB/IP and prints a JSON object with the address. It takes commands from stdin, each
+a line with a JSON list of a name and arguments, and answers each with a line of JSON.
 
-Its interfaces and endpoints have unusual places: nobody may count on the usual ones.
+Its interfaces and endpoints have unusual numbers: a driver must not rely on the usual ones.
 """
 
 import json
@@ -39,7 +39,7 @@ def pattern(size):
 
 
 class Gadget:
-    """A function: takes, sends and keeps what it is told to."""
+    """A USB function that takes, sends and records as commanded."""
 
     def __init__(self, serial="GADGET", packet=PACKET):
         self.packet_bytes = packet
@@ -91,7 +91,7 @@ class Gadget:
 
 
 class GadgetDevice(UsbDevice):
-    """The device, and what tests can tell it past the wire."""
+    """The device, with its out-of-band commands."""
 
     def __init__(self, serial="GADGET"):
         super().__init__(Gadget(serial))
@@ -113,7 +113,7 @@ class GadgetDevice(UsbDevice):
         self.advance()
 
     def do_taken(self):
-        """Give the sizes of packets taken since the last time, and their bytes in hex."""
+        """Return the sizes of packets taken since the last call, and their bytes in hex."""
         taken, self.function.taken = self.function.taken, []
         return [list(map(len, taken)), b"".join(taken).hex()]
 

@@ -1,6 +1,6 @@
-"""Three places for a USB gadget: in this process, behind USB/IP, and in this machine's kernel.
+"""Three hosts for a USB gadget: in this process, behind USB/IP, and in this machine's kernel.
 
-Each gives a backend of pyusb that sees it, and a way to tell it things.
+Each has a backend of pyusb that sees it, and a control channel to it.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ DEADLINE_S = 60 * int(os.environ.get("TEST_PATIENCE", "1"))
 
 
 def until(condition, what):
-    """Wait for what another process or the kernel does."""
+    """Wait until a condition on another process or the kernel holds."""
     deadline_s = time.monotonic() + DEADLINE_S
     while not (got := condition()):
         assert time.monotonic() < deadline_s, f"waited for {what}"
@@ -42,7 +42,7 @@ class Lab:
     backend = None
 
     def find(self):
-        """Give the gadget, with nothing of earlier finds in it; None if it is not there."""
+        """Return a fresh handle of the gadget; None if it is not there."""
         return usb.core.find(idVendor=0x1209, idProduct=0x0001, backend=self.backend)
 
     def tell(self, command, *arguments):
@@ -117,12 +117,12 @@ class InKernel(OverUsbIp):
 
 
 def in_kernel():
-    """Tell whether this machine's kernel can attach a device, and we may let it."""
+    """Return whether this machine's kernel can attach a device, and we may do it."""
     return (VHCI / "attach").exists()
 
 
 def attach(address):
-    """Attach a device to the kernel; give its port. The kernel has the socket from then on."""
+    """Attach a device to the kernel, which takes over the socket; return its port."""
     with socket.create_connection(address) as sock:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         request = usbip.OPERATION.pack(usbip.VERSION, usbip.REQUEST_IMPORT, 0)
@@ -138,7 +138,7 @@ def attach(address):
 
 
 def free_port():
-    """Give a port of the kernel's virtual hub for high speed that nothing is in."""
+    """Return a free high-speed port of the kernel's virtual hub."""
     for line in (VHCI / "status").read_text().splitlines():
         hub, port, state, *_ = line.split()
         if hub == "hs" and state == "004":

@@ -1,4 +1,4 @@
-"""Which ports there are, what answers there, and a device that is known by its number."""
+"""Listing and probing of ports; devices recognised by their serial number."""
 
 import json
 import os

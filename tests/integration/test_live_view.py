@@ -1,4 +1,4 @@
-"""The live view in a real browser: what is on the canvas, and what hands can do with it.
+"""Live view in a real browser: the canvas, and input by keys, pointer and touch.
 
 Places and counts are checked, never how fast it goes.
 """

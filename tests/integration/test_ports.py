@@ -1,4 +1,4 @@
-"""Ports as they are in the world: missing, busy, forbidden, silent, foreign, gone."""
+"""Ports that are missing, busy, forbidden, silent, foreign or gone."""
 
 import contextlib
 import http.server

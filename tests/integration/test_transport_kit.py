@@ -1,4 +1,4 @@
-"""What every byte pipe must do, over every kind of it: `Transport`, sentence by sentence."""
+"""Transport kit: every sentence of `Transport`, over every kind of byte pipe."""
 
 import contextlib
 import random

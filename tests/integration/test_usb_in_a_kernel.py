@@ -1,6 +1,6 @@
-"""The emulator plugged into a real Linux kernel, and the program as a person would use it.
+"""Emulator attached to a real Linux kernel, used by the commands.
 
-``tools/kernel_lab.py`` brings a kernel and runs these in it.
+``tools/kernel_lab.py`` builds a kernel and runs these tests in it.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""A display on USB as a person uses it: pushed to, pulled out, plugged in again."""
+"""Display on USB in real use: pushed to, unplugged, plugged in again."""
 
 import contextlib
 import json

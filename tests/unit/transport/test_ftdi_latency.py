@@ -1,4 +1,4 @@
-"""The latency timer of a USB-serial chip, in a tree like that of sysfs."""
+"""Latency timer of a USB-serial chip, in a tree like that of sysfs."""
 
 import pytest
 

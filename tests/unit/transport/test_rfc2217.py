@@ -1,4 +1,4 @@
-"""What a server of RFC 2217 sends, parted into data and commands."""
+"""Separation of a telnet stream into data and commands, and its buffer."""
 
 import itertools
 import socket

@@ -1,4 +1,4 @@
-"""``usb:`` ports: which display is meant, and what is said when it cannot be had."""
+"""``usb:`` ports: selection of a display, and errors when it cannot be opened."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Films, as others decode them."""
+"""Films, decoded by other programs."""
 
 import io
 import shutil

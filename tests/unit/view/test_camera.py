@@ -1,4 +1,4 @@
-"""The projection, from its formula and from what one sees."""
+"""Camera projection, compared with its formula and with known views."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Half blocks, read back as a terminal would."""
+"""Half-block text, decoded as a terminal does."""
 
 import itertools
 import re

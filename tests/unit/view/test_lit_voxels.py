@@ -1,4 +1,4 @@
-"""From memory to lit voxels, on every format."""
+"""Lit voxels of pages of every format."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The live view without a browser: messages, sources, and what the server answers to whom."""
+"""Live view without a browser: messages, sources, and the server's responses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Origins of pages that may watch: how they are written, and which requests are refused."""
+"""Origins of pages that may watch: their notation, and the requests that are refused."""
 
 import pytest
 

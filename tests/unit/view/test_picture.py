@@ -1,4 +1,4 @@
-"""Pictures, from what is seen on them."""
+"""Rendered pictures: positions, colours, exposure, labels."""
 
 import io
 import math

@@ -1,4 +1,4 @@
-"""Files of pictures: whole or not at all."""
+"""Files of pictures: replaced atomically or not at all."""
 
 import os
 
