@@ -77,11 +77,11 @@ class SessionOpening:
         """Description of an INFO for this session that did not come whole; None if none began."""
         *ended, rest = self._received.split(b"\0")
         for segment, is_ended in ((rest, False), *((each, True) for each in reversed(ended))):
-            if self._begins_info(segment):
-                # A device may begin anew with each HELLO.
-                count = len(segment) - segment.rfind(segment[:_SESSION_END])
-                what = "an INFO that is incomplete or damaged" if is_ended else "an incomplete INFO"
-                return f"{what}, of which {count} bytes came"
+            # A device may begin anew with each HELLO, and never send a 00.
+            for beginning in (segment[segment.rfind(segment[:_MIN_RECOGNIZED]) :], segment):
+                if self._begins_info(beginning):
+                    what = "INFO that is incomplete or damaged" if is_ended else "incomplete INFO"
+                    return f"an {what}, of which {len(beginning)} bytes came"
         return None
 
     def _begins_info(self, segment: bytes) -> bool:

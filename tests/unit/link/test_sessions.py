@@ -88,11 +88,13 @@ def test_a_device_that_stops_in_the_middle_of_its_info(before, count):
     assert "stopped in the middle" in hint
 
 
-def test_a_device_that_stops_in_the_middle_of_its_info_after_each_hello():
-    message, _ = timeout_after(WHOLE_INFO[:17] * 4)
-    assert "an incomplete INFO, of which 17 bytes came" in message
-    message, _ = timeout_after((WHOLE_INFO[:17] + b"\0") * 4)
-    assert "an INFO that is incomplete or damaged, of which 17 bytes came" in message
+@pytest.mark.parametrize("count", [3, 4, 6, 17, len(WHOLE_INFO) - 1])
+def test_a_device_that_stops_in_the_middle_of_its_info_after_each_hello(count):
+    message, _ = timeout_after(WHOLE_INFO[:count] * 4)
+    assert f"an incomplete INFO, of which {count} bytes came" in message
+    if count < len(WHOLE_INFO) - 1:  # else the 00 makes it whole
+        message, _ = timeout_after((WHOLE_INFO[:count] + b"\0") * 4)
+        assert f"an INFO that is incomplete or damaged, of which {count} bytes came" in message
 
 
 def test_the_info_of_another_session_is_no_incomplete_one_of_ours():
