@@ -81,18 +81,17 @@ class Frame:
     Parameters
     ----------
     grid : tuple of int
-        (nx, ny, nz) of the display.
+        Size (nx, ny, nz) of the display.
     format : PixelFormat or str
-        Its pixels: ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
+        ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
     palette : (256, 3) uint8 array, optional
-        For index8: red, green and blue of each pixel value. They stay as they are; what is drawn
-        takes the nearest.
+        For index8: red, green and blue of each pixel value. They are fixed: colours take the
+        nearest entry.
     own_palette : bool
-        For index8, if no `palette` is given: whether colours that the default palette lacks get
-        entries of their own, as far as there are any. Then what is drawn is shown in its exact
-        colours.
+        For index8 without `palette`: colours that the default palette lacks get free entries, as
+        long as there are any, and are shown exactly.
 
-    Only displays with the feature ``palette`` show a palette that is not the default one.
+    Only displays with the feature ``palette`` show another palette than the default one.
 
     """
 
@@ -107,14 +106,14 @@ class Frame:
         self.grid = Grid.of(grid)
         self.format = format if isinstance(format, PixelFormat) else PixelFormat(_text(format))
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
-        self._shared = False  # with a copy
+        self._shared = False  # raster is shared with a copy
         self._items: list[OrderedVoxels] = []
-        self._all_visible = False  # the painter's order: they are all seen
+        self._all_visible = False  # no drawn voxel is covered by a later item
         self._has_base = False
         self._lit: tuple[NDArray[np.int64], Values] | None = None
         if palette is not None and self.format is not PixelFormat.INDEX8:
             raise ValueError(f"a {self.format.value} display has no palette: leave it out")
-        self._palette: Palette | None = None  # the default one, or none
+        self._palette: Palette | None = None  # None: the default palette, or a format without
         own_palette = flag("own_palette", own_palette)
         if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
             self._palette = Palette(palette, grows=palette is None)
@@ -144,12 +143,12 @@ class Frame:
 
     def copy(self) -> Frame:
         """Return another frame of the same picture; quick, until one of the two is drawn on."""
-        self._visible(dark=True)  # once for both
+        self._visible(dark=True)  # so that it is found once for both
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
         twin._items = list(self._items)  # noqa: SLF001 - of its own kind
         if self._items and sum(map(len, self._items)) > _OVERDRAW_LIMIT * len(self.lit()[0]):
-            # Most of what was drawn is covered: the picture alone is less to keep.
+            # Most drawn voxels are covered: the raster alone is smaller.
             twin._items, twin._has_base = [], True  # noqa: SLF001
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
         self._shared = twin._shared = True  # noqa: SLF001
@@ -236,7 +235,7 @@ class Frame:
         self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
     ) -> Drawing:
         self._prepare_change()
-        # One colour is looked up once.
+        # A single colour is looked up once.
         each = len(colors) in {1, len(voxels)}
         rgb = colors if each else interpolate_colors(colors, len(voxels))
         found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
@@ -246,7 +245,7 @@ class Frame:
         at_corner = np.zeros(len(voxels), dtype=np.bool_)
         at_corner[corners] = True
         owner = np.zeros(len(voxels), dtype=np.int64)
-        # What is outside has an index that means nothing, and leaves with it.
+        # Voxels outside have meaningless indices; they are removed here.
         item = OrderedVoxels(voxels, self.grid.index_of(voxels), values, owner, at_corner).select(
             inside
         )
@@ -259,7 +258,7 @@ class Frame:
         return self._palette.rgb(values) if self._palette else self.format.rgb(values)
 
     def set(self, array: NDArray[np.generic]) -> None:
-        """Make the frame an array, whatever was drawn before. The palette stays as it is.
+        """Replace the picture by an array. The palette stays as it is.
 
         Parameters
         ----------
@@ -285,7 +284,7 @@ class Frame:
             )
 
     def clear(self) -> None:
-        """Make the frame dark."""
+        """Make all voxels dark."""
         self._prepare_change()
         self._raster[...] = 0
         self._items.clear()
@@ -293,14 +292,14 @@ class Frame:
 
     @property
     def palette(self) -> NDArray[np.uint8] | None:
-        """Red, green and blue of each pixel value, (256, 3) uint8: a copy. None if not index8."""
+        """Copy of the palette, (256, 3) uint8: colours of the pixel values. None if not index8."""
         if self.format is not PixelFormat.INDEX8:
             return None
         return (self._palette.colors if self._palette else DEFAULT).copy()
 
     @property
     def has_own_palette(self) -> bool:
-        """Whether the palette is not the default one."""
+        """True if the palette is not the default one."""
         return self._palette is not None and len(self._palette.entries_differing(DEFAULT)) > 0
 
     @property
@@ -356,12 +355,12 @@ class Frame:
         return page_png(self._raster_zyx, self.grid, self.format, self.palette)
 
     def rgb(self) -> NDArray[np.uint8]:
-        """Give the colours that are seen, (nz, ny, nx, 3) uint8, whatever the format."""
+        """Return the colours shown, (nz, ny, nx, 3) uint8, whatever the format."""
         colors = self._colors_of(self.format.values(self._raster))
         return colors.reshape(*self.grid.array_shape, 3)
 
     def lit(self) -> tuple[NDArray[np.int64], Values]:
-        """Give the lit voxels: their scan-order indices, ascending, and their pixel values."""
+        """Return the scan-order indices of lit voxels, ascending, and their pixel values."""
         if self._lit is None:
             self._lit = self._find_lit()
         return self._lit
@@ -381,8 +380,8 @@ class Frame:
         return self.format.values(self._raster.take(index, axis=0))
 
     def digest(self) -> int:
-        """Give the digest that a display which shows this frame must report."""
-        # Of an array, much may be lit.
+        """Return the digest that a display reports when it shows this frame (section 8)."""
+        # In a frame that was set from an array, much may be lit.
         whole = self._has_base
         found = page_digest(self._raster, self.format) if whole else digest(*self.lit())
         if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
@@ -390,16 +389,14 @@ class Frame:
         return found & 0xFFFFFFFF
 
     def payloads(self, max_payload: int, features: Collection[str] = ()) -> list[bytes]:
-        """Give the ops that draw the frame on a dark page.
-
-        No voxel gets two different pixels, so the payloads may arrive in any order.
+        """Return payloads that draw the frame on a dark page, in whatever order they arrive.
 
         Parameters
         ----------
         max_payload : int
-            The longest payload that the device takes.
+            Bytes of the longest payload that the device takes.
         features : collection of str
-            What it announced, as in `DeviceInfo.features`. Nothing else is made use of.
+            Features that the device announced: `DeviceInfo.features`. No others are used.
 
         """
         return list(chain.from_iterable(self.iter_payloads(max_payload, features)))
@@ -407,17 +404,17 @@ class Frame:
     def iter_payloads(
         self, max_payload: int, features: Collection[str] = (), bytes_per_s: float = 0.0
     ) -> Iterator[list[bytes]]:
-        """Give payloads as `payloads` as soon as they are coded, a few at a time, or none.
+        """Yield the payloads of `payloads` while they are encoded, a few at a time or none.
 
-        The frame must stay as it is until all have been taken.
+        The frame must not be changed until all have been taken.
 
         Parameters
         ----------
         max_payload, features
             As of `payloads`.
         bytes_per_s : float
-            What the line carries. On a fast one time is not spent on saving bytes that are sent
-            sooner than they are saved.
+            Rate of the line; 0 for a slow one. On a fast line, searches that take longer than they
+            save are skipped.
 
         """
         config = self._encoder_config(max_payload, features, bytes_per_s)
@@ -433,12 +430,12 @@ class Frame:
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
     ) -> list[bytes]:
-        """Give the ops that draw the frame on a page which shows another.
+        """Return payloads that draw the frame on a page which shows another.
 
         Parameters
         ----------
         base : Frame
-            What is shown, of the same grid and format.
+            The frame shown, of the same grid and format.
         max_payload, features
             As of `payloads`.
 
@@ -446,7 +443,7 @@ class Frame:
         config = self._encoder_config(max_payload, features)
         changed = self.changed_indices(base)
         items = self._visible(dark=True)
-        if items:  # one that has not changed at all is there
+        if items:  # items without any change are on the page already
             fresh = np.isin(items.index, changed)
             items = items.select(np.bincount(items.item, fresh)[items.item] > 0)
         content = PageUpdate(items, _without(changed, items), self._values_at)
@@ -456,7 +453,7 @@ class Frame:
         )
 
     def changed_indices(self, base: Frame) -> NDArray[np.int64]:
-        """Give the scan-order indices, ascending, of voxels that another frame has otherwise."""
+        """Return the scan-order indices, ascending, of voxels that differ from another frame."""
         instance("base", base, Frame, "a frame")
         if (base.grid, base.format) != (self.grid, self.format):
             raise ValueError(
@@ -477,35 +474,37 @@ class Frame:
         bits = _feature_bits(features)
         config = EncoderConfig(self.grid, self.format, max_payload, bits, bytes_per_s)
         if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
-            raise ValueError("this frame has a palette of its own, and the device keeps its own")
+            raise ValueError(
+                "the frame has a palette of its own, and the device cannot set its palette"
+            )
         return config
 
     def _visible(self, *, dark: bool) -> OrderedVoxels | None:
-        """Settle the painter's order: what a later item covers is not sent; nor is what is dark."""
+        """Return the drawn voxels that no later item covers, without dark ones unless asked for."""
         if not self._items:
             return None
         if len(self._items) > 1 or not self._all_visible:
             items = concatenate_ordered(self._items)
-            # What is covered never comes to light again: then something newer has drawn it.
+            # A covered voxel never shows again: a newer item would have drawn it.
             self._items = [items.select(self._values_at(items.index) == items.values)]
             self._all_visible = True
         (items,) = self._items
         return items if dark else items.select(items.values != 0)
 
     def _palette_blocks(self, old: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks | None:
-        """Give the pieces that make another palette this one, if it differs."""
+        """Return op blocks that set the entries that differ from another palette, or None."""
         if self._palette and len(entries := self._palette.entries_differing(old)):
             return color_blocks(entries, self._palette.colors, config)
         return None
 
 
 _NO_INDICES = np.empty(0, dtype=np.int64)
-# So many drawn voxels for one that is lit, and a copy forgets how it was drawn.
+# With more drawn voxels for each lit one, a copy keeps the raster alone.
 _OVERDRAW_LIMIT = 4
 
 
 def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
-    """Give the voxels at which a curve has its corners."""
+    """Return the rows of voxels at which a curve has its corners."""
     breaks = sequence.curve.breaks
     if not len(breaks):
         return _NO_INDICES
@@ -515,7 +514,7 @@ def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
 
 
 def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[np.int64]:
-    """Give indices, ascending, without those of items."""
+    """Return indices, ascending, without those of drawn voxels."""
     return np.setdiff1d(index, items.index) if items else index
 
 

@@ -1,1 +1,1 @@
-"""Grids, pixel formats, colours and palettes. Knows no packets, curves or displays."""
+"""Grids, pixel formats, colours and palettes. Must not know packets, curves or displays."""

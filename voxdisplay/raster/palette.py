@@ -1,8 +1,7 @@
-"""The palette of an INDEX8 page: which colour each pixel value shows, and how colours find values.
+"""Palette of INDEX8 pages: colour of each pixel value, and allocation of entries to colours.
 
-On a display with the feature PALETTE every page brings its own (protocol.md, section 7.6), so that
-a frame can show any colours, 255 at most besides black. On others the default palette holds. Knows
-nothing of voxels.
+On a display with the feature PALETTE every page has its own (protocol.md, section 7.6): a frame can
+show any colours, at most 255 besides black. Others have the default palette. Must not know voxels.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ DEFAULT.flags.writeable = False
 
 
 class Palette:
-    """Colours of pixel values. Pixel 0 is dark, whatever its entry says.
+    """Colours of pixel values. Pixel 0 is dark, whatever its entry is.
 
     Parameters
     ----------
     colors : (256, 3) uint8 array, optional
         Red, green and blue of each value; the default palette if left out.
     grows : bool
-        Whether a colour that is missing may take an entry that no pixel has used.
+        True if a missing colour may take an entry that no pixel has used.
 
     Attributes
     ----------
@@ -42,40 +41,40 @@ class Palette:
         self._used[0] = True
 
     def copy(self) -> Palette:
-        """Give another of the same colours, of which the same are used."""
+        """Return a copy, with the same entries in use."""
         twin = Palette(self.colors, grows=self._grows)
         twin._used = self._used.copy()
         return twin
 
     def mark_used(self, values: NDArray[np.integer]) -> None:
-        """Note that pixels have these values: their entries stay what they are."""
+        """Mark entries as used by pixels: they keep their colours."""
         self._used[values] = True
 
     def entries_differing(self, other: Colors) -> NDArray[np.int64]:
-        """Give the entries that are not as in other colours, ascending."""
+        """Return the entries that differ from other colours, ascending."""
         return np.flatnonzero((self.colors != other).any(axis=1))
 
     def rgb(self, values: NDArray[np.integer]) -> Colors:
-        """Give the colours, (n, 3), that pixel values, (n,), show: black for 0."""
+        """Return the colours, (n, 3), that pixel values, (n,), show: black for 0."""
         shown = self.colors.copy()
         shown[0] = 0
         return shown[np.asarray(values)]
 
     def nearest(self, rgb: Colors) -> Values:
-        """Give the pixel values of colours, (n, 3): exact ones while there are entries left.
+        """Return the pixel values of colours, (n, 3): exact ones while free entries last.
 
-        Where there are more colours than entries, those that get one are spread evenly over the
-        order in which they come; the others take the nearest by the sum of squared differences.
+        If there are more colours than entries, those that get one are spread evenly over the order
+        of their first use; the others take the nearest by the sum of squared differences.
         """
         wanted, first, back = np.unique(_packed_rgb(rgb), return_index=True, return_inverse=True)
-        order = np.argsort(first)  # as they come
+        order = np.argsort(first)  # of their first use
         values = np.empty(len(wanted), dtype=np.int64)
         values[order] = self._values_of(wanted[order])
         self.mark_used(values)
         return values[back].astype(np.uint32)
 
     def _values_of(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Give the values of different colours."""
+        """Return the values of distinct colours, as 24-bit numbers."""
         entries = _packed_rgb(self.colors)
         entries[0] = 0  # black is pixel 0
         known, where = np.unique(entries, return_index=True)
@@ -101,7 +100,7 @@ class Palette:
 
 
 def _packed_rgb(rgb: Colors) -> NDArray[np.int64]:
-    """Give colours as numbers."""
+    """Return colours as 24-bit numbers."""
     red, green, blue = rgb.astype(np.int64).T
     return np.asarray(red << 16 | green << 8 | blue)
 

@@ -1,6 +1,6 @@
-"""Pixel formats: how colours become what a display stores, and how that lies in an array.
+"""Pixel formats of protocol.md, section 2.1: colours, pixel values, and arrays of them.
 
-Knows the formats of protocol.md, section 2.1, and nothing of frames, curves or packets.
+Must not know frames, curves or packets.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Pixels = NDArray[np.uint8 | np.uint16]
 
 
 class PixelFormat(enum.Enum):
-    """What a voxel can be. The names are those of the command line and of ``INFO``."""
+    """Pixel format of a display; values are the names of the command line."""
 
     MONO1 = "mono1"
     INDEX8 = "index8"
@@ -32,12 +32,12 @@ class PixelFormat(enum.Enum):
 
     @classmethod
     def from_wire(cls, number: int) -> PixelFormat | None:
-        """Give the format that has a number in INFO, or None."""
+        """Return the format with a number in INFO; None if there is none."""
         return next((format_ for format_ in cls if format_.wire == number), None)
 
     @property
     def wire(self) -> int:
-        """The format's number on the wire."""
+        """Number of the format on the wire."""
         return int(getattr(spec, f"FORMAT_{self.name}"))
 
     @property
@@ -47,7 +47,7 @@ class PixelFormat(enum.Enum):
 
     @property
     def full(self) -> int:
-        """The value of the full pixel, with all its bits set."""
+        """Value of the full pixel: all bits set."""
         return 1 if self is PixelFormat.MONO1 else (1 << 8 * self.bytes) - 1
 
     @property
@@ -60,9 +60,9 @@ class PixelFormat(enum.Enum):
         return (*array_shape, 3) if self is PixelFormat.RGB888 else array_shape
 
     def nearest(self, rgb: NDArray[np.uint8]) -> Values:
-        """Give the pixel values nearest to colours.
+        """Return the pixel values nearest to colours.
 
-        On a display of one colour every colour but black is lit: a curve is drawn to be seen.
+        With mono1 every colour but black is lit, so that dark colours stay visible.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class PixelFormat(enum.Enum):
         return np.asarray(values, dtype=np.uint32)
 
     def rgb(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
-        """Give the colours, (n, 3) uint8, of pixel values, (n,)."""
+        """Return the colours, (n, 3) uint8, of pixel values, (n,)."""
         v = np.asarray(values, dtype=np.uint32)
         channels: tuple[NDArray[np.integer], ...]
         match self:
@@ -102,17 +102,17 @@ class PixelFormat(enum.Enum):
         return np.stack(channels, axis=1).astype(np.uint8)
 
     def values(self, array: NDArray[np.generic]) -> Values:
-        """Give the pixel values, flat in scan order, of an array of this format."""
+        """Return the pixel values, flat in scan order, of an array of this format."""
         if self is PixelFormat.RGB888:
             channels = array.reshape(-1, 3)
             padded = np.zeros((len(channels), 4), dtype=np.uint8)
-            for channel in range(3):  # all at once takes three times as long
+            for channel in range(3):  # one assignment for all takes three times as long
                 padded[:, channel] = channels[:, channel]
             return padded.view("<u4").reshape(-1).astype(np.uint32, copy=False)
         return array.reshape(-1).astype(np.uint32)
 
     def pixels(self, values: NDArray[np.integer]) -> Pixels:
-        """Give pixel values, (n,), as array elements: (n,), or (n, 3) for RGB888."""
+        """Return pixel values, (n,), as array elements: (n,), or (n, 3) for RGB888."""
         if self is PixelFormat.RGB888:
             return np.asarray(values[:, None] >> np.array([0, 8, 16]) & 255, dtype=np.uint8)
         return np.asarray(values, dtype=self.dtype)
@@ -164,16 +164,16 @@ class PixelFormat(enum.Enum):
 
 
 def is_lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:
-    """Tell which pixels, (n,) or (n, 3), are not dark: (n,)."""
+    """Return which pixels, (n,) or (n, 3), are lit: (n,)."""
     on = pixels != 0
     return on[:, 0] | on[:, 1] | on[:, 2] if on.ndim == 2 else np.asarray(on)
 
 
 def _quantise(channel: NDArray[np.integer], top: int) -> NDArray[np.integer]:
-    """Nearest of the levels 0..top to a channel of 0..255."""
+    """Return the nearest of the levels 0..top to a channel of 0..255."""
     return (channel * top * 2 + 255) // 510
 
 
 def _expand(level: NDArray[np.integer], top: int) -> NDArray[np.integer]:
-    """Channel of 0..255 of a level of 0..top."""
+    """Return the channel, 0..255, of a level of 0..top."""
     return (level * 510 + top) // (2 * top)

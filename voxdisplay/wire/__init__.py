@@ -1,1 +1,4 @@
-"""The wire: packets and ops as values and bytes. No I/O, no clock, no frames in flight."""
+"""Wire format of protocol.md: packets and ops as values and bytes.
+
+Must not know I/O, clocks or frames in flight.
+"""

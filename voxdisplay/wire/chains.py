@@ -1,8 +1,8 @@
-"""Ordered voxels -> STEP and LINE (protocol.md, sections 7.1 and 7.3), vectorised.
+"""Chain coding of ordered voxels: STEP and LINE (protocol.md, sections 7.1 and 7.3), vectorised.
 
-A sequence is cut into *segments* whose steps all fit one octant; each costs two bits a step, or
-nothing if it is the very line that LINE draws between its ends. What the voxels mean, and whether
-they are hidden by others, was settled before.
+Voxels are cut into *segments* whose steps all fit one octant; each costs two bits a step, or
+nothing if it is exactly the line that LINE draws between its ends. Must not know curves, nor which
+voxels are covered by later ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout
 
 Offsets = NDArray[np.int32]
 _STEPS_PER_BYTE = 4
-# By main axis and the axes that move, three bits: those of the next axis and the one behind it.
+# Crumb by main axis and a bit for each axis that moves.
 _CRUMB_OF = np.array(
     [
         axes >> (main + 1) % 3 & 1 | (axes >> (main + 2) % 3 & 1) << 1
@@ -38,14 +38,14 @@ _CRUMB_OF = np.array(
 
 @dataclass(frozen=True)
 class Chains:
-    """Pieces, and the voxels that they draw.
+    """Op blocks, one for each segment, and the voxels that they draw.
 
     Attributes
     ----------
-    pieces : Pieces
+    blocks : OpBlocks
     begin, count : (n,) int64 arrays
-        The first voxel of each, and how many steps follow. A piece that goes on from another
-        begins with the other's last voxel.
+        Row of the first voxel of each segment, and number of steps. A segment that continues
+        another begins with the other's last voxel.
 
     """
 
@@ -57,7 +57,7 @@ class Chains:
 def encode_chains(
     voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
 ) -> list[bytes]:
-    """Give the payloads that draw voxels, in their order.
+    """Return the payloads that draw voxels in their order.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def encode_chains(
         Columns x, y, z, all on the grid.
     pens : (n,) integer array
         Pixel value of each.
-    coding : Coding
+    config : EncoderConfig
 
     Returns
     -------
     list of bytes
-        At most ``coding.max_payload`` bytes each.
+        At most ``config.max_payload`` bytes each.
 
     """
     return PayloadLayout(build_chains(voxels, pens, config).blocks, config).payloads
@@ -82,18 +82,18 @@ def build_chains(
     config: EncoderConfig,
     corners: Bools | None = None,
 ) -> Chains:
-    """Chain voxels that follow each other as 26-neighbours with the same pen.
+    """Return the chains of voxels: runs of 26-neighbours with the same pen, cut into segments.
 
     Parameters
     ----------
-    voxels, pens, coding
+    voxels, pens, config
         As of `encode_chains`.
     corners : (n,) bool array, optional
-        Where a straight line may end and another begin.
+        True where a straight line may end and another begin.
 
     """
     n = len(voxels)
-    spots = np.ascontiguousarray(voxels.T, dtype=np.int32)  # axis first: numpy likes long rows
+    spots = np.ascontiguousarray(voxels.T, dtype=np.int32)  # axis first: long rows are faster
     steps = spots[:, 1:] - spots[:, :-1]
     value = pens.astype(np.int64)
     jump = np.abs(steps).max(axis=0, initial=0) != 1
@@ -106,7 +106,7 @@ def build_chains(
     longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * (config.max_block_bytes - 2))
     begin, count, lines = _split_long(begin, count, lines, longest)
 
-    at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step; its octant is unused
+    at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step and no octant
     octant = 8 * mains[at] + falls[at] if n > 1 else np.zeros(n, dtype=np.int64)
     body, size = _encode_ops(spots, steps, begin, count, octant, lines, config)
     index = config.grid.index_of(voxels)
@@ -119,10 +119,11 @@ def build_chains(
 
 
 def _longest_octant_runs(steps: Offsets, jump: Bools) -> tuple[Ints, Ints, Ints]:
-    """For each step: the end of the longest segment that begins there, and its octant.
+    """Return for each step the end of the longest segment from there, its main axis and signs.
 
     A run of steps fits an octant if some axis moves in all of them and no axis moves both ways.
-    Both stay true for any shorter run, so taking the longest each time gives the fewest segments.
+    Both hold for every part of such a run, so the greedy choice of the longest gives the fewest
+    segments.
     """
     m = steps.shape[-1]
     index = np.arange(m, dtype=np.int32)
@@ -142,16 +143,16 @@ def _longest_octant_runs(steps: Offsets, jump: Bools) -> tuple[Ints, Ints, Ints]
 
 
 def _break_at_corners(ends: Ints, corners: Ints) -> Ints:
-    """End segments also at the next corner behind their first voxel."""
+    """Return ends of segments that are also cut at the next corner after their first voxel."""
     behind = np.append(corners, len(ends))[np.searchsorted(corners, np.arange(len(ends)), "right")]
     return np.asarray(np.minimum(ends, behind))
 
 
 def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
-    """Follow the runs: first voxel and number of steps of each segment; a lone voxel has none."""
+    """Return first voxel and number of steps of each segment; a lone voxel has no steps."""
     m = len(jump)
     ends = _trim_partial_bytes(ends, jump)
-    following = (ends + jump).data  # a list of all would take longer than the few looked at
+    following = (ends + jump).data  # few entries are read: a list of all would be slower
     path = []
     at = 0
     while at < m:
@@ -159,7 +160,7 @@ def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
         at = following[at]
     begin = np.array(path, dtype=np.int64)
     jumps = jump[begin]
-    new = np.concatenate(([True], jumps))  # nothing leads there
+    new = np.concatenate(([True], jumps))  # no step leads there
     begin = np.append(begin, m)
     kept = np.append(~jumps, False) | new
     kept[-1] &= n > 0
@@ -168,7 +169,7 @@ def _segments(ends: Ints, jump: Bools, n: int) -> tuple[Ints, Ints]:
 
 
 def _trim_partial_bytes(ends: Ints, jump: Bools) -> Ints:
-    """End runs earlier whose last, partly filled byte of crumbs may be the next one's business."""
+    """Return ends of runs, moved back where the next run can take a partly filled crumb byte."""
     m = len(ends)
     at = np.arange(m, dtype=np.int32)
     left = (ends - at) & _STEPS_PER_BYTE - 1
@@ -182,13 +183,13 @@ def _trim_partial_bytes(ends: Ints, jump: Bools) -> Ints:
 
 
 def _find_lines(spots: Offsets, begin: Ints, count: Ints, config: EncoderConfig) -> Bools:
-    """Find the segments that LINE draws in fewer bytes: all their voxels are where it has them."""
+    """Return which segments LINE draws in fewer bytes: those that are exactly its voxels."""
     found = np.zeros(len(begin), dtype=np.bool_)
     if not config.has(spec.FEATURE_LINE):
         return found
     line_bytes = 1 + config.position_bytes
     maybe = np.flatnonzero(2 + -(-count // _STEPS_PER_BYTE) > line_bytes)
-    # Most segments of a curve are already elsewhere in their middle.
+    # Cheap rejection: most segments of a curve leave the line in their middle.
     for part in (2, 4):
         k = count[maybe] // part
         maybe = maybe[~_off_line(spots, begin, count, maybe, k)]
@@ -202,18 +203,18 @@ def _find_lines(spots: Offsets, begin: Ints, count: Ints, config: EncoderConfig)
 
 
 def _off_line(spots: Offsets, begin: Ints, count: Ints, which: Ints, k: Ints) -> Bools:
-    """Tell where voxel k of a segment is not that of the LINE between its ends."""
+    """Return whether voxel k of a segment differs from that of the LINE between its ends."""
     first, length = begin[which], count[which]
     off = np.zeros(len(which), dtype=np.bool_)
     for axis in spots:
         start = axis[first]
-        way = axis[first + length] - start
-        off |= axis[first + k] != start + (2 * k * way + length) // (2 * length)
+        distance = axis[first + length] - start
+        off |= axis[first + k] != start + (2 * k * distance + length) // (2 * length)
     return off
 
 
 def _split_long(begin: Ints, count: Ints, lines: Bools, longest: int) -> tuple[Ints, Ints, Bools]:
-    """Cut segments that no op holds."""
+    """Split segments with more steps than one op holds."""
     parts = np.where(lines, 1, np.maximum(1, -(-count // longest)))
     if parts.max(initial=0) <= 1:
         return begin, count, lines
@@ -236,7 +237,7 @@ def _encode_ops(
     lines: Bools,
     config: EncoderConfig,
 ) -> tuple[Bytes, Ints]:
-    """Give the ops of all segments, and how many bytes each has."""
+    """Return the ops of all segments, concatenated, and the bytes of each."""
     lone = count == 0
     stepped = np.flatnonzero(~lone & ~lines)
     crumbs, crumb_bytes = _crumbs(steps, begin[stepped], count[stepped], octant[stepped] // 8)
@@ -253,7 +254,7 @@ def _encode_ops(
 
 
 def _crumbs(steps: Offsets, begin: Ints, count: Ints, main: Ints) -> tuple[Bytes, Ints]:
-    """Give the crumb bytes of segments, one after another, and how many each has."""
+    """Return the crumb bytes of segments, concatenated, and the bytes of each."""
     sizes = -(-count // _STEPS_PER_BYTE)
     moved = (steps != 0).view(np.uint8)
     axes = moved[0] | moved[1] << 1 | moved[2] << 2

@@ -1,6 +1,6 @@
-"""Cells that make up cuboids, found by merging rows, then layers, then stacks of equal ones.
+"""Greedy merging of cells to cuboids: to rows, equal rows to layers, equal layers to stacks.
 
-The cells are voxels or bricks; this module does not care. It knows no op.
+Cells are voxels or bricks. Must not know ops.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from voxdisplay.wire.op_encoding import Ints
 def merge_cuboids(
     cells: Ints, group: Ints, high: Ints | None = None
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """Merge cells of the same group to cuboids, greedily: along x, then y, then z.
+    """Merge cells of the same group to cuboids, greedily along x, then y, then z.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ def merge_cuboids(
     low, high : (m, 3) int64 arrays
         The first and the last cell of each cuboid.
     count : (m,) int64 array
-        How many were merged to each.
+        Number of cells in each cuboid.
     owner : (n,) int64 array
-        Which it became.
+        Cuboid of each cell.
 
     """
     low = np.asarray(cells, dtype=np.int64)
@@ -39,7 +39,7 @@ def merge_cuboids(
     owner = np.arange(len(low))
     for axis in range(3):
         others = [a for a in range(3) if a != axis]
-        # Alike but for their place on this axis, and in its order.
+        # Sorted so that cells with equal extent on the other axes follow each other along this.
         keys = [low[:, axis], *(side[:, a] for a in others for side in (low, high)), of]
         order = np.lexsort(keys)
         alike = np.ones(len(order) - 1, dtype=np.bool_)

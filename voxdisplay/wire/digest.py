@@ -1,4 +1,7 @@
-"""The digest of a page (protocol.md, section 8), for whole sets of voxels at once."""
+"""Digest of a page (protocol.md, section 8), vectorised over voxels.
+
+Must not know frames or ops.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +11,20 @@ from numpy.typing import NDArray
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
 from voxdisplay.wire import spec
 
-# What sets the value of a colour apart from that of a pixel.
+# Added to a palette entry's colour, so that it differs from every pixel value.
 _COLOR = 0x1000000
-_BLOCK = 1 << 15  # voxels at once: what is computed of them stays in a core's cache
+_BLOCK = 1 << 15  # voxels per block: intermediate arrays stay in a core's cache
 
 
 def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
-    """Give the digest of a page with the default palette.
+    """Return the digest of a page with the default palette.
 
     Parameters
     ----------
     index : (n,) integer array
-        Scan-order indices of the voxels that may be lit, each once.
+        Scan-order indices of voxels, each once.
     values : (n,) integer array
-        Their pixel values; those that are 0 do not count.
+        Their pixel values; dark ones, 0, add nothing.
 
     Returns
     -------
@@ -32,12 +35,12 @@ def digest(index: NDArray[np.integer], values: NDArray[np.integer]) -> int:
     index, values = np.asarray(index), np.asarray(values)
     index, values = index[values != 0], values[values != 0]
     blocks = (slice(low, low + _BLOCK) for low in range(0, len(values), _BLOCK))
-    found = sum(_block_digest(index[some].astype(np.uint32), values[some]) for some in blocks)
+    found = sum(_block_digest(index[block].astype(np.uint32), values[block]) for block in blocks)
     return found & 0xFFFFFFFF
 
 
 def page_digest(page: Pixels, format_: PixelFormat) -> int:
-    """Give the digest of a whole page, as it lies in the display's memory; as `digest` does.
+    """Return the digest of a whole page as it lies in the display's memory.
 
     Parameters
     ----------
@@ -58,7 +61,7 @@ def page_digest(page: Pixels, format_: PixelFormat) -> int:
 
 
 def _block_digest(index: Values, values: NDArray[np.integer]) -> int:
-    """Give the sum of what lit voxels add, modulo 2**32."""
+    """Return the contribution of lit voxels, modulo 2**32."""
     h = index * np.uint32(spec.DIGEST_MUL_INDEX)
     part = values.astype(np.uint32)
     part *= np.uint32(spec.DIGEST_MUL_VALUE)
@@ -72,14 +75,14 @@ def _block_digest(index: Values, values: NDArray[np.integer]) -> int:
 
 
 def palette_digest(voxels: int, entries: NDArray[np.integer], colors: NDArray[np.integer]) -> int:
-    """Give what a palette adds to the digest of its page.
+    """Return the contribution of a palette to the digest of its page.
 
     Parameters
     ----------
     voxels : int
         Voxels of the page.
     entries : (n,) integer array
-        The entries that are not those of the default palette.
+        Entries that differ from the default palette.
     colors : (n, 3) integer array
         Their red, green and blue.
 

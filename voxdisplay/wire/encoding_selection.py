@@ -1,17 +1,17 @@
-"""Which coder draws what in the fewest bytes: counted before anything is sent.
+"""Selection of encodings: the encoder that draws a page update in the fewest bytes.
 
-Ordered items go as chains, sets of voxels as bricks, dots and boxes, or as spans in scan order;
-what is best is found out by laying out pieces and counting. A lower bound, where one is cheap,
-saves the trouble. Range coding takes long: whoever has a fast link leaves ARC out of the features.
-Painter's order was settled before: no voxel has two pixels, so pieces may come in any order, and
-for a fast line what is dense is coded in slabs, each by itself: it need not wait for all of them.
+Ordered voxels are encoded as chains, sets of voxels as bricks, dots and boxes, or as spans in scan
+order. Each candidate is laid out and its bytes are counted, unless a lower bound rules it out.
+Range coding is slow: for a fast link ARC is left out of the features (`features`). Each voxel has
+one pixel value here, so that op blocks may come in any order; for a fast line dense sets are
+encoded in independent slabs, so that the first can be sent at once. Must not know frames or links.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from itertools import chain as in_turn
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,25 +25,26 @@ from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout, concatena
 from voxdisplay.wire.range_coded_chains import encode_range_coded
 from voxdisplay.wire.raw_pixels import encode_raw, is_incompressible
 
-# Of many colours, voxels that mostly have other neighbours in their row make no bricks.
+# With more colours, voxels that mostly differ from the next in their row make no bricks.
 _MANY_COLORS = 16
-_SAMPLE = 512  # voxels, which mostly show already that there are as many
-# More voxels without an order are cut: into slabs of whole bricks, each of so many voxels or a few.
+_SAMPLE = 512  # voxels in which colours are counted first
+# Larger sets are cut into slabs of whole bricks with about so many voxels each; incompressible
+# slabs further, into parts for the parser.
 _LARGE_SET = 1 << 16
 _SLAB_VOXELS = 1 << 18
 _PARSED_VOXELS = 1 << 17
-# Bytes a second of a line that might run dry while all is coded in one piece, which is shorter.
+# Line rate, bytes/s, from which sets are cut: in one piece, which is shorter, the line would idle.
 _SLABS_FROM = 100_000
-# Bytes a second of a line on which chains are sent before it is known whether sets were shorter.
+# Line rate, bytes/s, from which chains are sent without trying whether sets are shorter.
 _CHAINS_FROM = 800_000
-_LONE_FRACTION = 16  # where one voxel of so many is alone, sets are tried all the same
-# Bytes a second of a line that carries pixels of many colours sooner than they are parsed.
+_LONE_FRACTION = 16  # unless one voxel in so many is isolated
+# Line rate, bytes/s, from which incompressible pages are sent raw rather than parsed.
 _RAW_FROM = 2_400_000
 
 
 @dataclass(frozen=True)
 class OrderedVoxels:
-    """Voxels in an order, all on the grid: those of one item, or of several, one after another.
+    """Voxels on the grid in drawing order, of one item or of several, one after another.
 
     Attributes
     ----------
@@ -53,10 +54,10 @@ class OrderedVoxels:
         Their scan-order indices.
     values : (n,) integer array
         Their pixel values.
-    owner : (n,) int64 array
-        Number of the item that each belongs to, ascending.
+    item : (n,) int64 array
+        Number of the item of each, ascending.
     corners : (n,) bool array
-        Where a straight line may end and another begin.
+        True where a straight line may end and another begin.
 
     """
 
@@ -70,38 +71,39 @@ class OrderedVoxels:
         return len(self.values)
 
     def select(self, kept: Bools) -> OrderedVoxels:
-        """Give some of the voxels."""
+        """Return the voxels where a mask, (n,), is set."""
         if kept.all():
             return self
         return OrderedVoxels(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
 def concatenate_ordered(parts: Sequence[OrderedVoxels]) -> OrderedVoxels:
-    """Give the items of all parts, n >= 1, one part after another, and number them anew."""
+    """Return the voxels of all parts, at least one, with their items renumbered."""
     if len(parts) == 1:
         return parts[0]
     voxels, index, values, _, corners = (
         np.concatenate([getattr(part, field.name) for part in parts])
         for field in fields(OrderedVoxels)
     )
-    # Those that were joined before have numbers from 0.
-    items = [int(part.item[-1]) + 1 if len(part) else 0 for part in parts]
-    first = np.cumsum(items) - items
+    # Parts that were concatenated before have several items, numbered from 0.
+    ordered = [int(part.item[-1]) + 1 if len(part) else 0 for part in parts]
+    first = np.cumsum(ordered) - ordered
     owner = np.concatenate([part.item + n for part, n in zip(parts, first, strict=True)])
     return OrderedVoxels(voxels, index, values, owner, corners)
 
 
 @dataclass(frozen=True)
 class PageUpdate:
-    """All that is to be drawn.
+    """Voxels to be drawn.
 
     Attributes
     ----------
-    items : Items or None
-    index : (n,) int64 array
-        Voxels without an order, besides: scan-order indices, ascending, each once.
-    look : Look
-        Gives the pixel values of voxels as they are to be in the end, by their indices.
+    ordered : OrderedVoxels or None
+        Voxels with a drawing order.
+    unordered : (n,) int64 array
+        Scan-order indices of all others, ascending, each once.
+    pixels_at : PixelLookup
+        Function from indices to the pixel values of the finished page.
 
     """
 
@@ -111,65 +113,65 @@ class PageUpdate:
 
 
 def encode_update(
-    content: PageUpdate, config: EncoderConfig, first: OpBlocks | None = None
+    update: PageUpdate, config: EncoderConfig, first: OpBlocks | None = None
 ) -> Iterator[list[bytes]]:
-    """Give the payloads that draw the content, in whatever order they arrive, bit by bit.
+    """Yield the payloads that draw an update, in whatever order they arrive.
 
-    Coding goes on while they are taken. An empty list means that some of the work is done: whoever
-    has something else to do may do it now.
+    Encoding continues while they are taken. An empty list is a pause, in which the caller may serve
+    the link.
 
     Parameters
     ----------
-    content : Content
-    coding : Coding
-    first : Pieces, optional
-        What is to be sent besides.
+    update : PageUpdate
+    config : EncoderConfig
+    first : OpBlocks, optional
+        Blocks to be sent as well, such as palette entries.
 
     Yields
     ------
     list of bytes
-        At most ``coding.max_payload`` bytes each, none of them empty.
+        At most ``config.max_payload`` bytes each, none of them empty.
 
     """
-    items, index = content.ordered, content.unordered
+    ordered, index = update.ordered, update.unordered
     if len(index) > _LARGE_SET and config.bytes_per_s >= _SLABS_FROM:
-        for slab in _slabs(index, content.pixels_at, config):
+        for slab in _slabs(index, update.pixels_at, config):
             yield from _encode(
-                PageUpdate(None, slab, content.pixels_at), config, first or no_blocks()
+                PageUpdate(None, slab, update.pixels_at), config, first or no_blocks()
             )
             first = None
-        if not items:
+        if not ordered:
             return
         index = index[:0]
-    yield from _encode(PageUpdate(items, index, content.pixels_at), config, first or no_blocks())
+    yield from _encode(PageUpdate(ordered, index, update.pixels_at), config, first or no_blocks())
 
 
 def encode_raw_if_faster(
     page: Pixels, config: EncoderConfig, first: OpBlocks | None = None
 ) -> Iterator[list[bytes]] | None:
-    """Give payloads that draw a page as it is, if a shorter coding would take longer than they.
+    """Return raw payloads of a page, if finding a shorter encoding would take longer than sending.
 
     Parameters
     ----------
     page : ndarray
         The display's memory in scan order: (V,), or (V, 3) for rgb888.
-    coding, first
-        As of `encode`.
+    config, first
+        As of `encode_update`.
 
     Returns
     -------
     iterator or None
-        As of `encode`; None if that should draw what is lit.
+        As of `encode_update`; None if that should be used.
 
     """
     if config.bytes_per_s < _RAW_FROM or not is_incompressible(page, config):
         return None
     before = PayloadLayout(first, config).payloads if first else []
-    return in_turn([before], encode_raw(page, config))
+    return chain([before], encode_raw(page, config))
 
 
 def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> Iterator[Ints]:
-    """Cut voxels into slabs along z, where bricks end; and those that make no bricks, further."""
+    """Yield slabs of voxels, cut along z between bricks; incompressible ones are cut further."""
     layer = config.grid.nx * config.grid.ny
     side = 1 << spec.LIMIT_MAX_LEVEL
     thick = max(1, _SLAB_VOXELS // (layer * side)) * side
@@ -181,64 +183,64 @@ def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> 
                 yield part
 
 
-def _encode(content: PageUpdate, config: EncoderConfig, first: OpBlocks) -> Iterator[list[bytes]]:
+def _encode(update: PageUpdate, config: EncoderConfig, first: OpBlocks) -> Iterator[list[bytes]]:
     best = _BestLayout(config, first)
-    items, pixels_at = content.ordered, content.pixels_at
-    if items is None or not len(items):
-        if len(content.unordered):
+    ordered, pixels_at = update.ordered, update.pixels_at
+    if ordered is None or not len(ordered):
+        if len(update.unordered):
             yield from _with_pauses(
-                _offer_set_encodings(best, no_blocks(), content.unordered, pixels_at)
+                _offer_set_encodings(best, no_blocks(), update.unordered, pixels_at)
             )
         yield best.payloads
         return
-    # A voxel that follows itself would end a chain.
-    items = items.select(np.concatenate(([True], items.index[1:] != items.index[:-1])))
-    chains = build_chains(items.voxels, items.values, config, items.corners)
+    # A repeated voxel would end a chain.
+    ordered = ordered.select(np.concatenate(([True], ordered.index[1:] != ordered.index[:-1])))
+    chains = build_chains(ordered.voxels, ordered.values, config, ordered.corners)
     yield []
-    if not len(content.unordered):
+    if not len(update.unordered):
         best.offer(chains.blocks)
-        if (items.values != items.values[0]).any():
+        if (ordered.values != ordered.values[0]).any():
             best.offer(_sorted_by_pen(chains.blocks))
     lone = int(np.count_nonzero(chains.count == 0))
     if (
         config.bytes_per_s >= _CHAINS_FROM
-        and _LONE_FRACTION * lone < len(items)
-        and not len(content.unordered)
+        and _LONE_FRACTION * lone < len(ordered)
+        and not len(update.unordered)
     ):
         yield best.payloads
         return
     yield []
-    apart = _cheaper_as_set(chains, items, pixels_at, config)
-    if apart.any() or len(content.unordered):
-        index = _union(items.index[_voxel_rows(chains, apart)], content.unordered)
-        kept = _sorted_by_pen(chains.blocks.take(np.flatnonzero(~apart)))
+    as_set = _cheaper_as_set(chains, ordered, pixels_at, config)
+    if as_set.any() or len(update.unordered):
+        index = _union(ordered.index[_voxel_rows(chains, as_set)], update.unordered)
+        kept = _sorted_by_pen(chains.blocks.take(np.flatnonzero(~as_set)))
         yield from _with_pauses(_offer_set_encodings(best, kept, index, pixels_at))
         yield []
     if config.bytes_per_s >= _CHAINS_FROM:
         yield best.payloads
         return
-    index = _union(items.index, content.unordered)
+    index = _union(ordered.index, update.unordered)
     if spans.min_bytes(index, config) < best.total_bytes:
         best.offer(run_to_end(spans.encode_span_set(index, pixels_at(index), pixels_at, config)))
-    if config.has(spec.FEATURE_ARC) and not len(content.unordered):
-        best.offer_payloads(encode_range_coded(items.voxels, items.values, config))
+    if config.has(spec.FEATURE_ARC) and not len(update.unordered):
+        best.offer_payloads(encode_range_coded(ordered.voxels, ordered.values, config))
     yield best.payloads
 
 
 def _with_pauses(steps: Incremental[None]) -> Iterator[list[bytes]]:
-    """Do steps, with nothing to be sent in between."""
+    """Yield a pause for each step of incremental work."""
     for _ in steps:
         yield []
 
 
 def _union(index: Ints, others: Ints) -> Ints:
-    """Give the indices of both, ascending, each once."""
+    """Return the union of indices, ascending."""
     together = np.sort(np.concatenate((index, others)) if len(others) else index)
     return together[np.concatenate(([True], together[1:] != together[:-1]))]
 
 
 class _BestLayout:
-    """The layout of the fewest bytes among those that were offered."""
+    """The layout with the fewest bytes of all candidates offered."""
 
     def __init__(self, config: EncoderConfig, first: OpBlocks) -> None:
         self.config = config
@@ -248,19 +250,19 @@ class _BestLayout:
 
     @property
     def total_bytes(self) -> float:
-        """Its bytes; without any, more than there can be."""
+        """Bytes of the best candidate; infinite without one."""
         others = sum(map(len, self._others))
         return self._layout.total_bytes + others if self._layout else np.inf
 
     @property
     def payloads(self) -> list[bytes]:
-        """Its payloads."""
+        """Payloads of the best candidate."""
         if self._layout is None:
             self.offer(no_blocks())
         return self._layout.payloads + self._others if self._layout else []
 
     def offer(self, *parts: OpBlocks) -> None:
-        """Take pieces, if they take fewer bytes."""
+        """Keep blocks if their layout takes fewer bytes than the best so far."""
         blocks = (
             concatenate_blocks([self._first, *parts])
             if len(self._first)
@@ -271,56 +273,56 @@ class _BestLayout:
             self._layout, self._others = layout, []
 
     def offer_payloads(self, payloads: list[bytes]) -> None:
-        """Take what is payloads already, if with what comes first they take fewer bytes."""
+        """Keep finished payloads if, with the blocks sent first, they take fewer bytes."""
         first = PayloadLayout(self._first, self.config)
         if first.total_bytes + sum(map(len, payloads)) < self.total_bytes:
             self._layout, self._others = first, payloads
 
 
 def _sorted_by_pen(blocks: OpBlocks) -> OpBlocks:
-    """Order pieces so that a pen is set once; pieces that go on from another stay behind it."""
+    """Return blocks sorted by pen, stably, so that each pen is set once."""
     if len(blocks) == 0 or (blocks.pen == blocks.pen[0]).all():
         return blocks
     return blocks.take(np.argsort(blocks.pen, kind="stable"))
 
 
 def _voxel_rows(chains: Chains, which: Bools) -> Ints:
-    """Give the places of the voxels of some pieces, one piece after another."""
+    """Return the rows of the voxels of selected segments, concatenated."""
     return concat_ranges(chains.begin[which], chains.count[which] + 1)
 
 
 def _cheaper_as_set(
-    chains: Chains, items: OrderedVoxels, pixels_at: spans.PixelLookup, config: EncoderConfig
+    chains: Chains, ordered: OrderedVoxels, pixels_at: spans.PixelLookup, config: EncoderConfig
 ) -> Bools:
-    """Tell which pieces of chains better go as a set of their voxels: (pieces,).
+    """Return which segments are cheaper as a set of their voxels: (segments,).
 
-    An item does if a lower bound does not speak against it, and if all such pieces of its pen
-    together take fewer bytes. A lone voxel always does.
+    Those of an item are if a lower bound admits it and all such segments of their pen together take
+    fewer bytes as a set. A lone voxel always is.
     """
     blocks = chains.blocks
-    apart: Bools = chains.count == 0
+    as_set: Bools = chains.count == 0
     if not voxel_sets.has_set_ops(config) or config.bytes_per_s >= _CHAINS_FROM:
-        return apart
+        return as_set
     goes = np.concatenate(([True], blocks.cursor[1:] != blocks.cursor_after[:-1]))
     cost = blocks.size + goes * (config.position_bytes + ~blocks.starts_with_step)
-    item = items.item[chains.begin]
+    item = ordered.item[chains.begin]
     as_chain = np.bincount(item, weights=cost)
-    least = voxel_sets.min_bytes(items.index, items.item, len(as_chain), config)
+    least = voxel_sets.min_bytes(ordered.index, ordered.item, len(as_chain), config)
     maybe = (least < as_chain)[item]
     if not maybe.any():
-        return apart
-    voxels = _union(items.index[_voxel_rows(chains, maybe)], items.index[:0])
+        return as_set
+    voxels = _union(ordered.index[_voxel_rows(chains, maybe)], ordered.index[:0])
     encoded = voxel_sets.encode_set(voxels, pixels_at(voxels), config)
     rank = np.searchsorted(encoded.values, blocks.pen[maybe])
     as_chains = np.bincount(rank, weights=cost[maybe], minlength=len(encoded.values))
-    apart[maybe] |= (encoded.bytes_per_value < as_chains)[rank]
-    return apart
+    as_set[maybe] |= (encoded.bytes_per_value < as_chains)[rank]
+    return as_set
 
 
 def _offer_set_encodings(
     best: _BestLayout, kept: OpBlocks, index: Ints, pixels_at: spans.PixelLookup
 ) -> Incremental[None]:
-    """Offer pieces together with a set of voxels, n >= 1, coded in each way; in steps."""
+    """Offer blocks together with each encoding of a set of voxels, n >= 1; incrementally."""
     config, values = best.config, pixels_at(index)
     if voxel_sets.has_set_ops(config) and not _is_incompressible(index, values):
         encoded = voxel_sets.encode_set(index, values, config)
@@ -340,19 +342,19 @@ def _offer_set_encodings(
 
 
 def _is_incompressible(index: Ints, values: NDArray[np.integer]) -> bool:
-    """Tell whether bricks cannot be worth trying: many colours, and few voxels like the next."""
+    """Return whether bricks cannot pay: many colours, and few voxels that equal the next."""
     alike = (index[1:] - index[:-1] == 1) & (values[1:] == values[:-1])
     if 2 * int(np.count_nonzero(alike)) >= len(index):
         return False
-    some = values[:: -(-len(values) // _SAMPLE)]
-    return len(np.unique(some)) > _MANY_COLORS or len(np.unique(values)) > _MANY_COLORS
+    sample = values[:: -(-len(values) // _SAMPLE)]
+    return len(np.unique(sample)) > _MANY_COLORS or len(np.unique(values)) > _MANY_COLORS
 
 
 def _cheaper_as_spans(
     index: Ints, values: NDArray[np.integer], encoded: voxel_sets.EncodedSet, config: EncoderConfig
 ) -> Bools:
-    """Guess which pixels take fewer bytes in scan order than as bricks: (pixels,)."""
+    """Estimate which pixel values take fewer bytes as spans than as bricks: (values,)."""
     row = np.concatenate(([True], (np.diff(index) != 1) | (values[1:] != values[:-1])))
     rows = np.bincount(np.searchsorted(encoded.values, values[row]), minlength=len(encoded.values))
-    # SKIP with a count of two bytes, and LIT of one pixel.
+    # Per row: SKIP with a count of two bytes, and LIT of one pixel.
     return rows * (3 + config.format.bytes) < encoded.bytes_per_value + config.pen_bytes

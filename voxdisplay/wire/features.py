@@ -1,6 +1,6 @@
-"""What of all that a device announces is worth using on a line.
+"""Selection of coding features by line rate.
 
-Knows lines only as bytes per second, and features by their names.
+Must not know links: a line is a number of bytes per second, a feature a name.
 """
 
 from __future__ import annotations
@@ -8,22 +8,22 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Final
 
-# Range coding saves about a bit a voxel and takes some 5 us for it: it pays below this.
+# Range coding saves about one bit a voxel and takes some 5 us for it: it pays below this rate.
 SLOW_BYTES_PER_S: Final = 25_000
-# What a line is taken for that nobody knows: it has work soon, as what is large is coded in parts,
-# and no bytes are spent to save time.
+# Assumed for a line of unknown rate: large frames are encoded in parts, so that the line has work
+# soon, and no bytes are spent to save time.
 UNKNOWN_BYTES_PER_S: Final = 200_000
 
 
 def select_features(features: Collection[str], bytes_per_s: float) -> tuple[str, ...]:
-    """Leave out ARC on a line that is faster than its coder.
+    """Return the features to use on a line: all but ARC where the line outpaces its coder.
 
     Parameters
     ----------
     features : collection of str
         As in `DeviceInfo.features`.
     bytes_per_s : float
-        What the line carries.
+        Rate of the line.
 
     """
     if bytes_per_s < SLOW_BYTES_PER_S:

@@ -1,7 +1,7 @@
-"""Work that is done in steps, for who must not be away from a line for long.
+"""Incremental work: long computations as generators that pause, so that a link can be served.
 
-Such work is a generator: at each yield there is time for something else, and in the end it returns
-what was wanted. Nothing here knows what is worked at.
+At each yield the caller may do something else; the generator's return value is the result. Must not
+know what is computed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Incremental: TypeAlias = Generator[None, None, Result]
 
 
 def run_to_end(steps: Incremental[Result]) -> Result:
-    """Do all steps; give the result."""
+    """Run incremental work to its end and return its result."""
     while True:
         try:
             next(steps)

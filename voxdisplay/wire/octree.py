@@ -1,10 +1,10 @@
-"""Sets of voxels without an order -> nodes of octrees, and how each costs least.
+"""Octree over a set of voxels, with the cheapest op for each node.
 
-Voxels of one pixel are sorted so that those of a node follow each other. From the leaves up, each
-node finds how its voxels cost least: as a brick of its own, as dots, as one chain if they are one,
-or in whatever way its children do; a brick that no payload holds is never among them. All nodes of
-a level are done at once, by arrays. This module counts bytes (protocol.md, section 7), and makes
-none.
+Voxels of one pixel value are sorted in Morton order, so that those of a node are contiguous. From
+the leaves up, each node takes the cheapest of: a brick (OCT) of its own, DOTS, one chain if its
+voxels are one, or the sum of its children; a brick that exceeds a payload is never taken. All nodes
+of a level are processed at once, by arrays. Must not encode: it counts bytes (protocol.md, section
+7).
 """
 
 from __future__ import annotations
@@ -21,41 +21,42 @@ TOP_LEVEL = spec.LIMIT_MAX_LEVEL
 BRICK_SIDE = 1 << TOP_LEVEL
 _LEAF_BITS = 3 * TOP_LEVEL
 _NEVER = 1 << 40
-# Where the bits of a coordinate inside a brick go, so that x, y and z take turns.
+# Bits of a coordinate inside a brick, spread for interleaving with the others (Morton order).
 _SPREAD = np.array(
     [sum((c >> bit & 1) << 3 * bit for bit in range(TOP_LEVEL)) for c in range(BRICK_SIDE)]
 )
-_BITS = np.array([mask.bit_count() for mask in range(256)])
-# Where one voxel of so many is lit, the whole page is looked at.
-_CROWDED = 16
+_POPCOUNT = np.array([mask.bit_count() for mask in range(256)])
+# A set denser than one voxel in so many is sorted as a whole page.
+_DENSE_RATIO = 16
 _AS_BRICK, _AS_DOTS, _AS_CHILDREN, _AS_CHAIN = range(4)
 _STEPS_PER_BYTE = 4
-# In nodes of lower levels a chain saves a byte or two; to look for them takes longest there.
+# In nodes of lower levels a chain saves a byte or two, and searching takes longest.
 _MIN_CHAIN_LEVEL = 3
 
 
 @dataclass(frozen=True)
 class Level:
-    """The nodes of one level, 1 or higher, in the order of their keys."""
+    """Nodes of one level, 1 or higher, in the order of their keys."""
 
     key: Ints
     first: Ints  # their first child on the level below; meaningless on level 1
-    mask: Bytes  # of all children, also where it is not sent
+    mask: Bytes  # of all children, also where a full node sends 00
     full: Bools
-    nodes: Ints  # masks of a brick that begins here
-    voxels: Ints  # how many
-    min_bytes: Ints  # bytes of the cheapest way
+    nodes: Ints  # masks of a brick whose root is this node
+    voxels: Ints  # number
+    min_bytes: Ints  # of the cheapest choice
     choice: NDArray[np.int8]
 
 
 def build_leaves(
     index: Ints, rank: Ints, ranks: int, bricks_per_axis: list[int], config: EncoderConfig
 ) -> tuple[Ints, Bytes]:
-    """Give keys and masks of the nodes of level 1, in the order of the keys.
+    """Return keys and masks of the nodes of level 1, in the order of the keys.
 
-    A key is the pixel, the brick, and the way down to the node in it, three bits a level.
+    A key is, from the highest digit: rank of the pixel value, brick of the top level in scan order,
+    and the path to the node inside it, three bits a level.
     """
-    if ranks == 1 and _CROWDED * len(index) > config.grid.voxels:
+    if ranks == 1 and _DENSE_RATIO * len(index) > config.grid.voxels:
         return _leaves_of_page(index, bricks_per_axis, config)
     x, y, z = config.grid.voxels_at(index).T
     bx, by, bz = bricks_per_axis
@@ -73,7 +74,7 @@ def build_leaves(
 def _leaves_of_page(
     index: Ints, bricks_per_axis: list[int], config: EncoderConfig
 ) -> tuple[Ints, Bytes]:
-    """Do as `leaves` for many voxels of one pixel: as a whole page nothing needs to be sorted."""
+    """Return as `build_leaves` for a dense set of one pixel value: by a page, without sorting."""
     nx, ny, nz = config.grid
     bx, by, bz = bricks_per_axis
     page = np.zeros((bz * BRICK_SIDE, by * BRICK_SIDE, bx * BRICK_SIDE), dtype=np.uint8)
@@ -85,7 +86,7 @@ def _leaves_of_page(
         mask |= page[child >> 2 :: 2, child >> 1 & 1 :: 2, child & 1 :: 2] << np.uint8(child)
     halves = [2] * (TOP_LEVEL - 1)
     parts = mask.reshape(bz, *halves, by, *halves, bx, *halves)
-    # Bricks first, then level by level: z, y and x take turns.
+    # Axes of bricks first, then of each level: z, y, x.
     axes = np.arange(3 * TOP_LEVEL).reshape(3, TOP_LEVEL).T.reshape(-1)
     ordered = parts.transpose(axes).reshape(-1)
     key = np.flatnonzero(ordered)
@@ -93,9 +94,9 @@ def _leaves_of_page(
 
 
 def build_levels(key: Ints, mask: Bytes, config: EncoderConfig) -> list[Level]:
-    """Build the levels from 1 up, each node with the cheapest way to draw it."""
+    """Return the levels from 1 up, each node with the cheapest way to draw it."""
     header, dot = _op_costs(config)
-    voxels = _BITS[mask]
+    voxels = _POPCOUNT[mask]
     nodes = np.ones(len(key), dtype=np.int64)
     costs = np.stack((nodes + header, voxels * dot, voxels * min(header, dot)))
     levels = [
@@ -126,16 +127,16 @@ def build_levels(key: Ints, mask: Bytes, config: EncoderConfig) -> list[Level]:
 
 
 def _find_chains(levels: list[Level], number: int, nodes: Ints) -> tuple[Ints, Ints, Ints]:
-    """Find out which nodes of a level, by their keys, are one chain that rises on some axis.
+    """Return which nodes of a level, given by their keys, are one chain along some axis.
 
     Returns
     -------
     keys : (n,) int64 array
-        Their voxels, each chain in its order.
+        Keys of their voxels, each chain in its order.
     main : (nodes,) int64 array
-        The axis, or -1.
+        The axis; -1 if the node is no chain.
     owner : (n,) int64 array
-        Which node each voxel belongs to.
+        Node of each voxel.
 
     """
     inside = 3 * (number - 1)
@@ -154,8 +155,8 @@ def _find_chains(levels: list[Level], number: int, nodes: Ints) -> tuple[Ints, I
         step = np.diff(spot[:, along])
         inner = owner[1:] == owner[:-1]
         far = inner & ((step[axis] != 1) | (np.abs(step) > 1).any(axis=0))
-        # What goes on on this axis, and does not turn round on another.
-        up, down = (_nodes_with(inner & (step * way > 0), owner, len(nodes)) for way in (1, -1))
+        # A chain advances by one on this axis and never reverses on another.
+        up, down = (_nodes_with(inner & (step * sign > 0), owner, len(nodes)) for sign in (1, -1))
         found = (
             ~_nodes_with(far[None], owner, len(nodes))[0] & ~(up & down).any(axis=0) & (main < 0)
         )
@@ -165,7 +166,7 @@ def _find_chains(levels: list[Level], number: int, nodes: Ints) -> tuple[Ints, I
 
 
 def _nodes_with(steps: Bools, owner: Ints, nodes: int) -> Bools:
-    """Tell of each row which nodes have such a step: (rows, nodes)."""
+    """Return for each row which nodes contain a step that is set: (rows, nodes)."""
     found = np.zeros((len(steps), nodes), dtype=np.bool_)
     row, at = np.nonzero(steps)
     found[row, owner[at]] = True
@@ -173,7 +174,7 @@ def _nodes_with(steps: Bools, owner: Ints, nodes: int) -> Bools:
 
 
 def _op_costs(config: EncoderConfig) -> tuple[int, int]:
-    """Give the bytes of a brick but for its masks, and of a dot."""
+    """Return the bytes of a brick without its masks, and of one dot."""
     header = 1 + config.position_bytes if config.has(spec.FEATURE_OCT) else _NEVER
     return header, config.position_bytes if config.has(spec.FEATURE_DOTS) else _NEVER
 
@@ -185,10 +186,10 @@ def _cheapest(costs: Ints) -> NDArray[np.int8]:
 def select_ops(
     levels: list[Level], config: EncoderConfig
 ) -> tuple[list[tuple[int, Ints]], Ints, Ints]:
-    """Go down from the top: the bricks of each level, the keys of chains' voxels, and of dots.
+    """Return the cheapest cover of the tree: bricks by level, keys of chain voxels, keys of dots.
 
-    Bricks are nodes of their level; those of level 0 are keys, too. Voxels of a chain are in its
-    order, one chain after another.
+    Bricks are indices of nodes of their level; those of level 0 are keys. Voxels of a chain are in
+    its order, one chain after another.
     """
     roots: list[tuple[int, Ints]] = []
     dots: list[Ints] = []
@@ -213,7 +214,7 @@ def select_ops(
 
 
 def _descendants(levels: list[Level], number: int, nodes: Ints, to: int) -> Ints:
-    """Give the descendants of nodes on a lower level, 1 or higher."""
+    """Return the descendants of nodes on a lower level, 1 or higher."""
     begin, end = nodes, nodes + 1
     for level in range(number, to, -1):
         edges = np.append(levels[level - 1].first, len(levels[level - 2].key))
@@ -222,14 +223,14 @@ def _descendants(levels: list[Level], number: int, nodes: Ints, to: int) -> Ints
 
 
 def _voxel_keys(levels: list[Level], nodes: Ints) -> Ints:
-    """Give the keys of the voxels of nodes of level 1."""
+    """Return the keys of the voxels of nodes of level 1."""
     leaves = levels[0]
     lit = np.unpackbits(leaves.mask[nodes, None], axis=1, bitorder="little") != 0
     return np.asarray((leaves.key[nodes, None] << 3 | np.arange(8))[lit])
 
 
 def origins(key: Ints, bricks_per_axis: list[int]) -> tuple[Ints, Ints]:
-    """Give the voxels, (n, 3), of keys of level 0, and the ranks of their pixels."""
+    """Return the voxels, (n, 3), of keys of level 0, and the ranks of their pixel values."""
     bx, by, bz = bricks_per_axis
     block, x = np.divmod(key >> _LEAF_BITS, bx)
     block, y = np.divmod(block, by)

@@ -1,6 +1,6 @@
-"""What all coders of ops share: how coordinates, counts and ragged rows become bytes.
+"""Encoding of operands: coordinates, counts and pixels as bytes (protocol.md, sections 2 and 7.2).
 
-This is protocol.md, sections 2 and 7.2. Nothing here knows what an op draws, or where it ends up.
+Shared by all encoders of ops. Must not know what an op draws, nor in which payload it ends up.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Counts above this need a LEB128 behind the op byte (section 7.2).
+# Counts above this need a LEB128 after the op byte (section 7.2).
 SHORT_COUNT = 31
-# From these counts on, the LEB128 has one byte more.
+# Counts from which the LEB128 is one byte longer.
 _LONGER_FROM = [SHORT_COUNT + 1 + (1 << bits if bits else 0) for bits in range(0, 35, 7)]
 
 
 @dataclass(frozen=True)
 class EncoderConfig:
-    """What the bytes of ops depend on: the display's grid and format, and what else it announced.
+    """Properties of device and line that determine the encoding.
 
     Attributes
     ----------
@@ -34,10 +34,10 @@ class EncoderConfig:
     max_payload : int
         Bytes of the longest payload.
     features : int
-        The bits of INFO: bit i is feature i. No op of another feature is ever made.
+        The bits of INFO: bit i is feature i. Ops of other features are never used.
     bytes_per_s : float
-        What the line carries; 0 for a slow one. What takes longer to find out than it saves there
-        is left undone.
+        Rate of the line; 0 for a slow one. Searches that take longer than they save on it are
+        skipped.
 
     """
 
@@ -48,7 +48,7 @@ class EncoderConfig:
     bytes_per_s: float = 0.0
 
     def has(self, feature: int) -> bool:
-        """Tell whether the device announced a feature, ``spec.FEATURE_...``."""
+        """Return whether the device announced a feature, ``spec.FEATURE_...``."""
         return bool(self.features >> feature & 1)
 
     @property
@@ -58,7 +58,7 @@ class EncoderConfig:
 
     @property
     def position_bytes(self) -> int:
-        """Bytes of the three coordinates of a MOVE or FROM."""
+        """Bytes of three coordinates, as of a MOVE or FROM."""
         return 3 * self.coordinate_bytes
 
     @property
@@ -68,12 +68,12 @@ class EncoderConfig:
 
     @property
     def max_block_bytes(self) -> int:
-        """Bytes of a payload that are left when its pen is set and its cursor has moved."""
+        """Bytes left in a payload after a PEN and a MOVE: the limit of one op block."""
         return self.max_payload - self.pen_bytes - 1 - self.position_bytes
 
 
 def little_endian(values: NDArray[np.integer], size: int) -> Bytes:
-    """Give values, (n,), as an (n, size) array of bytes, lowest first."""
+    """Return values, (n,), as an (n, size) array of bytes, least significant first."""
     shifts = np.arange(size, dtype=np.uint64) * np.uint64(8)
     return (values.astype(np.uint64)[:, None] >> shifts).astype(np.uint8)
 
@@ -86,7 +86,7 @@ def encode_positions(voxels: NDArray[np.integer], config: EncoderConfig) -> Byte
 
 
 def counted_op_bytes(counts: NDArray[np.integer]) -> Ints:
-    """Give the bytes of ops that carry counts, 1 <= count < 2**32, op byte included."""
+    """Return the bytes of ops with counts, 1 <= count < 2**32, op byte included."""
     size = np.ones(counts.shape, dtype=np.int64)
     most = counts.max(initial=0)
     for longer in _LONGER_FROM:
@@ -97,7 +97,7 @@ def counted_op_bytes(counts: NDArray[np.integer]) -> Ints:
 
 
 def counted_ops(op: int | Ints, counts: Ints) -> tuple[Bytes, Ints]:
-    """Give ops that carry counts: an (n, 6) array of bytes, and how many of each row count."""
+    """Return ops with counts as an (n, 6) array of bytes, and how many of each row are used."""
     size = counted_op_bytes(counts)
     out = np.empty((len(counts), 6), dtype=np.uint8)
     out[:, 0] = op | np.minimum(counts - 1, SHORT_COUNT)
@@ -109,7 +109,7 @@ def counted_ops(op: int | Ints, counts: Ints) -> tuple[Bytes, Ints]:
 
 
 def concat_ranges(start: Ints, length: Ints) -> Ints:
-    """Give the whole numbers of ranges, one range after another."""
+    """Return the integers of ranges [start, start + length), concatenated."""
     ends = np.cumsum(length)
     total = int(ends[-1]) if len(ends) else 0
     return np.asarray(np.arange(total) + np.repeat(start - (ends - length), length))

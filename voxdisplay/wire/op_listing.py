@@ -1,7 +1,7 @@
-"""The ops of a payload, one by one: what each is called and how many bytes it has (section 7).
+"""Listing of a payload's ops: name and size of each (protocol.md, section 7).
 
-For whoever wants to know what a packet is made of. Ops are told apart and measured, not checked and
-not drawn; what is cut off or not known here is listed as it is, and ends the list.
+For statistics of packets. Ops are identified and measured, neither validated nor drawn; a truncated
+or unknown op is listed as the rest of the payload.
 """
 
 from __future__ import annotations
@@ -18,19 +18,18 @@ _CRUMBS_PER_BYTE: Final = 4
 
 
 def list_ops(payload: bytes, config: EncoderConfig) -> Iterator[tuple[str, int]]:
-    """Give name and size of each op of a payload.
+    """Yield name and size of each op of a payload.
 
     Parameters
     ----------
     payload : bytes
         Of a DATA packet.
-    coding : Coding
-        What the bytes depend on.
+    config : EncoderConfig
 
     Yields
     ------
     name : str
-        That of protocol.md's table, or ``"?"`` for what is not known, or cut off.
+        As in protocol.md's table, or ``"?"`` for an op that is unknown or truncated.
     size : int
         Bytes; the sizes add up to the payload's.
 
@@ -65,7 +64,7 @@ def _chain(payload: bytes, at: int, config: EncoderConfig) -> int:
 
 
 def _count(payload: bytes, at: int) -> tuple[int, int]:
-    """Read the count of an op; give it and how many bytes op and count have."""
+    """Return the count of an op, and the bytes of op and count."""
     low = payload[at] & SHORT_COUNT
     if low < SHORT_COUNT:
         return low + 1, 1
@@ -77,7 +76,7 @@ def _count(payload: bytes, at: int) -> tuple[int, int]:
 
 
 def _brick(payload: bytes, at: int, config: EncoderConfig) -> int:
-    """Go through the masks of an OCT, level by level."""
+    """Return the size of an OCT from its masks, level by level."""
     size = 1 + config.position_bytes
     nodes = 1
     for _ in range(payload[at] & 0x1F):
@@ -103,7 +102,7 @@ def _literal(payload: bytes, at: int, config: EncoderConfig) -> int:
     return size + count * config.format.bytes
 
 
-# Value, the bits that tell it, and how long it is: by name, in the order of section 7.
+# Value, mask of the bits that identify it, and size: by name, in the order of section 7.
 _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]]]] = {
     "END": (spec.OP_END, 0xFF, _rest),
     "PEN": (spec.OP_PEN, 0xFF, lambda _payload, _at, config: config.pen_bytes),

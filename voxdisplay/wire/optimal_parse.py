@@ -1,8 +1,8 @@
-"""Which op draws which run of equal pixels: the cheapest way through SKIP, RUN, LIT and DIFF.
+"""Optimal parse of pixel runs into SKIP, RUN, LIT and DIFF: a shortest path (Viterbi).
 
-A shortest path over the runs, one state for each op that may go on: a LIT or a DIFF that is open
-costs no new op byte, and a DIFF needs the pen that the run before has left. The path is followed
-through many stretches of the page at once, so that numpy does the work. This module makes no bytes.
+One state for each op that may continue: an open LIT or DIFF costs no new op byte, and a DIFF needs
+the pen left by the run before. The recurrence is vectorised over many stretches of the page. Must
+not encode: it counts bits.
 """
 
 from __future__ import annotations
@@ -17,28 +17,29 @@ from voxdisplay.wire import spec
 from voxdisplay.wire.incremental import Incremental
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, counted_op_bytes
 
-# States: what the run before was drawn by.
+# States: the op that drew the previous run.
 _LIT, _DIFF, _RUN, _SKIP = range(4)
-# Ways to draw a run, by their first and their second op; the second draws all but one pixel.
+# Choices for a run: the op for its first pixel or all of it, and the op for the rest, or 0.
 LIT, DIFF, RUN, SKIP = spec.OP_LIT, spec.OP_DIFF, spec.OP_RUN, spec.OP_SKIP
 OP_PAIRS = np.array(
     [(LIT, 0), (DIFF, 0), (LIT, RUN), (DIFF, RUN), (RUN, 0), (RUN, 0), (SKIP, 0), (LIT, DIFF)]
 )
 _ALL_LIT, _ALL_DIFF, _LIT_RUN, _DIFF_RUN, _PEN_RUN, _SAME_RUN, _SKIPPED, _LIT_DIFF = range(8)
 
-# Costs are bits; what is never done costs more than any path. Below a cost stands how it came
-# about: the state before in two bits, the row of `OP_PAIRS` in three. So one minimum finds both.
+# Costs are bits; an impossible choice costs more than any path. The low bits of a cost hold its
+# back pointer: the previous state in two bits, the row of `OP_PAIRS` in three, so that one minimum
+# finds both.
 _NEVER = 1 << 23
 _FROM_BITS, _CODE_BITS = 2, 5
 _CODE = (1 << _CODE_BITS) - 1
 _OP_BITS = 8
-# A DIFF of an odd number of pixels wastes half a byte, every other time.
+# On average, a DIFF wastes a quarter of a byte: half a byte if its number of pixels is odd.
 _DIFF_BITS = _OP_BITS + 2
-# Longer ones are never a LIT or DIFF.
+# Longer runs are never LIT or DIFF.
 _LONG = 1 << 12
-# Runs of a stretch, where there are many, or few; the first of a stretch cannot be a DIFF.
+# Runs of a stretch, at most and at least; the first of a stretch cannot be a DIFF.
 _STRETCH, _LEAST_STRETCH = 96, 24
-# Rows of all stretches that are looked at in one step.
+# Rows of all stretches per step of the incremental work.
 _STEP = 16
 
 Costs = NDArray[np.int32]
@@ -46,15 +47,15 @@ Costs = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of equal pixels in scan order; no two neighbours can be one.
+    """Maximal runs of equal pixels in scan order.
 
     Attributes
     ----------
     start, length, value : (n,) int64 arrays
     may_skip : (n,) bool array
-        Whether the page has these pixels already; no two of these are neighbours.
+        True if the page has these pixels already; no two such runs are adjacent.
     may_write : (n,) bool array
-        Whether they are one value; otherwise they must be skipped.
+        True if the pixels are one value; otherwise they must be skipped.
 
     """
 
@@ -66,7 +67,7 @@ class Runs:
 
 
 def cheapest_ops(runs: Runs, config: EncoderConfig) -> Incremental[Ints]:
-    """Find the row of `OP_PAIRS` by which each run is drawn in the fewest bytes, in steps."""
+    """Return the row of `OP_PAIRS` for each run that gives the fewest bytes, incrementally."""
     n = len(runs.start)
     if n == 0:
         return np.empty(0, dtype=np.int64)
@@ -75,7 +76,7 @@ def cheapest_ops(runs: Runs, config: EncoderConfig) -> Incremental[Ints]:
     width = -(-n // height)
     yield
     of = {name: _to_columns(cost, height, width) for name, cost in _costs(runs, config).items()}
-    # At the top of a stretch the pen is not known, but for the first: a packet begins so.
+    # At the start of a stretch the pen is unknown, except for the first, which begins a packet.
     for name in ("no_diff", "no_diff_behind_skip", "same_run"):
         of[name][0, 1:] = _NEVER << _CODE_BITS
 
@@ -108,7 +109,7 @@ def cheapest_ops(runs: Runs, config: EncoderConfig) -> Incremental[Ints]:
 
 
 def _costs(runs: Runs, config: EncoderConfig) -> dict[str, Costs]:
-    """Give the bits of each way to draw each run, without those of an op that is open already."""
+    """Return the bits of each choice for each run, without the op byte of an open LIT or DIFF."""
     value = runs.value.astype(np.int32)
     length = np.minimum(runs.length, _LONG).astype(np.int32)
     pixel = 1 if config.format is PixelFormat.MONO1 else 8 * config.format.bytes
@@ -121,10 +122,10 @@ def _costs(runs: Runs, config: EncoderConfig) -> dict[str, Costs]:
     may_diff = config.has(spec.FEATURE_DIFF)
     writes, several = runs.writable, runs.writable & (length > 1)
 
-    def cost(way: int, bits: Costs | int, when: Bools) -> Costs:
+    def cost(row: int, bits: Costs | int, when: Bools) -> Costs:
         costs = np.where(when, np.int32(bits), np.int32(_NEVER))
         costs <<= _CODE_BITS
-        costs |= way << _FROM_BITS
+        costs |= row << _FROM_BITS
         return costs
 
     return {
@@ -142,19 +143,19 @@ def _costs(runs: Runs, config: EncoderConfig) -> dict[str, Costs]:
 
 
 def fits_nibble(difference: Ints | Costs) -> Bools:
-    """Tell which differences of pixels of a byte a nibble holds: -8 to 7, modulo 256."""
+    """Return which differences of 8-bit pixels fit a nibble: -8 to 7, modulo 256."""
     return np.asarray((((difference + 8) & 255) < 16) & (np.abs(difference) < 256))
 
 
 def _to_columns(cost: Costs, height: int, width: int) -> Costs:
-    """Lay costs out in columns, one for each stretch; what is missing costs nothing at all."""
+    """Return costs in columns, one for each stretch, padded with zeros."""
     padded = np.zeros(height * width, dtype=np.int32)
     padded[: len(cost)] = cost
     return np.ascontiguousarray(padded.reshape(width, height).T)
 
 
 def _trace_back(back: NDArray[np.uint8], state: Ints) -> Ints:
-    """Follow each stretch from its cheapest end to its beginning."""
+    """Return the choices along the best path of each stretch, from its end backwards."""
     ways = np.empty((len(back), len(state)), dtype=np.int64)
     column = np.arange(len(state))
     for row in range(len(back) - 1, -1, -1):

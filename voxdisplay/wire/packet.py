@@ -1,8 +1,8 @@
-"""Packets as values, and those values as bytes (protocol.md, sections 3 to 5 and 9 to 11).
+"""Packet types and their serialisation (protocol.md, sections 3 to 5 and 9 to 11).
 
-Each type of packet is a frozen dataclass whose fields have the document's names. ``encode`` gives
-what goes on the wire; ``decode`` takes what ``stream`` has found between two delimiters and
-checked. Knows nothing of what is on its way, nor of what the ops of a packet draw.
+Each type is a frozen dataclass whose fields have the document's names. `encode` returns the bytes
+on the wire; `decode` takes a packet that `packet_stream` has delimited and checked. Must not know
+packets in flight, nor what ops draw.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from voxdisplay.wire import spec
 _CODES = {1: "B", 2: "H", 4: "I"}
 _CRC = struct.Struct("<I")
 _HEADER_BYTES = 3
-# Of an INFO of another major only this much is known: up to its boot id (section 15).
+# Bytes of an INFO of another major version that are defined: up to its boot id (section 15).
 _FOREIGN_BYTES = 8 - _HEADER_BYTES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packet:
-    """What all packets have: the header of section 4."""
+    """Base of all packets: the header of section 4."""
 
     TYPE: ClassVar[int]
     SECTION: ClassVar[str]
@@ -38,12 +38,12 @@ class Packet:
     flags: int = 0
 
     def tail(self) -> bytes:
-        """Give what follows the fields of the layout."""
+        """Return the bytes after the fields of the layout."""
         return b""
 
     @classmethod
     def read_tail(cls, tail: bytes, offset: int) -> dict[str, Any]:
-        """Read what follows the fields of the layout, at an offset of the packet."""
+        """Return the fields after those of the layout; their offset in the packet is given."""
         del tail, offset
         return {}
 
@@ -52,7 +52,7 @@ _P = TypeVar("_P", bound=Packet)
 
 
 def _packet_type(kind: int, section: str, layout: spec.Layout = ()) -> Any:
-    """Make a dataclass a type of packet: its number, its section, and its layout as a struct."""
+    """Return a decorator that makes a dataclass a packet type: number, section and layout."""
 
     def finish(cls: type[_P]) -> type[_P]:
         cls.TYPE, cls.SECTION, cls.LAYOUT = kind, section, layout
@@ -83,7 +83,7 @@ class Data(Packet):
 @_packet_type(spec.TYPE_HELLO, "5", spec.LAYOUT_HELLO)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hello(Packet):
-    """Opens a session."""
+    """Opening of a session, from the host."""
 
     session: int
     major: int = spec.VERSION_MAJOR
@@ -93,13 +93,13 @@ class Hello(Packet):
 @_packet_type(spec.TYPE_STATUS, "9")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status(Packet):
-    """Asks for an ACK; ``seq`` is the tag."""
+    """Request for an ACK; ``seq`` is the tag."""
 
 
 @_packet_type(spec.TYPE_READ, "10", spec.LAYOUT_READ)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Read(Packet):
-    """Asks for the pixels of a range of indices; ``seq`` is the tag."""
+    """Request for the pixels of a range of indices; ``seq`` is the tag."""
 
     start: int
     count: int
@@ -108,7 +108,7 @@ class Read(Packet):
 @_packet_type(spec.TYPE_ACK, "9", spec.LAYOUT_ACK)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ack(Packet):
-    """What the device has, and what it has room for."""
+    """Acknowledgement: packets received, credit, and the frame shown."""
 
     last: int
     session: int
@@ -120,19 +120,19 @@ class Ack(Packet):
 
     @property
     def next(self) -> int:
-        """The lowest sequence number that has not been received."""
+        """Lowest sequence number that has not been received (cumulative ACK)."""
         return self.seq
 
     @property
     def shown(self) -> int | None:
-        """Id of the frame on display, or None if this session has shown none."""
+        """Id of the frame on display; None if this session has shown none."""
         return self.frame if self.flags & spec.ACK_FLAG_SHOWN else None
 
 
 @_packet_type(spec.TYPE_INFO, "5", spec.LAYOUT_INFO)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Info(Packet):
-    """What the device says of itself."""
+    """Answer to HELLO: grid, format, limits, features and names of the device."""
 
     major: int
     session: int
@@ -152,7 +152,7 @@ class Info(Packet):
     serial: str = ""
 
     def has(self, feature: int) -> bool:
-        """Tell whether the device announced a feature, ``spec.FEATURE_...``."""
+        """Return whether the device announced a feature, ``spec.FEATURE_...``."""
         return bool(self.features >> feature & 1)
 
     def tail(self) -> bytes:
@@ -179,7 +179,7 @@ class Info(Packet):
 @_packet_type(spec.TYPE_PAGE, "10", spec.LAYOUT_PAGE)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page(Packet):
-    """Pixels of a range of indices, as ops."""
+    """Answer to READ: pixels of a range of indices, as ops."""
 
     start: int
     count: int
@@ -199,7 +199,7 @@ class Page(Packet):
 @_packet_type(spec.TYPE_ERROR, "11", spec.LAYOUT_ERROR)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Error(Packet):
-    """What the device refused, and where."""
+    """Refusal of a packet: code, and offset in it."""
 
     code: int
     session: int
@@ -224,7 +224,7 @@ TYPES: dict[int, type[Packet]] = {
 
 
 def pack(packet: Packet) -> bytes:
-    """Give a packet's bytes with the check value, before COBS."""
+    """Return the bytes of a packet with its CRC, before COBS."""
     body = packet.BODY.pack(*(getattr(packet, name, 0) for name, _, _ in packet.LAYOUT))
     head = bytes((packet.TYPE << 4 | packet.flags, packet.seq, packet.frame))
     data = head + body + packet.tail()
@@ -232,20 +232,20 @@ def pack(packet: Packet) -> bytes:
 
 
 def encode(packet: Packet) -> bytes:
-    """Give what goes on the wire for a packet: COBS, and the 00 that ends it (section 3)."""
+    """Return the bytes of a packet on the wire: COBS-encoded, with the 00 delimiter (section 3)."""
     return bytes(cobs.encode(pack(packet))) + b"\0"
 
 
 def max_wire_bytes(size: int) -> int:
-    """Give the most bytes that a packet of ``size`` bytes, check value included, has on the wire.
+    """Return the most bytes on the wire of a packet of ``size`` bytes, CRC included.
 
-    That is the packet, COBS's code byte for each 254 bytes of it, and the 00.
+    That is the packet, a COBS code byte for every 254 bytes of it, and the 00.
     """
     return size + -(-size // 254) + 1
 
 
 def has_valid_crc(raw: bytes) -> bool:
-    """Tell whether bytes out of COBS are a packet: long enough, and the check value holds."""
+    """Return whether decoded bytes are a packet: long enough, with a valid CRC."""
     return (
         len(raw) >= spec.LIMIT_OVERHEAD
         and zlib.crc32(raw[: -_CRC.size]) == _CRC.unpack_from(raw, len(raw) - _CRC.size)[0]
@@ -253,12 +253,12 @@ def has_valid_crc(raw: bytes) -> bool:
 
 
 def decode(raw: bytes) -> Packet:
-    """Read an intact packet: header, payload and check value, out of COBS.
+    """Return the packet of decoded bytes whose CRC is valid: header, payload and CRC.
 
     Raises
     ------
     RemoteProtocolError
-        If the type is not known, or the payload too short for it.
+        If the type is unknown, or the payload too short for it.
 
     """
     kind = raw[0] >> 4

@@ -1,7 +1,7 @@
-"""Bytes as they come from a pipe -> packets (protocol.md, section 3): delimiting, CRC, resync.
+"""Incremental packet reader: delimiting, CRC check, resynchronisation (protocol.md, section 3).
 
-Any bytes whatever may be fed in any portions; what is no packet is counted and dropped, in bounded
-memory. Knows nothing of what the packets mean.
+Takes any bytes in any portions; those that are no packet are counted and dropped, in bounded
+memory. Must not know what packets mean.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from cobs import cobs
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
-# A longest packet out of a longest payload, with COBS's byte for each 254 and one more.
+# Longest packet, and its segment with COBS's code bytes.
 _LONGEST = spec.LIMIT_MAX_PAYLOAD + spec.LIMIT_OVERHEAD
 _LONGEST_SEGMENT = _LONGEST + _LONGEST // 254 + 1
 _KEPT_NOISE = 64
@@ -22,7 +22,7 @@ _KEPT_NOISE = 64
 
 @dataclass(slots=True)
 class StreamCounters:
-    """What a `PacketStream` has seen. ``noise_bytes`` are all bytes that made no packet."""
+    """Counters of a `PacketStream`; ``noise_bytes`` are all bytes that made no packet."""
 
     packets: int = 0
     unknown: int = 0
@@ -31,34 +31,34 @@ class StreamCounters:
 
 
 class PacketStream:
-    """An incremental reader of packets.
+    """Incremental reader of packets.
 
     Attributes
     ----------
     counters : StreamCounters
-        What has come so far.
+
     """
 
     def __init__(self) -> None:
         self.counters = StreamCounters()
         self._noise = b""
         self._segment = bytearray()
-        self._searched = 0  # so many bytes of it are known to have no 00
+        self._searched = 0  # leading bytes known to have no 00
         self._overlong = 0
 
     @property
     def noise(self) -> bytes:
-        """The first bytes that made no packet, at most 64; those that wait for a 00 included."""
+        """First bytes that made no packet, at most 64, including those without a 00 yet."""
         return (self._noise + bytes(self._segment[:_KEPT_NOISE]))[:_KEPT_NOISE]
 
     def feed(self, data: bytes) -> Iterator[packets.Packet]:
-        """Take bytes, give the packets that they complete, one by one.
+        """Take bytes; yield the packets that they complete.
 
         Raises
         ------
         RemoteProtocolError
-            If an intact packet breaks protocol.md. The packets behind it are not lost: go on with
-            ``feed(b"")``.
+            If a packet with a valid CRC breaks protocol.md. Packets after it are not lost: continue
+            with ``feed(b"")``.
 
         """
         self._segment += data
@@ -76,7 +76,7 @@ class PacketStream:
             raw = self._decode_segment(segment)
             if raw is None:
                 continue
-            if raw[0] >> 4 not in packets.TYPES:  # section 12: of a later version, perhaps
+            if raw[0] >> 4 not in packets.TYPES:  # section 12: perhaps of a later version
                 self.counters.unknown += 1
                 continue
             self.counters.packets += 1

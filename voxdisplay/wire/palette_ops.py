@@ -1,4 +1,4 @@
-"""Entries of a palette -> COLORS (protocol.md, section 7.6). Knows no voxels."""
+"""Encoder of palette entries: COLORS (protocol.md, section 7.6). Must not know voxels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _OP_BYTES, _COLOR_BYTES = 3, 3
 
 
 def color_blocks(entries: Ints, palette: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks:
-    """Give the pieces that set some entries of a palette.
+    """Return the op blocks that set some entries of a palette.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def color_blocks(entries: Ints, palette: NDArray[np.uint8], config: EncoderConfi
         Their numbers, ascending.
     palette : (256, 3) uint8 array
         Red, green and blue of all entries.
-    coding : Coding
+    config : EncoderConfig
 
     """
     most = min(spec.LIMIT_MAX_COLORS, (config.max_block_bytes - _OP_BYTES) // _COLOR_BYTES)
@@ -41,7 +41,7 @@ def color_blocks(entries: Ints, palette: NDArray[np.uint8], config: EncoderConfi
 
 
 def _runs(entries: list[int]) -> list[range]:
-    """Join entries that follow each other, and those with only one between: it costs no more."""
+    """Return entries as ranges; a gap of one entry is included, since a second op costs as much."""
     runs: list[range] = []
     for entry in entries:
         if runs and entry <= runs[-1].stop + 1:

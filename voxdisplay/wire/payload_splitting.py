@@ -1,9 +1,9 @@
-"""Pieces of what is drawn, whoever coded them -> payloads, each of which stands for itself.
+"""Splitting of op blocks into self-contained payloads.
 
-A *piece* is a few ops that need the pen and the cursor in some state, and leave them in another
-(protocol.md, section 7). Laying pieces out puts PEN, MOVE or SKIP before those that need it, and
-makes a STEP that begins elsewhere a FROM. At the start of a payload nothing is left of the piece
-before. Nothing here knows what a piece draws.
+An *op block* is a few ops that require a state of pen and cursor, and leave another (protocol.md,
+section 7), like a basic block of a compiler. The layout inserts PEN, MOVE or SKIP where the state
+differs, and turns a STEP that begins elsewhere into a FROM. Each payload begins with the initial
+state. Must not know what a block draws.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from voxdisplay.wire.op_encoding import (
     little_endian,
 )
 
-ANY = -1  # a piece that does not care, or after which nobody knows
+ANY = -1  # no required state before a block, or an unknown one after it
 
 
 @dataclass(frozen=True)
 class OpBlocks:
-    """Pieces, in an order.
+    """Op blocks in the order in which they are sent.
 
     Attributes
     ----------
     body : (bytes,) uint8 array
-        Their ops, one piece after another.
+        Their ops, concatenated.
     size : (n,) int64 array
-        Bytes of each; at most `EncoderConfig.max_block_bytes`, or as much more as a PEN has if it
-        needs no pen.
-    pen, at : (n,) int64 arrays
-        The pixel that the pen must be before, the index that the cursor must be; or `ANY`.
-    pen_after, at_after : (n,) int64 arrays
-        What they are afterwards; or `ANY`.
-    is_chain : (n,) bool array
-        Whether its first op is a STEP.
+        Bytes of each; at most `EncoderConfig.max_block_bytes`, plus those of a PEN if it requires
+        no pen.
+    pen, cursor : (n,) int64 arrays
+        Required pixel value of the pen, and index of the cursor; or `ANY`.
+    pen_after, cursor_after : (n,) int64 arrays
+        Pen and cursor afterwards; or `ANY`.
+    starts_with_step : (n,) bool array
+        True if its first op is a STEP.
 
     """
 
@@ -63,7 +63,7 @@ class OpBlocks:
         return len(self.size)
 
     def take(self, order: Ints) -> OpBlocks:
-        """Give some of the pieces, in another order."""
+        """Return blocks by their numbers, in that order."""
         start = np.cumsum(self.size) - self.size
         body = self.body[concat_ranges(start[order], self.size[order])]
         rest = (getattr(self, field.name)[order] for field in fields(self)[1:])
@@ -71,7 +71,7 @@ class OpBlocks:
 
 
 def no_blocks() -> OpBlocks:
-    """Give no pieces at all."""
+    """Return an empty list of blocks."""
     none = np.empty(0, dtype=np.int64)
     return OpBlocks(
         np.empty(0, dtype=np.uint8), none, none, none, none, none, np.empty(0, dtype=np.bool_)
@@ -79,7 +79,7 @@ def no_blocks() -> OpBlocks:
 
 
 def concatenate_blocks(parts: Sequence[OpBlocks]) -> OpBlocks:
-    """Give the pieces of all parts, one part after another."""
+    """Return the blocks of all parts, one part after another."""
     if len(parts) == 1:
         return parts[0]
     names = [field.name for field in fields(OpBlocks)]
@@ -87,7 +87,7 @@ def concatenate_blocks(parts: Sequence[OpBlocks]) -> OpBlocks:
 
 
 class PayloadLayout:
-    """Pieces laid out in payloads, in their order: first counted, then made if they are wanted.
+    """Layout of op blocks in payloads: sizes are counted first, bytes made on request.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class PayloadLayout:
         self._blocks = blocks
         self._config = config
         n = len(blocks)
-        # What is left of the piece before; 0 and the full pixel at the start of a payload.
+        # State left by the block before; at the start of a payload the full pixel, and index 0.
         self._pen_before = np.full(n, config.format.full)
         self._cursor_before = np.zeros(n, dtype=np.int64)
         first = self._sizes()
@@ -122,11 +122,11 @@ class PayloadLayout:
         return np.asarray((self._blocks.pen != ANY) & (self._blocks.pen != self._pen_before))
 
     def _cursor_ops(self) -> tuple[Bools, Bools, Bools]:
-        """Tell which pieces need a SKIP, a MOVE, and a FROM."""
+        """Return which blocks need a SKIP, a MOVE, and a FROM."""
         blocks = self._blocks
         goes = (blocks.cursor != ANY) & (blocks.cursor != self._cursor_before)
         ahead = blocks.cursor - self._cursor_before
-        # MOVE has an op byte of its own, FROM has not.
+        # MOVE has an op byte of its own; FROM replaces the STEP.
         least = self._config.position_bytes + np.where(blocks.starts_with_step, -1, 1)
         skips = (
             goes & (self._cursor_before != ANY) & (ahead > 0) & (counted_op_bytes(ahead) <= least)
@@ -143,7 +143,7 @@ class PayloadLayout:
 
     @cached_property
     def payloads(self) -> list[bytes]:
-        """The payloads, none of them empty."""
+        """Payloads, none of them empty."""
         blocks, config = self._blocks, self._config
         offset = np.cumsum(self._size) - self._size
         out = np.zeros(self.total_bytes, dtype=np.uint8)
@@ -163,7 +163,7 @@ class PayloadLayout:
         here[moves] += 1
         goes = np.flatnonzero(moves | froms)
         place = encode_positions(config.grid.voxels_at(blocks.cursor[goes]), config)
-        behind = froms[goes]  # the coordinates of a FROM stand behind its op byte
+        behind = froms[goes]  # the coordinates of a FROM follow its op byte
         out[(here[goes] + behind)[:, None] + np.arange(config.position_bytes)] = place
         here[goes] += config.position_bytes
 
@@ -174,7 +174,7 @@ class PayloadLayout:
         start = np.cumsum(blocks.size) - blocks.size
         op = blocks.body[start[froms]] + np.uint8(spec.OP_FROM - spec.OP_STEP)
         out[here[froms] - config.position_bytes] = op
-        # The body's op byte lies where the last coordinate byte belongs.
+        # The op byte of the body was copied to the place of the last coordinate byte.
         out[here[froms]] = place[behind, -1]
 
         data = out.tobytes()
@@ -183,19 +183,19 @@ class PayloadLayout:
 
 
 def next_fit(first: Ints, following: Ints, limit: int) -> Ints:
-    """Pack pieces into payloads, in order, each as full as it goes.
+    """Return the starts of payloads by next-fit packing: blocks in order, each payload filled.
 
     Parameters
     ----------
     first, following : (n,) int64 arrays
-        Bytes of each piece when it begins a payload, and when it goes on from the piece before.
+        Bytes of each block when it begins a payload, and when it follows another.
     limit : int
-        Bytes of a payload; no piece is longer.
+        Bytes of a payload; no block is longer.
 
     Returns
     -------
     (payloads,) int64 array
-        The first piece of each payload.
+        The first block of each payload.
 
     """
     total = np.concatenate(([0], np.cumsum(following)))

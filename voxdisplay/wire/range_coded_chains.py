@@ -1,8 +1,8 @@
-"""Ordered voxels -> ARC, range-coded chains (protocol.md, section 7.7).
+"""Encoder of range-coded chains: ARC (protocol.md, section 7.7).
 
-Which models a bit has follows from the voxels alone, so that numpy finds them for many steps at
-once; what is left to a loop is a table look-up and a few additions a bit. What the voxels mean, and
-whether they are hidden by others, was settled before.
+The models (contexts) of a bit depend on the voxels alone, so that numpy finds them for many steps
+at once; the adaptive binary range coder itself is a loop of table look-ups and additions. Must not
+know curves, nor which voxels are covered by later ones.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from numpy.typing import NDArray
 from voxdisplay.wire import spec
 from voxdisplay.wire.op_encoding import EncoderConfig, Ints
 
-# Of 4096 parts, how many the chance of a sure thing has.
+# Probabilities are parts of 4096.
 _ONE = 4096
 _LEAST_RANGE = 1 << 24
 _LONGEST_PIECE = (2 << spec.ARC_MAX_K) - 2
 
-# A bit without a model has one more, whose state never changes.
+# Bits without a model use one more, whose state never changes.
 _PLAIN = spec.ARC_MODELS
 _FIXED = _ONE << 3
 _FRESH = spec.ARC_HALF << 3
 
-# The last MORE bit makes a payload longer by so many bytes at most.
+# Most bytes by which the last MORE bit lengthens a payload.
 _TAIL_BYTES = 2
-# Steps given up for a number that takes more room than the one it replaces.
+# Steps kept in reserve, since another count may take more bits than the one it replaces.
 _SPARE_STEPS = 8
-# Voxels, to a byte of payload, that are prepared at once for the first payload.
+# Voxels per byte of payload that are prepared for the first payload.
 _FIRST_WINDOW = 5
 
 
 def encode_range_coded(
     voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
 ) -> list[bytes]:
-    """Give the payloads that draw voxels, in their order; each is one ARC.
+    """Return the payloads that draw voxels in their order; each is one ARC.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ def encode_range_coded(
         reached by a step, others by a jump.
     pens : (n,) integer array
         Pixel value of each.
-    coding : Coding
+    config : EncoderConfig
 
     Returns
     -------
     list of bytes
-        At most ``coding.max_payload`` bytes each.
+        At most ``config.max_payload`` bytes each.
 
     """
     payloads = []
@@ -73,7 +73,7 @@ def encode_range_coded(
 
 
 def _encode_payload(part: _Window, config: EncoderConfig) -> tuple[bytes, int]:
-    """Give one payload, and how many voxels of the part it draws."""
+    """Return one payload, and the number of voxels of the window that it draws."""
     coder = _RangeCoder(config.max_payload - 1 - _TAIL_BYTES)
     pen, drawn = config.format.full, 0
     for begin, end in part.pieces:
@@ -91,7 +91,7 @@ def _encode_payload(part: _Window, config: EncoderConfig) -> tuple[bytes, int]:
 def _encode_piece(
     coder: _RangeCoder, part: _Window, head: list[tuple[int, int]], begin: int, end: int
 ) -> int:
-    """Code as many voxels of a piece as there is room for; give their number."""
+    """Encode as many voxels of a piece as fit; return their number."""
     jumps = begin == 0 or not part.joined[begin - 1]
     want = end - begin
     while want > 0:
@@ -105,7 +105,7 @@ def _encode_piece(
             if coded == high - low:
                 return want
             reached = int(np.searchsorted(part.offset, low + coded, side="right")) - 1
-            # Another number of steps may take more room: leave some for it.
+            # Another count of steps may take more bits: keep a reserve.
             want = min(want - 1, max(reached - first + jumps - _SPARE_STEPS, 1))
         else:
             want = 0
@@ -114,7 +114,7 @@ def _encode_piece(
 
 
 def _count_bits(value: int) -> list[tuple[int, int]]:
-    """Give models and bits of a number from 0 to _LONGEST_PIECE."""
+    """Return models and bits of a count from 0 to _LONGEST_PIECE (Elias gamma code)."""
     k = (value + 1).bit_length() - 1
     length = [(spec.ARC_COUNT + i, 1) for i in range(k)]
     if k < spec.ARC_MAX_K:
@@ -123,7 +123,7 @@ def _count_bits(value: int) -> list[tuple[int, int]]:
 
 
 def _raw_bits(value: int, count: int) -> list[tuple[int, int]]:
-    """Give bits without a model, highest first."""
+    """Return bits without a model, most significant first."""
     return [(_PLAIN, value >> i & 1) for i in reversed(range(count))]
 
 
@@ -132,9 +132,9 @@ def _raw_bits(value: int, count: int) -> list[tuple[int, int]]:
 
 @cache
 def _tables() -> tuple[list[int], tuple[list[int], list[int]]]:
-    """Give the chance of a 0 in each state of a model, and its state after a 0 and after a 1.
+    """Return the probability of a 0 in each state of a model, and the states after a 0 and a 1.
 
-    A state is 8 times the chance, of 4096, plus the number of bits seen, up to ARC_ENOUGH.
+    A state is 8 times the probability, in parts of 4096, plus the bits seen, up to ARC_ENOUGH.
     """
     state = np.arange(_FIXED + 1)
     p, seen = state >> 3, state & 7
@@ -146,22 +146,22 @@ def _tables() -> tuple[list[int], tuple[list[int], list[int]]]:
 
 
 class _RangeCoder:
-    """Codes bits into at most so many bytes."""
+    """Adaptive binary range coder with a limit of bytes."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._states = [_FRESH] * spec.ARC_MODELS + [_FIXED]
         self._low = 0
         self._range = _LEAST_RANGE
-        # Bytes with what they carry over to the one before: below 512. The first is none of ours.
+        # Bytes with their carry into the previous one, so below 512; the first is not sent.
         self._out: list[int] = []
 
     def state(self) -> tuple[list[int], int, int, int]:
-        """Give all that `restore` needs."""
+        """Return a snapshot for `restore`."""
         return self._states.copy(), self._low, self._range, len(self._out)
 
     def restore(self, state: tuple[list[int], int, int, int]) -> None:
-        """Go back to an earlier state."""
+        """Return to a snapshot."""
         self._states, self._low, self._range, size = state
         del self._out[size:]
 
@@ -173,7 +173,7 @@ class _RangeCoder:
         *,
         force: bool = False,
     ) -> int:
-        """Code bits, each with two models or twice the same; give how many there was room for."""
+        """Encode bits, each with two models or one twice; return how many fitted."""
         chance, after = _tables()
         states, out, low, span = self._states, self._out, self._low, self._range
         limit = 1 << 62 if force else self._limit
@@ -200,7 +200,7 @@ class _RangeCoder:
         return count
 
     def finish(self) -> bytes:
-        """Give the bytes: the last three that a decoder reads are 0 and are left out."""
+        """Return the bytes; the last three that a decoder reads are 0 and are not sent."""
         tail = (self._low + _LEAST_RANGE - 1) >> 24
         parts = [*self._out, tail]
         total = int.from_bytes(bytes(p & 0xFF for p in parts), "big")
@@ -213,18 +213,18 @@ class _RangeCoder:
 
 @dataclass(frozen=True)
 class _Window:
-    """Voxels that may fill a payload, with the models of the steps between them.
+    """Window of voxels that may fill a payload, with the models of the steps between them.
 
     Attributes
     ----------
     pieces : list of (int, int)
-        The voxels [begin, end) of each piece: one pen, and a step between any two.
+        The voxels [begin, end) of each piece: one pen, consecutive voxels are neighbours.
     joined : list of bool
-        Whether the step behind a voxel leads to a neighbour.
+        True if the voxel after it is a neighbour.
     offset : (steps + 1,) int64 array
-        Where the bits of a step begin; one that is no step has none.
+        First bit of each step; a jump has no bits.
     ones, others, bits : lists of int
-        Two models, or twice the same, and the bit.
+        Both models (one twice if there is only one), and the bit.
 
     """
 
@@ -242,7 +242,7 @@ class _Window:
     def of(
         cls, voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
     ) -> _Window:
-        """Prepare voxels; the first begins a payload."""
+        """Return a window of voxels; the first begins a payload."""
         places = voxels.astype(np.int64)
         steps = np.diff(places, axis=0)
         joined = np.abs(steps).max(axis=1, initial=0) == 1
@@ -269,7 +269,7 @@ class _Window:
         )
 
     def head(self, begin: int, pen: int) -> list[tuple[int, int]]:
-        """Give models and bits before the number of a piece, when the pen is as said."""
+        """Return models and bits that precede the count of a piece, given the current pen."""
         jumps = begin == 0 or not self.joined[begin - 1]
         bits = [(spec.ARC_MORE, 1)]
         if begin:
@@ -285,14 +285,14 @@ class _Window:
 
 
 def _first_steps(joined: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Say which of the joined steps are the first of a curve."""
+    """Return which of the steps between neighbours are the first of a curve."""
     return np.append(True, ~joined)[: len(joined)][joined]
 
 
 def _step_contexts(
     steps: Ints, first: NDArray[np.bool_]
 ) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """Give two models, the bit, and whether it is sent, of the six bits of each step: (n, 6)."""
+    """Return both models, bit, and whether it is sent, of the six bits of each step: (n, 6)."""
     n = len(steps)
     moved = (steps != 0).astype(np.int64)
     axes = [_AxisContext.of(moved[:, axis], steps[:, axis] < 0, first) for axis in range(3)]
@@ -330,7 +330,7 @@ def _step_contexts(
 
 @dataclass(frozen=True)
 class _AxisContext:
-    """What a decoder knows of an axis before each step: (n,) arrays."""
+    """Context of an axis before each step, as a decoder knows it: (n,) arrays."""
 
     last: Ints
     run: Ints
@@ -341,7 +341,7 @@ class _AxisContext:
 
     @classmethod
     def of(cls, moved: Ints, falls: NDArray[np.bool_], first: NDArray[np.bool_]) -> _AxisContext:
-        """Follow an axis over the steps of curves."""
+        """Return the context of an axis over the steps of curves."""
         index = np.arange(len(moved))
         curve = np.maximum.accumulate(np.where(first, index, 0))
 
@@ -355,7 +355,7 @@ class _AxisContext:
         length = np.diff(np.append(starts, len(moved)))
 
         def earlier(back: int) -> Ints:
-            """Length of the run so many before, in the same curve."""
+            """Return the length of an earlier run of the same curve; 0 if there is none."""
             at = np.maximum(nth - back, 0)
             return np.where((nth >= back) & (starts[at] >= curve), length[at], 0)
 

@@ -1,7 +1,7 @@
-"""Pixels as they are, for lines that carry them faster than a shorter coding is found.
+"""Raw encoding of pages: literal pixels (LIT) and skipped gaps (protocol.md, section 7.2).
 
-What is lit is written by LIT straight from the display's memory, narrow dark gaps included, and
-wide gaps are skipped (protocol.md, section 7.2). This module must not know how fast a line is.
+For lines that carry pixels faster than a shorter encoding is found. Lit pixels are copied from the
+raster, narrow dark gaps included; wide gaps are skipped. Must not know how fast a line is.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from voxdisplay.wire.op_encoding import (
 )
 from voxdisplay.wire.payload_splitting import next_fit
 
-# Bytes of a gap that are written: to skip fewer saves nothing.
+# Gaps of up to so many bytes are written: skipping them saves nothing.
 _NARROW = 3
-# Coded at once: much less, and the last payload of each costs; more, and the line waits for it.
+# Voxels encoded at once: fewer waste partly filled payloads, more keep the line waiting.
 _SLAB_VOXELS = 1 << 19
-# Of a large page each seventh block is looked at: the way from one to the next is no multiple of
-# the sides that displays have, so that they lie all over the page.
+# A large page is sampled at every seventh block. The distance of samples is no multiple of usual
+# grid sides, so that they are spread over the page.
 _BLOCK, _EACH = 1000, 7
-# Of more colours hardly two voxels that follow each other are alike by chance.
+# With more colours, adjacent voxels are rarely alike by chance.
 _MANY_COLORS = 16
-_SOME = 4096  # voxels, which show whether there are as many
-# Changes in each byte of eight pixels from which on runs are not shorter.
+_SOME = 4096  # voxels of the sample in which colours are counted
+# Changes per byte of eight pixels above which runs are no shorter.
 _MANY_CHANGES = 3
 
 
 def is_incompressible(page: Pixels, config: EncoderConfig) -> bool:
-    """Tell whether few voxels are like the next, so that there is little to be saved.
+    """Return whether few voxels are like the next, so that there is little to be saved.
 
     Parameters
     ----------
     page : ndarray
         The display's memory in scan order: (V,), or (V, 3) for rgb888.
-    coding : Coding
+    config : EncoderConfig
 
     """
     if len(page) > _BLOCK * _EACH:
@@ -63,26 +63,26 @@ def is_incompressible(page: Pixels, config: EncoderConfig) -> bool:
     if 2 * (alike - int(np.count_nonzero(same & ~on[1:]))) >= np.count_nonzero(on):
         return False
     places = np.flatnonzero(on)
-    some = page[places[:: -(-len(places) // _SOME)]]
-    return len(np.unique(some, axis=0)) > _MANY_COLORS
+    sample = page[places[:: -(-len(places) // _SOME)]]
+    return len(np.unique(sample, axis=0)) > _MANY_COLORS
 
 
 def encode_raw(page: Pixels, config: EncoderConfig) -> Iterator[list[bytes]]:
-    """Give the payloads that draw a page which is dark before, a few at a time.
+    """Yield the payloads that draw a page over a dark one, a few at a time.
 
     Parameters
     ----------
-    page, coding
+    page, config
         As of `is_incompressible`.
 
     Yields
     ------
     list of bytes
-        At most ``coding.max_payload`` bytes each, none of them empty.
+        At most ``config.max_payload`` bytes each, none of them empty.
 
     """
     units, per_unit = page, 1
-    if config.format is PixelFormat.MONO1:  # a pixel run begins with a byte: so do all
+    if config.format is PixelFormat.MONO1:  # a pixel run begins at a byte, so all are aligned
         units, per_unit = np.packbits(page, bitorder="little"), 8
     elif config.format is PixelFormat.RGB565:
         units = page.astype("<u2", copy=False)
@@ -90,9 +90,9 @@ def encode_raw(page: Pixels, config: EncoderConfig) -> Iterator[list[bytes]]:
     memory = units.view(f"V{size}").reshape(-1) if units.ndim == 2 else units
     for low in range(0, len(page), _SLAB_VOXELS):
         at = low // per_unit
-        some = slice(at, at + _SLAB_VOXELS // per_unit)
+        slab = slice(at, at + _SLAB_VOXELS // per_unit)
         yield _encode_slab(
-            is_lit(units[some]), memory[some], low, len(page) - low, per_unit, config
+            is_lit(units[slab]), memory[slab], low, len(page) - low, per_unit, config
         )
 
 
@@ -104,19 +104,19 @@ def _encode_slab(
     per_unit: int,
     config: EncoderConfig,
 ) -> list[bytes]:
-    """Code a slab.
+    """Return the payloads of one slab.
 
     Parameters
     ----------
     on : (n,) bool array
-        Which units are lit.
+        Units that are lit.
     memory : (n,) array
-        All of them, as they go over the wire.
+        All units as they go over the wire.
     low, voxels : int
-        The index of the first voxel, and how many there are from it on.
+        Index of the first voxel, and number of voxels from there to the end of the page.
     per_unit : int
         Voxels of a unit; the last of a page may have fewer.
-    coding : Coding
+    config : EncoderConfig
 
     """
     if not on.any():
@@ -125,9 +125,9 @@ def _encode_slab(
     edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
     wide = np.flatnonzero(edges[2::2] - edges[1:-1:2] > _NARROW // size)
     begin, end = edges[np.append(0, 2 * wide + 2)], edges[np.append(2 * wide + 1, -1)]
-    # No LIT is longer than a payload takes, wherever it begins.
-    way, op = counted_op_bytes(np.array([low + voxels, 8 * config.max_payload])).tolist()
-    most = (config.max_payload - way - op) // size
+    # No LIT is longer than a payload, wherever it begins.
+    skip_bytes, op = counted_op_bytes(np.array([low + voxels, 8 * config.max_payload])).tolist()
+    most = (config.max_payload - skip_bytes - op) // size
     parts = -(-(end - begin) // most)
     done = concat_ranges(np.zeros(len(parts), dtype=np.int64), parts) * most
     start = np.repeat(begin, parts) + done
@@ -156,12 +156,12 @@ def _encode_slab(
 
 
 def _op_bytes(counts: Ints) -> Ints:
-    """Give the bytes of ops that carry counts; none where there is nothing to count."""
+    """Return the bytes of ops with counts; 0 for a count of 0."""
     return np.where(counts > 0, counted_op_bytes(counts), 0)
 
 
 def _mask(begin: Ints, end: Ints, size: int) -> Bools:
-    """Give a mask, (size,), that is set in ranges, which ascend."""
+    """Return a mask, (size,), that is set inside ascending ranges."""
     edges = np.stack((begin, end), axis=1).reshape(-1)
     lengths = np.diff(edges, prepend=0, append=size)
     return np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)

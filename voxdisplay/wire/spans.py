@@ -1,7 +1,7 @@
-"""Pixels in scan order <-> SKIP, RUN, LIT, DIFF and PEN (protocol.md, sections 7.2 and 7.5).
+"""Encoder and decoder of pixels in scan order: SKIP, RUN, LIT, DIFF, PEN (protocol.md, 7.2, 7.5).
 
-The encoder finds runs of equal pixels, lets `parse` choose how each is drawn, and makes the bytes.
-The decoder reads what a PAGE brings. Neither knows what the pixels show.
+The encoder finds runs of equal pixels, has `optimal_parse` choose an op for each, and makes the
+bytes. The decoder reads the ops of a PAGE (section 10). Must not know what the pixels show.
 """
 
 from __future__ import annotations
@@ -31,37 +31,37 @@ from voxdisplay.wire.payload_splitting import ANY, OpBlocks, PayloadLayout, no_b
 
 PixelLookup = Callable[[Ints], NDArray[np.integer]]
 
-# Pixels of a gap that may be cheaper to write again than to skip.
+# Gaps of up to so many pixels may be cheaper to write again than to skip.
 _NARROW = 64
-# Where the ops of a PAGE begin in its packet.
+# Offset of the ops of a PAGE in its packet.
 _PAGE_OPS = 12
 
 
 def encode_spans(values: NDArray[np.integer], config: EncoderConfig) -> list[bytes]:
-    """Give the payloads that draw a page which is dark before.
+    """Return the payloads that draw a page over a dark one.
 
     Parameters
     ----------
     values : (V,) integer array
         Pixel value of each voxel in scan order.
-    coding : Coding
+    config : EncoderConfig
 
     Returns
     -------
     list of bytes
-        At most ``coding.max_payload`` bytes each; empty if all is dark.
+        At most ``config.max_payload`` bytes each; empty if all is dark.
 
     """
     return PayloadLayout(run_to_end(encode_runs(page_runs(values), config)), config).payloads
 
 
 def page_runs(values: NDArray[np.integer]) -> Runs:
-    """Give the runs of a page; what is dark may be skipped."""
+    """Return the runs of a page; dark ones may be skipped."""
     edges = np.flatnonzero(values[1:] != values[:-1]) + 1
     start = np.concatenate(([0], edges)) if len(values) else edges
     length = np.diff(start, append=len(values))
     value = values[start].astype(np.int64)
-    # What is dark at the beginning and at the end needs no op.
+    # Dark runs at the beginning and at the end need no op.
     lit = slice(int(value[:1].sum() == 0), len(value) - int(value[-1:].sum() == 0))
     start, length, value = start[lit], length[lit], value[lit]
     dark = value == 0
@@ -69,7 +69,7 @@ def page_runs(values: NDArray[np.integer]) -> Runs:
 
 
 def set_runs(index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup) -> Runs:
-    """Give the runs of some voxels, and of the gaps between them, which may be skipped.
+    """Return the runs of a set of voxels, and of the gaps between them, which may be skipped.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ def set_runs(index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup) -
         Scan-order indices, ascending, each once, n >= 1.
     values : (n,) integer array
         Their pixel values.
-    look : Look
-        Gives the pixel values of voxels by their indices, as they are to be in the end.
+    pixels_at : PixelLookup
+        Function from indices to the pixel values of the finished page.
 
     """
     apart = np.diff(index) != 1
@@ -107,9 +107,9 @@ def set_runs(index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup) -
 
 
 def min_bytes(index: Ints, config: EncoderConfig) -> int:
-    """Give a lower bound of the bytes for voxels, (n,) ascending, n >= 1, quickly.
+    """Return a lower bound of the bytes for voxels, (n,) ascending, n >= 1; cheap to find.
 
-    Each gap is skipped, and a new op follows; or it is drawn, and a voxel behind it.
+    Each gap is either skipped, and a new op follows, or drawn together with a voxel after it.
     """
     gap = np.diff(index) - 1
     gap = gap[gap > 0]
@@ -124,14 +124,14 @@ def min_bytes(index: Ints, config: EncoderConfig) -> int:
 def encode_span_set(
     index: Ints, values: NDArray[np.integer], pixels_at: PixelLookup, config: EncoderConfig
 ) -> Incremental[OpBlocks]:
-    """Make the pieces that draw voxels, in steps: the parameters are those of `set_runs`."""
+    """Return op blocks that draw a set of voxels, incrementally; parameters as of `set_runs`."""
     runs = set_runs(index, values, pixels_at)
     yield
     return (yield from encode_runs(runs, config))
 
 
 def encode_runs(runs: Runs, config: EncoderConfig) -> Incremental[OpBlocks]:
-    """Make the pieces that draw runs, in steps."""
+    """Return the op blocks that draw runs, incrementally."""
     choice = yield from cheapest_ops(runs, config)
     yield
     op, rest = OP_PAIRS[:, 0][choice], OP_PAIRS[:, 1][choice]
@@ -152,12 +152,12 @@ def encode_runs(runs: Runs, config: EncoderConfig) -> Incremental[OpBlocks]:
 def _blocks_of_stretches(
     op: Ints, start: Ints, count: Ints, value: Ints, config: EncoderConfig
 ) -> OpBlocks:
-    """Make pieces of stretches of equal pixels: those of one LIT, or one DIFF, are joined."""
+    """Return op blocks of stretches of equal pixels; consecutive LITs or DIFFs become one op."""
     goes_on = np.zeros(len(op), dtype=np.bool_)
     goes_on[1:] = (op[1:] == op[:-1]) & (op[1:] != RUN) & (start[1:] == (start + count)[:-1])
     first = np.flatnonzero(~goes_on)
     pixels = np.add.reduceat(count, first)
-    # All pixels of LIT and DIFF, and what the pen is before each.
+    # All pixels of LIT and DIFF, one of RUN; and the pen before each.
     written = np.where(op == RUN, 1, count)
     pixel = np.repeat(value, written)
     pen = np.concatenate(([config.format.full], pixel[:-1]))
@@ -182,7 +182,7 @@ def _blocks_of_stretches(
 
 
 def _max_pixels(room: int, bits: int) -> int:
-    """Give the most pixels of so many bits that one op with its count holds in so many bytes."""
+    """Return the most pixels of ``bits`` bits that an op with its count holds in ``room`` bytes."""
     overhead = 1
     while True:
         count = (room - overhead) * 8 // bits
@@ -194,7 +194,7 @@ def _max_pixels(room: int, bits: int) -> int:
 def _encode_ops(
     op: Ints, count: Ints, at_pixel: Ints, pixel: Ints, pen: Ints, config: EncoderConfig
 ) -> tuple[Bytes, Ints]:
-    """Give all ops with their operands, and the bytes of each."""
+    """Return all ops with their operands, concatenated, and the bytes of each."""
     ops, op_bytes = counted_ops(op, count)
     size = op_bytes.copy()
     operands: list[tuple[Bools, Bytes, Ints]] = []
@@ -216,14 +216,14 @@ def _encode_ops(
 
 
 def _literal_operands(pixel: Ints, count: Ints, config: EncoderConfig) -> tuple[Bytes, Ints]:
-    """Give the pixel runs (section 2.1) of LIT ops."""
+    """Return the pixel runs (section 2.1) of LIT ops."""
     if config.format is PixelFormat.MONO1:
         return _pack_bits(pixel.astype(np.uint8), count, 8)
     return little_endian(pixel, config.format.bytes).reshape(-1), count * config.format.bytes
 
 
 def _pack_bits(parts: Bytes, count: Ints, per_byte: int) -> tuple[Bytes, Ints]:
-    """Pack parts of bytes, the first lowest; each stretch of ``count`` begins a new byte."""
+    """Return parts packed to bytes, the first lowest; each stretch of ``count`` begins a byte."""
     size = -(-count // per_byte)
     padded = np.zeros((int(size.sum()), per_byte), dtype=np.uint8)
     padded.reshape(-1)[concat_ranges((np.cumsum(size) - size) * per_byte, count)] = parts
@@ -232,7 +232,7 @@ def _pack_bits(parts: Bytes, count: Ints, per_byte: int) -> tuple[Bytes, Ints]:
 
 
 def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
-    """Read the ops of a PAGE (section 10).
+    """Return the pixel values of the ops of a PAGE (section 10).
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
     Raises
     ------
     RemoteProtocolError
-        If an op is not allowed there, is cut off, or the ops do not cover exactly ``count``.
+        If an op is not allowed there or is truncated, or the ops do not cover ``count`` pixels.
 
     """
     reader = _PageReader(ops, count, format_)
@@ -262,7 +262,7 @@ def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
 
 
 class _PageReader:
-    """The ops of a PAGE, one after another, into an array."""
+    """Reader of the ops of a PAGE into an array of pixel values."""
 
     def __init__(self, ops: bytes, count: int, format_: PixelFormat) -> None:
         self.values = np.zeros(count, dtype=np.uint32)
@@ -273,13 +273,13 @@ class _PageReader:
         self._pen = format_.full
 
     def error(self, what: str) -> RemoteProtocolError:
-        """Give the error that says what is wrong with the op at `at`."""
+        """Return the error of the op at `at`."""
         return RemoteProtocolError(
             f"PAGE: {what}", section="10", offset=_PAGE_OPS + self.at, raw=self._ops
         )
 
     def read_op(self) -> None:
-        """Read the op at `at`, and go behind it."""
+        """Read the op at `at` and advance past it."""
         op = self._ops[self.at]
         if op == spec.OP_END:
             if any(self._ops[self.at :]):
@@ -310,7 +310,7 @@ class _PageReader:
         self.cursor, self.at = end, behind
 
     def _pixels(self, at: int, n: int) -> tuple[Values, int]:
-        """Read the pixel run (section 2.1) of n pixels at a place; give where it ends, too."""
+        """Return the pixel run (section 2.1) of n pixels at an offset, and its end."""
         mono = self._format is PixelFormat.MONO1
         behind = at + (-(-n // 8) if mono else n * self._format.bytes)
         if behind > len(self._ops):
@@ -327,7 +327,7 @@ class _PageReader:
 
 
 def _read_count(ops: bytes, at: int) -> tuple[int, int]:
-    """Read the count of the op at ``at``; give it and where its operands go on."""
+    """Return the count of the op at ``at``, and the offset of its operands."""
     low = ops[at] & SHORT_COUNT
     at += 1
     if low < SHORT_COUNT:

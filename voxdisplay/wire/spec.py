@@ -1,4 +1,4 @@
-"""Every literal of protocol.md, in its order. No logic, and no knowledge of who uses it.
+"""Literals of protocol.md, in its order. No logic; must not know who uses them.
 
 A table of the document that is headed ``literals: GROUP`` gives constants ``GROUP_NAME``; one
 headed ``layout: NAME`` gives ``LAYOUT_NAME``, a tuple of (field, offset, size in bytes). The

@@ -1,8 +1,8 @@
-"""Sets of voxels without an order -> OCT, DOTS, BOX and STEP (protocol.md, 7.1, 7.3, 7.4).
+"""Encoder of voxel sets: OCT, DOTS, BOX and STEP (protocol.md, sections 7.1, 7.3, 7.4).
 
-What is flat and large becomes a BOX. An octree says which nodes of the rest become bricks or
-chains, and which voxels dots. Full bricks that make up a cuboid become one BOX, and so do large
-cuboids that lie anywhere, if that takes fewer bytes. What the voxels mean was settled before.
+Large flat areas become a BOX. An octree selects which nodes of the rest become bricks or chains,
+and which voxels dots. Full bricks that make up a cuboid are merged to one BOX, and so are large
+cuboids anywhere, if that takes fewer bytes. Must not know curves, nor an order of voxels.
 """
 
 from __future__ import annotations
@@ -39,10 +39,11 @@ from voxdisplay.wire.payload_splitting import (
     no_blocks,
 )
 
-# A cuboid of so many voxels may be worth a BOX of its own; the rows of voxels must be few, or long.
+# A cuboid of so many voxels may pay as a BOX. They are searched if the rows of voxels are few or
+# long.
 _LARGE = 64
 _MANY_ROWS, _LONG_ROW = 2000, 4
-# A square of four voxels in a cube of eight: across which axis, and whether in its upper half.
+# Squares of four voxels in a cube of eight: their normal axis, and lower or upper half.
 _SQUARES = [(axis, half) for axis in range(3) for half in range(2)]
 _SQUARE_OF = np.full(256, -1)
 for _number, (_axis, _half) in enumerate(_SQUARES):
@@ -51,16 +52,16 @@ for _number, (_axis, _half) in enumerate(_SQUARES):
 
 @dataclass(frozen=True)
 class EncodedSet:
-    """Voxels of a set as bricks, dots and boxes.
+    """Encoded voxel set: bricks, dots, boxes and chains.
 
     Attributes
     ----------
-    pieces : Pieces
-        Ordered by pen.
+    blocks : OpBlocks
+        Sorted by pen.
     values : (k,) int64 array
-        The pixels that there are, ascending.
-    bytes_of : (k,) int64 array
-        Bytes that the voxels of each take, its PEN not included.
+        Pixel values that occur, ascending.
+    bytes_per_value : (k,) int64 array
+        Bytes of the voxels of each, without its PEN.
 
     """
 
@@ -70,14 +71,14 @@ class EncodedSet:
 
 
 def has_set_ops(config: EncoderConfig) -> bool:
-    """Tell whether the device has an op for sets."""
+    """Return whether the device has an op for sets."""
     return config.has(spec.FEATURE_OCT) or config.has(spec.FEATURE_DOTS)
 
 
 def encode_set_payloads(
     index: Ints, values: NDArray[np.integer], config: EncoderConfig
 ) -> list[bytes]:
-    """Give the payloads that draw a set of voxels; the device must have OCT or DOTS.
+    """Return the payloads that draw a set of voxels; the device must have OCT or DOTS.
 
     Parameters
     ----------
@@ -85,19 +86,19 @@ def encode_set_payloads(
         Scan-order indices, ascending, each once, n >= 1.
     values : (n,) integer array
         Pixel value of each.
-    coding : Coding
+    config : EncoderConfig
 
     Returns
     -------
     list of bytes
-        At most ``coding.max_payload`` bytes each.
+        At most ``config.max_payload`` bytes each.
 
     """
     return PayloadLayout(encode_set(index, values, config).blocks, config).payloads
 
 
 def encode_set(index: Ints, values: NDArray[np.integer], config: EncoderConfig) -> EncodedSet:
-    """Make a set of voxels bricks, dots and boxes, whichever is cheapest where."""
+    """Return a set of voxels encoded as bricks, dots, boxes and chains, whichever is cheapest."""
     bricks = _encode_by_octree(index, values, config)
     if not config.has(spec.FEATURE_BOX):
         return bricks
@@ -140,7 +141,7 @@ def _tree_blocks(
 
 def _with_byte_counts(blocks: OpBlocks, pixels: Ints, config: EncoderConfig) -> EncodedSet:
     blocks = blocks.take(np.argsort(blocks.pen, kind="stable"))
-    # Everything of a pen counts, the MOVE of a BOX included, and what makes a STEP a FROM.
+    # All bytes but the PEN count: the MOVE of a BOX, and what turns a STEP into a FROM.
     goes = blocks.cursor != ANY
     goes[1:] &= blocks.cursor[1:] != blocks.cursor_after[:-1]
     size = blocks.size + goes * (config.position_bytes + ~blocks.starts_with_step)
@@ -151,7 +152,7 @@ def _with_byte_counts(blocks: OpBlocks, pixels: Ints, config: EncoderConfig) -> 
 def _large_boxes(
     index: Ints, values: NDArray[np.integer], bytes_without: int, config: EncoderConfig
 ) -> EncodedSet | None:
-    """Give the set with its large cuboids, wherever they lie, as BOX, if that takes fewer bytes."""
+    """Return the set with its large cuboids as BOX if that takes fewer bytes, else None."""
     edge = (np.diff(index) != 1) | (values[1:] != values[:-1]) | (index[1:] % config.grid.nx == 0)
     first = np.flatnonzero(np.concatenate(([True], edge)))
     if len(index) < _LARGE or len(first) > max(_MANY_ROWS, len(index) // _LONG_ROW):
@@ -178,9 +179,9 @@ def _large_boxes(
 
 
 def min_bytes(index: Ints, group: Ints, groups: int, config: EncoderConfig) -> Ints:
-    """Give a lower bound of the bytes of each of some sets, quickly: (groups,).
+    """Return a lower bound of the bytes of each of several sets: (groups,); cheap to find.
 
-    A cube of two voxels a side that is not full has a mask of its own, or costs more.
+    Every cube of two voxels a side that is not full costs a mask, or more.
     """
     x, y, z = (config.grid.voxels_at(index).T >> 1).astype(np.int64)
     half = [side // 2 + 1 for side in config.grid]
@@ -192,7 +193,7 @@ def min_bytes(index: Ints, group: Ints, groups: int, config: EncoderConfig) -> I
 
 
 def _rank_values(values: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Give the pixels that there are, and the number of that of each voxel."""
+    """Return the pixel values that occur, ascending, and the rank of each voxel's."""
     if (values == values[0]).all():
         return values[:1].astype(np.int64), np.zeros(len(values), dtype=np.int64)
     pixels, rank = np.unique(values, return_inverse=True)
@@ -207,7 +208,7 @@ def _oct_blocks(
     config: EncoderConfig,
     bricks_per_axis: list[int],
 ) -> OpBlocks:
-    """Give the OCT ops of bricks of one level."""
+    """Return the OCT ops of bricks of one level."""
     none = np.zeros(len(roots), dtype=np.int64)
     size = 1 + config.position_bytes + (levels[number - 1].nodes[roots] if number else none)
     offset = np.cumsum(size) - size
@@ -219,7 +220,7 @@ def _oct_blocks(
     place = encode_positions(origin >> number, config)
     body[offset[:, None] + 1 + np.arange(config.position_bytes)] = place
     at = offset + 1 + config.position_bytes
-    # Level by level; below a full node there is nothing.
+    # Masks level by level; a full node has no masks below it.
     seen, owner = roots, np.arange(len(roots))
     for depth in range(number, 0, -1):
         level = levels[depth - 1]
@@ -240,7 +241,7 @@ def _oct_blocks(
 def _dot_blocks(
     key: Ints, pixels: Ints, config: EncoderConfig, bricks_per_axis: list[int]
 ) -> OpBlocks:
-    """Give DOTS ops, each with voxels of one pen."""
+    """Return DOTS ops, each of one pen."""
     voxels, rank = origins(key, bricks_per_axis)
     most = min(spec.LIMIT_MAX_DOTS, (config.max_block_bytes - 2) // config.position_bytes)
     first = np.flatnonzero(np.concatenate(([True], rank[1:] != rank[:-1])))
@@ -249,7 +250,7 @@ def _dot_blocks(
     done = concat_ranges(np.zeros(len(count), dtype=np.int64), parts) * most
     first = np.repeat(first, parts) + done
     count = np.minimum(np.repeat(count, parts) - done, most)
-    alone = (count == 1) & config.has(spec.FEATURE_OCT)  # a brick of level 0 is a byte shorter
+    alone = (count == 1) & config.has(spec.FEATURE_OCT)  # OCT of level 0 is one byte shorter
     size = np.where(alone, 1, 2) + count * config.position_bytes
     offset = np.cumsum(size) - size
     body = np.empty(int(size.sum()), dtype=np.uint8)
@@ -271,7 +272,7 @@ def _merge_full_bricks(
     config: EncoderConfig,
     bricks_per_axis: list[int],
 ) -> tuple[OpBlocks | None, list[tuple[int, Ints]]]:
-    """Make a BOX of full bricks that stand together; give it, and the bricks that are left."""
+    """Return a BOX for each cuboid of full bricks, and the bricks that are left."""
     (number, top), *others = roots
     full = levels[number - 1].full[top]
     if not config.has(spec.FEATURE_BOX) or full.sum() < 2:
@@ -290,10 +291,10 @@ def _merge_full_bricks(
 def _flat_boxes(
     key: Ints, mask: Bytes, pixels: Ints, config: EncoderConfig, bricks_per_axis: list[int]
 ) -> tuple[OpBlocks, Bools]:
-    """Make a BOX of squares that lie side by side; tell which nodes of level 1 are left.
+    """Return a BOX for each large flat area of squares, and which nodes of level 1 are left.
 
-    Each of them takes a mask in a brick, or more elsewhere: as many as a BOX and its MOVE have
-    bytes are worth one.
+    Each square costs a mask in a brick, or more: as many squares as a BOX and its MOVE have bytes
+    pay for them.
     """
     least = 2 * (1 + config.position_bytes)
     rest = np.ones(len(key), dtype=np.bool_)
@@ -303,7 +304,7 @@ def _flat_boxes(
     origin, rank = origins(key[at] << 3, bricks_per_axis)
     square = _SQUARE_OF[mask[at]]
     axis, half = np.array(_SQUARES)[square].T
-    # Squares one above the other are no cuboid: each plane is a group of its own.
+    # Squares in adjacent planes make no flat area: each plane is a group of its own.
     plane = np.take_along_axis(origin, axis[:, None], axis=1)[:, 0] + half
     group = (rank * len(_SQUARES) + square) << 32 | plane
     low, high, count, owner = merge_cuboids(origin >> 1, group)
@@ -317,7 +318,7 @@ def _flat_boxes(
 
 
 def box_blocks(low: Ints, high: Ints, pen: Ints, config: EncoderConfig) -> OpBlocks:
-    """Give BOX ops from one corner to the other, both (n, 3) and included."""
+    """Return BOX ops from corner to corner, (n, 3) each, both inclusive."""
     n = len(low)
     op = np.full((n, 1), spec.OP_BOX, dtype=np.uint8)
     body = np.concatenate((op, encode_positions(high, config)), axis=1)
