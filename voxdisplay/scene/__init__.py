@@ -1,6 +1,6 @@
-"""Scene files: what they may say, and the curves and colours they mean.
+"""Scene files: reader, object types, JSON Schema, and the scenes that are drawn on frames.
 
-Knows curves, colours and the grid; does not know voxels, frames or displays.
+It must not know displays or the wire.
 """
 
 from voxdisplay.scene.model import Scene, SceneItem

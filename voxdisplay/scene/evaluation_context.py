@@ -45,7 +45,7 @@ class EvaluationContext:
     folder : Path or None
         Folder of the files that the object may name; None: it may name none.
     notes : list of str
-        Lines for people about what was chosen while the object was read.
+        Choices made while the object was read, one line each, for people.
 
     """
 

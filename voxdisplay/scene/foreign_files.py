@@ -1,6 +1,6 @@
 """Recognition of files that are not scenes by their first bytes.
 
-Tells a person what was opened by mistake. It must not read what such files hold.
+It names, in errors, what was opened by mistake; it must not read such files.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class ForeignFile(NamedTuple):
-    """What a file is instead of a scene, and what to do with it."""
+    """Kind of a file that is not a scene, and what to do with it."""
 
     kind: str
     hint: str

@@ -1,7 +1,7 @@
 """Diagnosis of JSON syntax errors: from the position where a parser stopped to plain words.
 
 Knows JSON and the habits of those who write it by hand, who come from Python, JavaScript or YAML.
-It does not parse: all that stands before the position is taken to be well-formed.
+It does not parse: the text before the position is taken to be well-formed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _OTHER_WORDS = {"True": "true", "False": "false", "None": "null", "undefined": "
 
 
 class SyntaxProblem(NamedTuple):
-    """What is wrong with a JSON text, where, and what to do about it."""
+    """Mistake in a JSON text: its position, its name, and the remedy."""
 
     at: int
     problem: str
@@ -36,7 +36,7 @@ class SyntaxProblem(NamedTuple):
 
 
 class _Context(NamedTuple):
-    """What stands before the position where a parser stopped."""
+    """Surroundings of the position where a parser stopped."""
 
     bracket: int | None  # the innermost one that is open
     before: int | None  # the last character that is not blank
@@ -58,12 +58,12 @@ def explain_syntax_error(text: str, at: int) -> SyntaxProblem:
     """
     context = _context_of(text, at)
     if context.unfinished is not None:
-        return _in_string(text, at, context.unfinished)
-    at = _next(text, at)
+        return _explain_in_string(text, at, context.unfinished)
+    at = _skip_blanks(text, at)
     if at == len(text):
-        return _truncated(text, at, context.bracket)
+        return _explain_truncation(text, at, context.bracket)
     if text[at] == ",":  # parsers differ in whether they stop at a comma or behind it
-        behind = _next(text, at + 1)
+        behind = _skip_blanks(text, at + 1)
         if text[behind : behind + 1] in ("]", "}"):
             return _trailing_comma(at, text[behind])
     before = "" if context.before is None else text[context.before]
@@ -71,17 +71,17 @@ def explain_syntax_error(text: str, at: int) -> SyntaxProblem:
         return _trailing_comma(context.before, text[at])
     in_object = context.bracket is not None and text[context.bracket] == "{"
     if before == "" and text[at] not in "#/":
-        return _no_scene(text, at)
+        return _explain_beginning(text, at)
     if before == "" or before in "[:" or (before == "," and not in_object):
-        return _no_value(text, at)
+        return _explain_value(text, at)
     if before in "{,":
-        return _no_key(text, at)
+        return _explain_key(text, at)
     if context.bracket is None:
-        return _after_the_end(text, at)
-    return _no_delimiter(text, at, context)
+        return _explain_trailing_text(text, at)
+    return _explain_delimiter(text, at, context)
 
 
-def _next(text: str, at: int) -> int:
+def _skip_blanks(text: str, at: int) -> int:
     """Return the position of the next character that is not blank."""
     return len(text) - len(text[at:].lstrip(_BLANK))
 
@@ -110,9 +110,9 @@ def _position(text: str, at: int) -> str:
     return f"line {line}, column {at - text.rfind(chr(10), 0, at)}"
 
 
-def _in_string(text: str, at: int, begin: int) -> SyntaxProblem:
+def _explain_in_string(text: str, at: int, begin: int) -> SyntaxProblem:
     if text[at] in "\n\r":
-        return _no_closing_quote(begin)
+        return _open_quote(begin)
     if text[at] == "\t":
         return SyntaxProblem(at, "a tab inside quotes", r"write \t, or a blank")
     # A parser may stop at the backslash, or at what makes it no escape.
@@ -123,14 +123,14 @@ def _in_string(text: str, at: int, begin: int) -> SyntaxProblem:
             f"{excerpt(text[escape : escape + 2])[1:-1]} inside quotes has no meaning",
             r"a backslash itself is written \\; folders are parted by /",
         )
-    return _unexpected(text, at)
+    return _explain_character(text, at)
 
 
-def _no_closing_quote(begin: int) -> SyntaxProblem:
+def _open_quote(begin: int) -> SyntaxProblem:
     return SyntaxProblem(begin, "this quote is not closed on its line", 'add the closing "')
 
 
-def _truncated(text: str, at: int, bracket: int | None) -> SyntaxProblem:
+def _explain_truncation(text: str, at: int, bracket: int | None) -> SyntaxProblem:
     if bracket is None:
         return SyntaxProblem(at, "the file ends before its value is complete")
     missing = _CLOSING[text[bracket]]
@@ -143,7 +143,7 @@ def _trailing_comma(at: int, closing: str) -> SyntaxProblem:
     return SyntaxProblem(at, f"a trailing comma before the closing {closing}", "remove the comma")
 
 
-def _no_scene(text: str, at: int) -> SyntaxProblem:
+def _explain_beginning(text: str, at: int) -> SyntaxProblem:
     found = _UNQUOTED.match(text, at)
     begin = excerpt(found[0].rstrip() if found else text[at])
     return SyntaxProblem(
@@ -151,7 +151,7 @@ def _no_scene(text: str, at: int) -> SyntaxProblem:
     )
 
 
-def _after_the_end(text: str, at: int) -> SyntaxProblem:
+def _explain_trailing_text(text: str, at: int) -> SyntaxProblem:
     if text[at] in "]}":
         return SyntaxProblem(at, f"one closing {text[at]} too many", "remove it")
     if text[at] in ",{[":
@@ -159,10 +159,10 @@ def _after_the_end(text: str, at: int) -> SyntaxProblem:
         return SyntaxProblem(
             at, problem, 'several objects are written as {"objects": [{...}, {...}]}'
         )
-    return _unexpected(text, at, "after the end of the scene")
+    return _explain_character(text, at, "after the end of the scene")
 
 
-def _no_key(text: str, at: int) -> SyntaxProblem:
+def _explain_key(text: str, at: int) -> SyntaxProblem:
     if found := _QUOTED_KEY.match(text, at):
         return SyntaxProblem(
             at, "a key in other than double quotes", f'write "{found[1]}" with double quotes'
@@ -172,20 +172,20 @@ def _no_key(text: str, at: int) -> SyntaxProblem:
             at, f"the key {excerpt(found[0])} has no quotes", f'write "{found[0]}":'
         )
     if text[at] == '"':
-        return _no_closing_quote(at)
+        return _open_quote(at)
     if text[at] == ",":
         return SyntaxProblem(at, "a comma with nothing before it", "remove the comma")
     if text[at] in "{[":
         return SyntaxProblem(at, "a value without a key", 'each value is written as "key": value')
-    return _unexpected(text, at, "in place of a key", 'keys are written as "key": value')
+    return _explain_character(text, at, "in place of a key", 'keys are written as "key": value')
 
 
-def _no_value(text: str, at: int) -> SyntaxProblem:
+def _explain_value(text: str, at: int) -> SyntaxProblem:
     start = text[at]
     if start in _QUOTES:
         return SyntaxProblem(at, "text in other than double quotes", 'use the plain double quote "')
     if start == '"':
-        return _no_closing_quote(at)
+        return _open_quote(at)
     if start in ",:]}":
         name = {",": "comma", ":": "colon"}.get(start, f"closing {start}")
         return SyntaxProblem(at, f"a value is missing before this {name}")
@@ -206,11 +206,11 @@ def _no_value(text: str, at: int) -> SyntaxProblem:
             f"{excerpt(word)} has no quotes",
             f'text and expressions are written in double quotes: "{_short(word)}"',
         )
-    return _unexpected(text, at, "in place of a value")
+    return _explain_character(text, at, "in place of a value")
 
 
-def _no_delimiter(text: str, at: int, context: _Context) -> SyntaxProblem:
-    """Explain what follows a complete value inside of brackets, and is neither comma nor end."""
+def _explain_delimiter(text: str, at: int, context: _Context) -> SyntaxProblem:
+    """Explain text that follows a value inside brackets, and is neither a comma nor the end."""
     assert context.bracket is not None  # noqa: S101 - as its caller knows
     bracket, start = text[context.bracket], text[at]
     adjacent = text[at - 1 : at] not in _BLANK
@@ -240,19 +240,21 @@ def _no_delimiter(text: str, at: int, context: _Context) -> SyntaxProblem:
         word = found[0].rstrip() if found else start
         hint = f'expressions are written in double quotes: "{_short(word)}"'
         if start == "/" and not number:
-            return _unexpected(text, at)
+            return _explain_character(text, at)
         return SyntaxProblem(begin, f"the expression {excerpt(word)} has no quotes", hint)
     if start in '"[{' or start.isalnum() or start in "-_" or start in _QUOTES:
         return SyntaxProblem(at, "a comma is missing before this", "values are parted by commas")
-    return _unexpected(text, at)
+    return _explain_character(text, at)
 
 
 def _is_key(text: str, string: int) -> bool:
-    """Return whether a string inside of braces stands where keys do."""
+    """Return whether a string inside braces is in the place of a key."""
     return text[:string].rstrip(_BLANK)[-1:] in {"{", ","}
 
 
-def _unexpected(text: str, at: int, where: str = "here", hint: str | None = None) -> SyntaxProblem:
+def _explain_character(
+    text: str, at: int, where: str = "here", hint: str | None = None
+) -> SyntaxProblem:
     start = text[at]
     if start == "#" or text.startswith("/*", at):
         problem = f"a comment that begins with {'#' if start == '#' else '/*'}"

@@ -24,7 +24,7 @@ _SPACE = re.compile(r"[ \t\n\r]*")
 
 
 class JsonText:
-    """The text of a JSON file.
+    """Text of a JSON file.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class JsonText:
         text = text.removeprefix("\ufeff")
         self.file = file
         # Blanks in place of comments leave every position as it is.
-        self._text = _STRING_OR_COMMENT.sub(_blanked, text) if "//" in text else text
+        self._text = _STRING_OR_COMMENT.sub(_blank_comment, text) if "//" in text else text
 
     def parse(self) -> Any:
         """Return the value of the text.
@@ -56,7 +56,7 @@ class JsonText:
         try:
             value = json.loads(
                 self._text,
-                object_pairs_hook=_distinct,
+                object_pairs_hook=_object_without_repeats,
                 parse_constant=_refuse_constant,
                 parse_int=_integer,
             )
@@ -82,13 +82,13 @@ class JsonText:
             ) from None
         return value
 
-    def located(self, error: SceneError, key: str | None = None) -> SceneError:
-        """Return an error with the file, and the line and column of its JSON path.
+    def add_location(self, error: SceneError, key: str | None = None) -> SceneError:
+        """Return an error, with the file, line and column of its JSON path added to it.
 
         Parameters
         ----------
         error : SceneError
-            It is changed.
+            Changed in place.
         key : str, optional
             One of the keys of the object at the path, to be pointed at in place of the object.
 
@@ -183,11 +183,11 @@ class _ConstantError(Exception):
     """A number is NaN or infinite, which `json` would take."""
 
 
-def _blanked(match: re.Match[str]) -> str:
+def _blank_comment(match: re.Match[str]) -> str:
     return match[0] if match[0][0] == '"' else " " * len(match[0])
 
 
-def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _object_without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) != len(pairs):
         raise _RepeatedKeyError

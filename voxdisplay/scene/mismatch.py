@@ -1,7 +1,8 @@
 """Explanation of JSON values that do not fit the annotations of `objects`.
 
 msgspec converts what fits, and refuses the rest in words that depend on its version: this module
-finds the first mismatch again, and words it for people. It must not know single keys or types.
+finds the first mismatch again, and words it for people. It must not know single keys or types of
+objects.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from voxdisplay.expressions.parse import excerpt
 
 
 class Mismatch(NamedTuple):
-    """Where a value does not fit, as a JSON path, why, and what to do about it.
+    """Place where a value does not fit, as a JSON path, the reason, and the remedy.
 
     An unknown key is named beside the path of the object that has it.
     """
@@ -64,7 +65,7 @@ def find_mismatch(value: Any, kind: Any, path: str = "$") -> Mismatch | None:
         The value's JSON path.
 
     """
-    bare, metadata = _bare(kind)
+    bare, metadata = _split_annotation(kind)
     if get_origin(bare) not in {Union, UnionType}:
         if _is_struct(bare):
             return _object_mismatch(value, [bare], path)
@@ -94,8 +95,8 @@ def field_types(struct: type[msgspec.Struct]) -> dict[str, Any]:
     return {field.encode_name: hints[field.name] for field in msgspec.structs.fields(struct)}
 
 
-def _bare(kind: Any) -> tuple[Any, tuple[msgspec.Meta, ...]]:
-    """Take an annotation apart: the type, and what is said about it."""
+def _split_annotation(kind: Any) -> tuple[Any, tuple[msgspec.Meta, ...]]:
+    """Return an annotation's type and its metadata."""
     if get_origin(kind) is Annotated:
         return get_args(kind)[0], kind.__metadata__
     return kind, ()
@@ -107,7 +108,7 @@ def _is_struct(kind: Any) -> bool:
 
 def _is_type_of(value: Any, kind: Any) -> bool:
     """Return whether a JSON value is of an annotation's type, whatever its limits and parts."""
-    bare, _ = _bare(kind)
+    bare, _ = _split_annotation(kind)
     origin = get_origin(bare) or bare
     if origin in {Union, UnionType}:
         return any(_is_type_of(value, each) for each in get_args(bare))
@@ -115,7 +116,7 @@ def _is_type_of(value: Any, kind: Any) -> bool:
 
 
 def _expectation(kind: Any) -> str:
-    bare, metadata = _bare(kind)
+    bare, metadata = _split_annotation(kind)
     for meta in metadata:
         if meta.extra and "expected" in meta.extra:
             return str(meta.extra["expected"])
@@ -129,11 +130,11 @@ def _expectation(kind: Any) -> str:
 
 
 def _unexpected(value: Any, expected: str, path: str) -> Mismatch:
-    return Mismatch(path, f"expected {expected}, found {described(value)}")
+    return Mismatch(path, f"expected {expected}, found {describe_value(value)}")
 
 
-def described(value: Any) -> str:
-    """Return a few words for a JSON value."""
+def describe_value(value: Any) -> str:
+    """Return a short description of a JSON value, for errors."""
     match value:
         case None:
             return "null"
@@ -210,7 +211,7 @@ def _limit_mismatch(value: Any, metadata: tuple[msgspec.Meta, ...], path: str) -
 
 def _part_mismatch(value: Any, kind: Any, path: str) -> Mismatch | None:
     """Return the first mismatch inside a value whose own type fits."""
-    bare, _ = _bare(kind)
+    bare, _ = _split_annotation(kind)
     arguments = get_args(bare)
     origin = get_origin(bare)
     if origin is Literal:

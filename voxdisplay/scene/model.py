@@ -38,7 +38,7 @@ class SceneItem:
         Its type in the file: ``"parametric"``, ``"circle"``, ...
     curve : Curve
     color : (k, 3) uint8 array
-        Red, green, blue: one colour, or several that are spread along the curve.
+        Red, green, blue: one colour, or several as `Frame.draw` takes them.
     path : str
         Its JSON path in the file, such as ``$.objects[0]``.
     source : JsonText, optional
@@ -55,7 +55,7 @@ class SceneItem:
     def scene_error(self, error: CurveError) -> SceneError:
         """Return an error of the item's curve as one that names the object's place in the file."""
         found = SceneError(str(error), path=self.path, hint=error.hint)
-        return self.source.located(found) if self.source else found
+        return self.source.add_location(found) if self.source else found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,10 +66,10 @@ class Scene:
     ----------
     size : Grid or None
         The grid it was composed for; None: the display's own.
-    items : tuple of Item
-        In the order in which they are drawn.
+    items : tuple of SceneItem
+        In drawing order.
     notes : tuple of str
-        Lines for people about what was chosen while the file was read.
+        Choices made by the reader, one line each, for people.
 
     """
 

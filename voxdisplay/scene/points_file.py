@@ -53,9 +53,9 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
         kinds = f"{', '.join(_TABLES)} or .npy"
         raise CurveError(f"{excerpt(name)} is not a file of points: {kinds}")
     try:
-        data = _bytes(folder, name)
+        data = _read_file(folder, name)
     except FileNotFoundError:
-        hint = did_you_mean(name, _beside(folder))
+        hint = did_you_mean(name, _names_in(folder))
         raise CurveError(f"there is no file {excerpt(name)} beside the scene", hint=hint) from None
     except CurveError:
         raise
@@ -70,14 +70,14 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
 
 
 def _read_array(name: str, data: bytes, *, split: bool) -> FilePoints:
-    points = _npy(name, data)
+    points = _parse_npy(name, data)
     wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if wrong.size and not split:
         raise CurveError(f"row {wrong[0]} of {excerpt(name)} is not finite", hint=GAPS_HINT)
     return FilePoints(*split_strands(points, []))
 
 
-def _bytes(folder: Path, name: str) -> bytes:
+def _read_file(folder: Path, name: str) -> bytes:
     """Read a whole file inside a folder."""
     parts = PureWindowsPath(name)  # knows / and \ and drives, on any system
     if parts.is_absolute() or parts.anchor or ".." in parts.parts:
@@ -86,7 +86,7 @@ def _bytes(folder: Path, name: str) -> bytes:
     path = (root / name).resolve(strict=True)
     if not path.is_relative_to(root):
         raise CurveError(f"{excerpt(name)} leads outside the scene's folder")
-    # Not blocking, so that a pipe put there cannot hold us up before it is found to be one.
+    # Not blocking: else opening a pipe would wait for a writer.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(handle, "rb") as file:
         status = os.fstat(handle)
@@ -98,7 +98,7 @@ def _bytes(folder: Path, name: str) -> bytes:
     return data
 
 
-def _beside(folder: Path) -> list[str]:
+def _names_in(folder: Path) -> list[str]:
     with os.scandir(folder) as entries:
         return [entry.name for entry, _ in zip(entries, range(1000), strict=False)]
 
@@ -109,7 +109,7 @@ _NPY_ORDER = re.compile(rb"'fortran_order' *: *(True|False)")
 _NPY_SHAPE = re.compile(rb"'shape' *: *\(([0-9, ]{0,60})\)")
 
 
-def _npy(name: str, data: bytes) -> NDArray[np.float64]:
+def _parse_npy(name: str, data: bytes) -> NDArray[np.float64]:
     version = data[6:7]
     start = 10 if version == b"\x01" else 12
     if data[:6] != b"\x93NUMPY" or version not in {b"\x01", b"\x02", b"\x03"} or len(data) < start:

@@ -23,7 +23,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
-from voxdisplay.scene.mismatch import described, find_mismatch
+from voxdisplay.scene.mismatch import describe_value, find_mismatch
 from voxdisplay.scene.model import Scene, SceneItem
 from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
 from voxdisplay.scene.values import MAX_SIDE
@@ -59,20 +59,20 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         missing = f"no such file: {excerpt(str(path))}"
-        raise SceneError(missing, path="", hint=_similar(path)) from None
+        raise SceneError(missing, path="", hint=_similar_file_hint(path)) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         what = error.strerror if isinstance(error, OSError) else error
         raise SceneError(f"cannot read {excerpt(str(path))}: {what}", path="") from error
-    return _read(data, path.parent, _shown(path))
+    return _read(data, path.parent, _display_name(path))
 
 
-def _shown(path: Path) -> str:
+def _display_name(path: Path) -> str:
     """Return a file's name as errors show it."""
     name = str(path)
     return name if name.isprintable() and len(name) < 200 else excerpt(name)
 
 
-def _similar(path: Path) -> str | None:
+def _similar_file_hint(path: Path) -> str | None:
     try:
         with os.scandir(path.parent) as entries:
             names = [entry.name for entry, _ in zip(entries, range(1000), strict=False)]
@@ -113,7 +113,7 @@ def _read(data: bytes | str, folder: Path | None, file: str | None) -> Scene:
             file=file,
             hint="put long lists of points into a .npy file beside it",
         )
-    source = JsonText(data if isinstance(data, str) else _decoded(data, file), file)
+    source = JsonText(data if isinstance(data, str) else _decode(data, file), file)
     try:
         raw = source.parse()
     except SceneError as error:
@@ -125,10 +125,10 @@ def _read(data: bytes | str, folder: Path | None, file: str | None) -> Scene:
     try:
         return _scene(raw, folder, source)
     except SceneError as error:
-        raise source.located(error) from error.__cause__
+        raise source.add_location(error) from error.__cause__
 
 
-def _decoded(data: bytes, file: str | None) -> str:
+def _decode(data: bytes, file: str | None) -> str:
     encoding = unicode_encoding(data)
     try:
         if not encoding:
@@ -144,8 +144,8 @@ def _decoded(data: bytes, file: str | None) -> str:
 def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
     if not isinstance(raw, dict):
         hint = _MANY_OBJECTS if isinstance(raw, list) else None
-        raise SceneError(f"a scene is an object {{...}}, not {described(raw)}", hint=hint)
-    if "objects" not in raw and ("type" in raw or _means("type", raw)):
+        raise SceneError(f"a scene is an object {{...}}, not {describe_value(raw)}", hint=hint)
+    if "objects" not in raw and ("type" in raw or _has_key_like("type", raw)):
         if not isinstance(raw.pop("$schema", ""), str):
             raise SceneError("expected text in double quotes", path="$.$schema")
         scene_object: SceneObject = _convert(raw, Object, source)
@@ -165,8 +165,8 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
     return Scene(size, tuple(items), tuple(notes))
 
 
-def _means(key: str, raw: dict[str, Any]) -> bool:
-    """Return whether a scene without the keys that it needs has one that resembles a key."""
+def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
+    """Return whether a scene has a key that resembles one."""
     return any(did_you_mean(key, [written]) for written in raw)
 
 
@@ -224,17 +224,17 @@ def _convert(raw: Any, kind: Any, source: JsonText) -> Any:
         # The message of msgspec would depend on its version.
         if found is None:
             raise SceneError("a value is of the wrong kind") from None
-    hint = _hint(raw, found.path) or found.hint
-    raise source.located(SceneError(found.message, path=found.path, hint=hint), found.key)
+    hint = _key_hint(raw, found.path) or found.hint
+    raise source.add_location(SceneError(found.message, path=found.path, hint=hint), found.key)
 
 
-def _hint(raw: dict[str, Any], path: str) -> str | None:
+def _key_hint(raw: dict[str, Any], path: str) -> str | None:
     """Return a hint that needs the meaning of a key."""
     if path == "$.size":
         side = raw["size"] if type(raw["size"]) is int else 64
         return f'write "size": [{side}, {side}, {side}]'
     single = "objects" not in raw
-    meant = "type" in raw or _means("type", raw) or _means("objects", raw)
+    meant = "type" in raw or _has_key_like("type", raw) or _has_key_like("objects", raw)
     if path == "$" and single and not meant:
         return 'a scene has the key "objects", a file of one object the key "type"'
     if path == "$" and single and raw.get("type") in TYPES and raw.keys() & {"size", "params"}:

@@ -26,22 +26,22 @@ _IN_BRACKETS = re.compile(r"\s*(?:\[[^\]]*\]|\([^)]*\))")
 
 
 class Layout(NamedTuple):
-    """How the rows of a table are written.
+    """Notation of a table: separator, header and columns.
 
     Attributes
     ----------
     first : int
         Index of the first row's line.
     separator : str or None
-        What separates its fields; None: blanks.
+        Text between fields; None: blanks.
     columns : int
-        How many columns have names or numbers.
+        Number of columns that have a name or a value.
     axes : list of int
         The columns that are x, y and z.
     names : list of str
-        Those of all columns; empty if the table has none.
+        Names of all columns; empty if the table has none.
     numeric : int
-        How many columns hold numbers.
+        Number of columns that hold numbers.
 
     """
 
