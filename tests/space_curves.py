@@ -88,3 +88,9 @@ def moved(curve: Curve, shift: tuple[int, int, int]) -> Function:
 def turned(curve: Curve, axes: tuple[int, ...]) -> Function:
     """Give the curve with its axes in another order."""
     return Function(lambda t: tuple(curve.position(t)[list(axes)]), *curve.t_range)
+
+
+def backwards(curve: Curve) -> Function:
+    """Give the curve from its end to its beginning."""
+    first, last = curve.t_range
+    return Function(lambda t: tuple(curve.position(first + last - t)), first, last)

@@ -53,9 +53,13 @@ def _initial_shares(degree: int | None) -> Floats:
         if degree is None
         else min(INITIAL_STEPS_PER_COEFFICIENT * (degree + 1), INITIAL_STEPS)
     )
-    look = np.linspace(0.0, 1.0, steps + 1)
-    look[1:-1] += (np.arange(1, steps) * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6 / steps
-    return look
+    # Symmetric about the middle, so that a curve and its reverse are sampled at the same points.
+    inner = np.arange(1, (steps + 1) // 2)
+    jitter = (inner * (5**0.5 - 1) / 2 % 1 - 0.5) * 0.6
+    shares = np.linspace(0.0, 1.0, steps + 1)
+    shares[inner] += jitter / steps
+    shares[steps - inner] -= jitter / steps
+    return shares
 
 
 def sample_adaptively(batch: CurveBatch) -> Samples:
@@ -135,7 +139,7 @@ def initial_samples(batch: CurveBatch) -> Samples:
     fresh = np.append(True, (piece[1:] != piece[:-1]) | (t[1:] != t[:-1]))
     if not fresh.all():  # a break was there, or a range has fewer parameters than it has looks
         piece, t = piece[fresh], t[fresh]
-    return Samples(piece, t, batch.evaluate(piece, t), index)
+    return batch.settle_ties(Samples(piece, t, batch.evaluate(piece, t), index))
 
 
 def _insert_breaks(

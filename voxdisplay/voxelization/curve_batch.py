@@ -9,7 +9,7 @@ its neighbours in the batch: decisions are taken per interval, and positions fou
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from operator import attrgetter
 
@@ -23,6 +23,12 @@ from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns
 
 AXES = "xyz"
+
+# Coordinates are moved so far, in voxels, towards the centre of the curve's box, and by less within
+# ``CORE`` of it. What would lie on a boundary between voxels lies on the inner side of it then:
+# ties are settled in a way that knows neither axis nor sign nor direction.
+TIE_SHIFT = 1e-7
+CORE = 0.25
 
 # Voxel indices are int32, and sums and differences of a few of them must be as well.
 MAX_COORDINATE = 2.0**30
@@ -102,6 +108,7 @@ class CurveBatch:
         # The last position that was not finite: index of the curve, t.
         self._undefined: tuple[int, float] | None = None
         self._evaluator = BatchEvaluator(self.curves)
+        self._centres: Floats | None = None  # of the curves' boxes, (3, curves)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
@@ -169,7 +176,45 @@ class CurveBatch:
         if not near:
             at = int(np.argmin((np.abs(points) < MAX_COORDINATE).all(axis=0)))
             raise self._position_error(int(curve[at]), float(t[at]), points[:, at])
-        return points
+        return self._moved(curve, points)
+
+    def settle_ties(self, samples: Samples) -> Samples:
+        """Move all points of the curves by ``TIE_SHIFT`` from now on, but for their ends.
+
+        A straight diagonal that passes halfway between voxels stays straight: to both of its axes
+        the same happens.
+
+        Parameters
+        ----------
+        samples : Samples
+            One piece for each curve.
+
+        Returns
+        -------
+        Samples
+            The same, moved. The first and the last point of each curve stay: which voxels hold
+            them is a matter of definition.
+
+        """
+        first = samples.bounds[:-1]
+        low = np.minimum.reduceat(samples.points, first, axis=1)
+        high = np.maximum.reduceat(samples.points, first, axis=1)
+        self._centres = (low + high) / 2
+        points = self._moved(samples.piece, samples.points)
+        ends = np.concatenate((first, samples.bounds[1:] - 1))
+        points[:, ends] = samples.points.take(ends, axis=1)
+        return replace(samples, points=points)
+
+    def _moved(self, curve: Ints, points: Floats) -> Floats:
+        if self._centres is None:
+            return points
+        alone = len(self.curves) == 1
+        shift = (self._centres if alone else self._centres.take(curve, axis=1)) - points
+        np.minimum(shift, CORE, out=shift)
+        np.maximum(shift, -CORE, out=shift)
+        shift *= TIE_SHIFT / CORE
+        shift += points
+        return shift
 
     def _position_error(self, index: int, t: float, point: Floats) -> CurveError:
         row = int(np.argmin(np.abs(point) < MAX_COORDINATE))

@@ -32,6 +32,9 @@ from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, Voxels
 # Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
 # Below 1 a step passes at most one plane of an axis; each further try is a finer look.
 STEP_LIMITS = (0.7, 0.35, 0.17, 0.08)
+# Gains this near to each other, in square voxels, are the same: which crossing comes first does not
+# count.
+SAME_GAIN = 1e-9
 # Where curves are sampled at first between two such events: so closely that hardly a crossing
 # needs a second guess.
 EIGHTHS = np.linspace(0.0, 1.0, 9)
@@ -105,7 +108,9 @@ def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
     torn = events.with_voxels(voxels).gaps()
     while (torn := torn[~bridged[torn]]).size:
         # Of two that fall apart, the one that gains less goes back: at least one has moved.
-        back = np.unique(np.where(gain[torn] <= gain[torn + 1], torn, torn + 1))
+        one, other = gain[torn], gain[torn + 1]
+        back = np.concatenate((torn[one <= other + SAME_GAIN], torn[other <= one + SAME_GAIN] + 1))
+        back = np.unique(back)
         gain[back] = np.inf
         voxels[:, back] = nearest[:, back]
         look = np.unique(np.concatenate((back - 1, back)))

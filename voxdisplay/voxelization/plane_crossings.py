@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
+from voxdisplay.curves.curve import NO_BREAKS
 from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
 from voxdisplay.voxelization.index_ranges import expand_ranges, split_blocks
 from voxdisplay.voxelization.root_finding import TOLERANCE, find_roots
@@ -28,9 +29,13 @@ BLOCK = 1 << 15
 MIN_PARALLEL_BLOCKS = 8
 # So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
 # the last bit, or lines along edges and diagonals waver.
-TIE_TOLERANCE = 1e-9
+TIE_TOLERANCE = 1e-10
 # A corner must be better by this much, in square voxels, to be preferred to the nearest one.
 MIN_GAIN = 1e-8
+# How far along the tangent a plane may be from the point found near it, in voxels; and how far, in
+# square voxels, the corner nearest to the point on the plane may be from the point found.
+MAX_PROJECTION = 1e-2
+MAX_SQUARE = 0.50005
 
 Ends = tuple[Floats, Floats]
 
@@ -46,6 +51,13 @@ class Crossings:
     events: VoxelEvents
     better: Voxels
     gain: Floats
+
+
+class Slopes(NamedTuple):
+    """Estimates of dP/dt at samples, (3, K) each; they differ where the curve has a corner."""
+
+    arriving: Floats  # at the end of the step before a sample
+    leaving: Floats  # at the beginning of the step after it
 
 
 class CrossingGuesses(NamedTuple):
@@ -73,7 +85,7 @@ def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
 
     Their events are connected only where one axis goes on to dominate.
     """
-    slopes = slopes_at(samples)
+    slopes = _slopes_between_corners(batch, samples)
 
     def crossings_of(block: tuple[int, int]) -> Crossings:
         return _block_crossings(batch, samples, slopes, guess_crossings(samples, slopes, *block))
@@ -102,6 +114,30 @@ def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
     return crossings
 
 
+def _slopes_between_corners(batch: CurveBatch, samples: Samples) -> Slopes:
+    """Estimate dP/dt after and before each sample: the same but where a curve turns sharply."""
+    breaks = [curve.breaks for curve in batch.curves]
+    if not any(each.size for each in breaks if each is not NO_BREAKS):
+        slopes = slopes_at(samples)
+        return Slopes(slopes, slopes)
+    of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
+    turn = of + 1j * np.concatenate(breaks)
+    here = samples.curve[samples.piece] + 1j * samples.t
+    at = np.minimum(np.searchsorted(here, turn), here.size - 1)
+    corner = np.zeros(here.size, dtype=bool)
+    corner[at[here[at] == turn]] = True
+    # Each corner ends one piece and begins another.
+    twice = np.arange(here.size).repeat(1 + corner)
+    second = np.append(False, twice[1:] == twice[:-1])
+    opens = second | np.append(True, samples.piece[twice[1:]] != samples.piece[twice[:-1]])
+    piece = np.cumsum(opens) - 1
+    points = samples.points.take(twice, axis=1)
+    parts = Samples(piece, samples.t[twice], points, samples.curve[samples.piece[twice[opens]]])
+    slopes = slopes_at(parts)
+    before_second = np.append(second[1:], False)
+    return Slopes(slopes[:, ~second], slopes[:, ~before_second])
+
+
 @with_kernel
 @np.errstate(all="ignore")
 def slopes_at(samples: Samples) -> Floats:
@@ -128,7 +164,7 @@ def slopes_at(samples: Samples) -> Floats:
 
 @with_kernel
 @np.errstate(all="ignore")
-def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> CrossingGuesses:
+def guess_crossings(samples: Samples, slopes: Slopes, low: int, high: int) -> CrossingGuesses:
     """Guess, by cubics, where the steps from samples low..high-1 cross their dominant planes."""
     stop = min(high + 1, samples.t.size)
     points = samples.points[:, low:stop]
@@ -149,8 +185,8 @@ def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> Cr
     h = samples.t[left + 1] - samples.t[left]
     begin = samples.points.take(at)
     length = samples.points.take(at + 1) - begin
-    m_left = length / (slopes.take(at) * h)
-    m_right = length / (slopes.take(at + 1) * h)
+    m_left = length / (slopes.leaving.take(at) * h)
+    m_right = length / (slopes.arriving.take(at + 1) * h)
     # Within (0, 3) the cubic is monotone (Fritsch and Carlson 1980).
     m_left[~((m_left > 0) & (m_left < 3))] = 1.0
     m_right[~((m_right > 0) & (m_right < 3))] = 1.0
@@ -172,7 +208,7 @@ def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> Cr
 
 
 def _block_crossings(
-    batch: CurveBatch, samples: Samples, slopes: Floats, aims: CrossingGuesses
+    batch: CurveBatch, samples: Samples, slopes: Slopes, aims: CrossingGuesses
 ) -> Crossings:
     aims, points = _refine_crossings(batch, samples, aims)
     piece, t = samples.piece[aims.knot], aims.t
@@ -237,7 +273,7 @@ def _brackets(
 @with_kernel
 @np.errstate(all="ignore")
 def rank_corners(
-    samples: Samples, slopes: Floats, aims: CrossingGuesses, points: Floats
+    samples: Samples, slopes: Slopes, aims: CrossingGuesses, points: Floats
 ) -> CornerChoices:
     """Look for the corners of the crossed faces that are nearest to the tangents.
 
@@ -248,8 +284,8 @@ def rank_corners(
     ----------
     samples : Samples
         Along the curves.
-    slopes : (3, K) float64 array
-        dP/dt at the samples.
+    slopes : Slopes
+        At the samples.
     aims : Aims
         Which planes are crossed, where.
     points : (3, n) float64 array
@@ -268,19 +304,33 @@ def rank_corners(
 
     """
     left, axis, tau = aims.knot, aims.axis, aims.tau
-    nearest = np.floor(points + TIE_TOLERANCE)
-    plane = aims.level - 0.5
-    for row in range(3):
-        np.copyto(nearest[row], plane, where=axis == row)
     h = samples.t[left + 1] - samples.t[left]
-    tangent = slopes.take(left, axis=1) * h  # per step, not per t
-    after = slopes.take(left + 1, axis=1) * h
+    tangent = slopes.leaving.take(left, axis=1) * h  # per step, not per t
+    after = slopes.arriving.take(left + 1, axis=1) * h
     tangent += tau * (after - tangent)
 
-    apart = nearest + 0.5 - points
     length = np.maximum(np.sqrt((tangent * tangent).sum(axis=0)), np.finfo(float).tiny)
     along = tangent / length
+    # The curve is found near the plane, and followed to the plane itself along its tangent.
+    at = axis * np.int64(axis.size) + np.arange(axis.size)  # of flat rows
+    off_plane = (points.take(at) - aims.level) / along.take(at)
+    lost = ~(np.abs(off_plane) < MAX_PROJECTION)
+    if lost.any():
+        off_plane[lost] = 0.0
+        along[:, lost & ~np.isfinite(along).all(axis=0)] = 0.0
+    on_plane = points - off_plane * along
+    nearest = np.floor(on_plane + TIE_TOLERANCE)
+    plane = aims.level - 0.5
+    nearest.reshape(-1)[at] = plane
+    apart = nearest + 0.5 - on_plane
     project = (apart * along).sum(axis=0)
+    square = (apart * apart).sum(axis=0) + off_plane * (off_plane - 2.0 * project)
+    far = (square > MAX_SQUARE).nonzero()[0]
+    if far.size:
+        nearest[:, far] = np.floor(points[:, far] + TIE_TOLERANCE)
+        nearest[axis[far], far] = plane[far]
+        apart[:, far] = nearest[:, far] + 0.5 - points[:, far]
+        project[far] = (apart[:, far] * along[:, far]).sum(axis=0)
     # The other corner along axis b is a unit step e_b away, towards the crossing. With w the
     # tangent's direction, D = ``apart``, that changes |D|^2 - (D.w)^2 by 1 - 2|D_b| - (2 p + s) s
     # with p = D.w and s = w.e_b. Two such steps change it by the sum of both minus 2 s s'.
@@ -305,9 +355,8 @@ def rank_corners(
     each = np.arange(moved.size)
     first, second = np.where(axis == 0, 1, 0), np.where(axis == 2, 1, 2)
     for across, moves in ((first, both | ~other), (second, both | other)):
-        step = np.where(apart[across, each] > 0, -1, 1) * moves
-        better[across, moved] += step
-        apart[across, each] += step
+        better[across, moved] += np.where(apart[across, each] > 0, -1, 1) * moves
+    apart = better.take(moved, axis=1) + 0.5 - points.take(moved, axis=1)
     far = ((apart * apart).sum(axis=0) > 0.5).nonzero()[0]
     foot[moved[far]] = (apart[:, far] * along[:, far]).sum(axis=0) / length[moved[far]]
     return CornerChoices(nearest, better, gain, foot)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
+from voxdisplay.compute.array_types import Floats
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.index_ranges import expand_ranges
@@ -24,6 +25,15 @@ BLOCK = 1 << 12
 # voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
 # which is much more than `adaptive_sampling.MAX_SAG` at cusps.
 MAX_UNCOVERED = 2.0
+# Paths cost the squared distances of their voxels from the curve and this for each, in square
+# voxels: fewer voxels are better, but not at the price of a corner or a peak.
+VOXEL_COST = 0.05
+# Costs are whole numbers of units of 1 / COST_UNITS square voxels. Of distances that differ by
+# rounding only, hardly any are rounded to different units.
+COST_UNITS = 1.1 * 2.0**36
+# What is further away, in square voxels, does not cost more.
+FAR = 4.0
+TINY = float(np.finfo(float).tiny)
 
 
 def drop_repeats(events: VoxelEvents) -> VoxelEvents:
@@ -36,38 +46,45 @@ def drop_repeats(events: VoxelEvents) -> VoxelEvents:
 def thin_events(
     events: VoxelEvents, samples: Samples | None = None, *, keep_tips: bool = False
 ) -> VoxelEvents:
-    """Take short cuts, event i to event J(i), from the first to the last event of every piece.
+    """Return the subsequence of events without chords that lies nearest to the curve.
 
-    J(i) is the furthest j at most ``WINDOW`` on whose voxel is equal or adjacent to that of i,
-    with every event between them adjacent to i (a prefix) or to j (the rest). On the path so found
-    no two voxels are neighbours but consecutive ones, unless the curve leaves their surroundings
-    between them: a chord from a to c across b would have made c, not b, the J(a).
+    A shortcut leads from event i to a later event j, at most ``WINDOW`` on, whose voxel is equal
+    or adjacent to that of i, with every event between them adjacent to i (a prefix) or to j (the
+    rest). Of all paths of steps and shortcuts from the first to the last event of a piece, the
+    one with the least sum of squared distances from the curve, plus ``VOXEL_COST`` for each
+    voxel, is taken. On it no two voxels are neighbours but consecutive ones, unless the curve
+    leaves their surroundings between them: a shortcut from one to the other would cost less.
+
+    The sum knows no direction: a curve and its reverse, or its mirror image, have the same path.
+    Where two paths cost the same, the one found from the lesser end of the shortcuts is taken.
 
     Parameters
     ----------
-    events : Events
+    events : VoxelEvents
         Consecutive ones 26-adjacent or equal within a piece.
     samples : Samples, optional
-        Points along the same pieces. Short cuts that leave one of them further than
-        ``MAX_UNCOVERED`` from both ends are not taken: the chords that remain are the curve's.
+        Points along the same pieces, to measure distances from. Shortcuts that leave one of them
+        further than ``MAX_UNCOVERED`` from both ends are not taken: the chords that remain are
+        the curve's own.
     keep_tips : bool
-        Take no short cut over a tip: a voxel that sticks out of the box around both ends, where
+        Take no shortcut over a tip: a voxel that sticks out of the box around both ends, where
         the sequence comes back so near to itself that it would still be touching without the tip.
 
     Returns
     -------
-    Events
-        Of which no two consecutive ones of a piece are equal. First and last stay.
+    VoxelEvents
+        No two consecutive ones of a piece are equal. The first and the last stay.
 
     """
     if not events.t.size:
         return events
     full, thin = events, drop_repeats(events)
-    start, stop = _shortcuts(thin, samples, keep_tips=keep_tips)
-    if start.size:
+    starts, stops = _shortcuts(thin, samples, keep_tips=keep_tips)
+    if starts.size:
+        starts, stops = _cheapest(thin, samples, starts, stops)
         change = np.zeros(thin.t.size, dtype=np.int8)
-        change[start + 1] += 1
-        change[stop] -= 1
+        change[starts + 1] += 1
+        change[stops] -= 1
         thin = drop_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
     # A piece ends where it ends, even if its last voxel was reached before.
     last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
@@ -93,34 +110,132 @@ def continues_run(events: VoxelEvents) -> NDArray[np.bool_]:
 def _shortcuts(
     events: VoxelEvents, samples: Samples | None, *, keep_tips: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the short cuts i, J(i) with J(i) > i + 1 on the path from the start of each piece."""
+    """Find all shortcuts, as indices of their ends, in ascending order of these."""
     size = events.t.size
-    # Look only where a turn is within reach: between turns the step i, i + 1 is all there is.
+    # Only near turns: between them the step i, i + 1 is all there is.
     turn = (~continues_run(events)).nonzero()[0]
     reach = np.bincount(np.maximum(turn - WINDOW, 0), minlength=size + 1)
     reach -= np.bincount(np.minimum(turn + WINDOW, size), minlength=size + 1)
-    look = (np.cumsum(reach[:-1]) > 0).nonzero()[0]
-    if look.size < 3:
-        return look[:0], look[:0]
-    stretch = look - np.arange(look.size) + events.piece[look]
-    leap = furthest_shortcuts(events.voxels.take(look, axis=1), stretch)
-    short = (leap > 1).nonzero()[0]
-    if not short.size:
-        return short, short
-    starts, stops = look[short], look[short] + leap[short]
+    near_turns = (np.cumsum(reach[:-1]) > 0).nonzero()[0]
+    if near_turns.size < 3:
+        return near_turns[:0], near_turns[:0]
+    stretch = near_turns - np.arange(near_turns.size) + events.piece[near_turns]
+    first, second = find_shortcuts(events.voxels.take(near_turns, axis=1), stretch)
+    starts, stops = near_turns[first], near_turns[second]
     if keep_tips:
         keep = ~_skips_tip(events, starts, stops)
         starts, stops = starts[keep], stops[keep]
     if samples:
         keep = ~_uncovers_curve(events, samples, starts, stops)
         starts, stops = starts[keep], stops[keep]
-    taken = []
-    end = -1
-    for nth, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
-        if start >= end:
-            taken.append(nth)
-            end = stop
-    return starts[taken], stops[taken]
+    return starts, stops
+
+
+def _cheapest(
+    events: VoxelEvents,
+    samples: Samples | None,
+    starts: NDArray[np.intp],
+    stops: NDArray[np.intp],
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Select the shortcuts of the cheapest path."""
+    # Shortcuts that overlap form a group; what is chosen in one is no concern of another.
+    opens = np.append(True, starts[1:] >= np.maximum.accumulate(stops)[:-1])
+    first = opens.nonzero()[0]
+    last = np.append(first[1:], starts.size)
+    alone = last - first == 1
+    taken_starts, taken_stops = [starts[first[alone]]], [stops[first[alone]]]
+    if not alone.all():
+        several = ~alone
+        lows = starts[first[several]]
+        highs = np.maximum.reduceat(stops, first)[several]
+        counts = highs - lows + 1
+        nodes = expand_ranges(lows, counts)
+        costs = _costs(events, samples, nodes).tolist()
+        voxels = list(zip(*events.voxels.take(nodes, axis=1).tolist(), strict=True))
+        shortcuts = list(zip(starts.tolist(), stops.tolist(), strict=True))
+        at = 0
+        found: list[tuple[int, int]] = []
+        for low, count, a, b in zip(
+            lows.tolist(),
+            counts.tolist(),
+            first[several].tolist(),
+            last[several].tolist(),
+            strict=True,
+        ):
+            links = [(i - low, j - low) for i, j in shortcuts[a:b]]
+            path = _cheapest_path(costs[at : at + count], voxels[at : at + count], links)
+            found += [(low + i, low + j) for i, j in path]
+            at += count
+        more = np.array(found, dtype=np.intp).reshape(-1, 2)
+        taken_starts.append(more[:, 0])
+        taken_stops.append(more[:, 1])
+    return np.concatenate(taken_starts), np.concatenate(taken_stops)
+
+
+def _cheapest_path(
+    costs: list[int], voxels: list[tuple[int, ...]], links: list[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    """Return the shortcuts of the cheapest path over n events, from the first to the last."""
+    size = len(costs)
+    backwards = voxels[-1] < voxels[0]
+    if backwards:
+        costs, voxels = costs[::-1], voxels[::-1]
+        links = [(size - 1 - j, size - 1 - i) for i, j in links]
+    before: list[list[int]] = [[k - 1] for k in range(size)]
+    for i, j in links:
+        before[j].append(i)
+    total, origin = [0] * size, [0] * size
+    for j in range(1, size):
+        least, best = -1, 0
+        for i in sorted(before[j], reverse=True):
+            step = 0 if voxels[i] == voxels[j] else costs[i] + costs[j]
+            if least < 0 or total[i] + step < least:
+                least, best = total[i] + step, i
+        total[j], origin[j] = least, best
+    path = []
+    j = size - 1
+    while j:
+        i = origin[j]
+        if j - i > 1:
+            path.append((size - 1 - j, size - 1 - i) if backwards else (i, j))
+        j = i
+    return path
+
+
+def _costs(
+    events: VoxelEvents, samples: Samples | None, index: NDArray[np.integer]
+) -> NDArray[np.int64]:
+    """Return the costs of events: squared distances from the samples' polyline, as integers.
+
+    Whole numbers, so that sums do not depend on the order of their terms.
+    """
+    square = np.zeros(index.size)
+    if samples:
+        square = _squared_distances(events, samples, index)
+    scaled = (np.minimum(square, FAR) + VOXEL_COST) * COST_UNITS
+    return np.floor(scaled + 0.5).astype(np.int64)
+
+
+def _squared_distances(events: VoxelEvents, samples: Samples, index: NDArray[np.integer]) -> Floats:
+    """Return squared distances of voxel centres, (n,), from the polyline around their t."""
+    order = samples.piece + 1j * samples.t
+    here = events.piece[index] + 1j * events.t[index]
+    low, high = np.searchsorted(order, here), np.searchsorted(order, here, side="right")
+    bounds = samples.bounds
+    first, last = bounds[events.piece[index]], bounds[events.piece[index] + 1] - 1
+    centres = events.voxels.take(index, axis=1) + 0.5
+    least = np.full(index.size, np.inf)
+    for shift in range(4):
+        begin = np.minimum(np.maximum(low - 2 + shift, first), last)
+        end = np.minimum(np.minimum(begin + 1, high + 1), last)
+        here_points = samples.points.take(begin, axis=1)
+        along = samples.points.take(end, axis=1) - here_points
+        offset = centres - here_points
+        length = np.maximum((along * along).sum(axis=0), TINY)
+        share = np.minimum(np.maximum((offset * along).sum(axis=0) / length, 0.0), 1.0)
+        offset = offset - share * along
+        least = np.minimum(least, (offset * offset).sum(axis=0))
+    return least
 
 
 def _skips_tip(
@@ -161,11 +276,12 @@ def _uncovers_curve(
     return behind
 
 
-def furthest_shortcuts(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
-    """Give J(i) - i for each of n voxels, (3, n), which are looked at within stretches (n,)."""
-    leap = np.ones(stretch.size, dtype=np.int8)
+def find_shortcuts(
+    voxels: NDArray[np.int32], stretch: NDArray[np.integer]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find all shortcuts between n voxels, (3, n), within stretches, (n,): starts and stops."""
     touch = _adjacency_in_window(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
-    w, start = touch[1:].nonzero()
+    start, w = touch[1:].T.nonzero()
     if start.size:
         w += 2
         stop, steps = start + w, np.arange(WINDOW)[:, None]
@@ -173,8 +289,16 @@ def furthest_shortcuts(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) 
         ahead, behind = (
             np.logical_and.accumulate(each).sum(axis=0) for each in (touch[:, start], before)
         )
-        short = ahead + behind >= w - 1
-        leap[start[short]] = w[short]  # of several for one voxel, the last: the furthest
+        valid = ahead + behind >= w - 1
+        start, w = start[valid], w[valid]
+    return start, start + w
+
+
+def furthest_shortcuts(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) -> NDArray[np.int8]:
+    """Return how many events each of n voxels, (3, n), can skip at most, plus 1: (n,)."""
+    leap = np.ones(stretch.size, dtype=np.int8)
+    start, stop = find_shortcuts(voxels, stretch)
+    leap[start] = stop - start  # of several for one voxel, the last: the furthest
     return leap
 
 

@@ -13,10 +13,13 @@ from voxdisplay.voxelization.adaptive_sampling import MAX_CHORD, MAX_PARTS, MAX_
 from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.kernels.contiguous import Bytes, packed
 from voxdisplay.voxelization.plane_crossings import (
+    MAX_PROJECTION,
+    MAX_SQUARE,
     MIN_GAIN,
     TIE_TOLERANCE,
     CornerChoices,
     CrossingGuesses,
+    Slopes,
 )
 from voxdisplay.voxelization.voxel_events import Voxels
 
@@ -115,14 +118,11 @@ def _slopes_at(piece: Ints, t: Floats, points: Floats) -> Floats:
     return slopes
 
 
-def guess_crossings(samples: Samples, slopes: Floats, low: int, high: int) -> CrossingGuesses:
+def guess_crossings(samples: Samples, slopes: Slopes, low: int, high: int) -> CrossingGuesses:
     """See `plane_crossings.guess_crossings`."""
-    points = packed(samples.points)
-    return CrossingGuesses(
-        *_guess_crossings(
-            samples.piece, samples.t, points, packed(slopes), low, high, TIE_TOLERANCE
-        )
-    )
+    known = samples.piece, samples.t, packed(samples.points)
+    tangents = packed(slopes.arriving), packed(slopes.leaving)
+    return CrossingGuesses(*_guess_crossings(*known, *tangents, low, high, TIE_TOLERANCE))
 
 
 @jit
@@ -132,7 +132,14 @@ def _monotone(slope: float) -> float:
 
 @jit
 def _guess_crossings(
-    piece: Ints, t: Floats, points: Floats, slopes: Floats, low: int, high: int, nudge: float
+    piece: Ints,
+    t: Floats,
+    points: Floats,
+    arriving: Floats,
+    leaving: Floats,
+    low: int,
+    high: int,
+    nudge: float,
 ) -> tuple[Ints, Bytes, Bools, Floats, Floats, Floats]:
     stop = min(high, t.size - 1)
     # The steps that pass planes, of which axis, how many.
@@ -166,8 +173,8 @@ def _guess_crossings(
         h = t[k + 1] - t[k]
         begin = points[axis, k]
         length = points[axis, k + 1] - begin
-        m_left = _monotone(length / (slopes[axis, k] * h))
-        m_right = _monotone(length / (slopes[axis, k + 1] * h))
+        m_left = _monotone(length / (leaving[axis, k] * h))
+        m_right = _monotone(length / (arriving[axis, k + 1] * h))
         sense = 1.0 if passed > 0 else -1.0
         first = np.floor(begin - 0.5) + (1.5 if passed > 0 else 0.5)
         for plane in range(int(abs(passed))):
@@ -183,13 +190,14 @@ def _guess_crossings(
 
 
 def rank_corners(
-    samples: Samples, slopes: Floats, aims: CrossingGuesses, points: Floats
+    samples: Samples, slopes: Slopes, aims: CrossingGuesses, points: Floats
 ) -> CornerChoices:
     """See `plane_crossings.rank_corners`."""
+    tangents = packed(slopes.arriving), packed(slopes.leaving)
     aimed = aims.knot, aims.axis, aims.level, aims.tau
-    return CornerChoices(
-        *_rank_corners(samples.t, packed(slopes), *aimed, packed(points), TIE_TOLERANCE, MIN_GAIN)
-    )
+    limits = TIE_TOLERANCE, MIN_GAIN, MAX_PROJECTION, MAX_SQUARE
+    known = (*tangents, *aimed, packed(points), *limits)
+    return CornerChoices(*_rank_corners(samples.t, *known))
 
 
 @jit
@@ -205,7 +213,8 @@ def _dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> fl
 @jit
 def _rank_corners(
     t: Floats,
-    slopes: Floats,
+    arriving: Floats,
+    leaving: Floats,
     knot: Ints,
     axes: Bytes,
     level: Floats,
@@ -213,6 +222,8 @@ def _rank_corners(
     points: Floats,
     nudge: float,
     margin: float,
+    most_projection: float,
+    most_square: float,
 ) -> tuple[Voxels, Voxels, Floats, Floats]:
     size = knot.size
     nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
@@ -221,16 +232,34 @@ def _rank_corners(
         left, axis, share, plane = knot[k], axes[k], tau[k], level[k] - 0.5
         h = t[left + 1] - t[left]
         x, y, z = points[0, k], points[1, k], points[2, k]
-        corner_x = plane if axis == 0 else np.floor(x + nudge)
-        corner_y = plane if axis == 1 else np.floor(y + nudge)
-        corner_z = plane if axis == 2 else np.floor(z + nudge)
-        apart_x, apart_y, apart_z = corner_x + 0.5 - x, corner_y + 0.5 - y, corner_z + 0.5 - z
-        along_x = _between(slopes[0, left] * h, slopes[0, left + 1] * h, share)
-        along_y = _between(slopes[1, left] * h, slopes[1, left + 1] * h, share)
-        along_z = _between(slopes[2, left] * h, slopes[2, left + 1] * h, share)
+        along_x = _between(leaving[0, left] * h, arriving[0, left + 1] * h, share)
+        along_y = _between(leaving[1, left] * h, arriving[1, left + 1] * h, share)
+        along_z = _between(leaving[2, left] * h, arriving[2, left + 1] * h, share)
         length = _larger(np.sqrt(_dot(along_x, along_y, along_z, along_x, along_y, along_z)), TINY)
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
+        off = x if axis == 0 else (y if axis == 1 else z)
+        off = (off - level[k]) / (along_x if axis == 0 else (along_y if axis == 1 else along_z))
+        if not abs(off) < most_projection:
+            off = 0.0
+            if not (np.isfinite(along_x) and np.isfinite(along_y) and np.isfinite(along_z)):
+                along_x = along_y = along_z = 0.0
+        on_x, on_y, on_z = x - off * along_x, y - off * along_y, z - off * along_z
+        corner_x = plane if axis == 0 else np.floor(on_x + nudge)
+        corner_y = plane if axis == 1 else np.floor(on_y + nudge)
+        corner_z = plane if axis == 2 else np.floor(on_z + nudge)
+        apart_x, apart_y, apart_z = (
+            corner_x + 0.5 - on_x,
+            corner_y + 0.5 - on_y,
+            corner_z + 0.5 - on_z,
+        )
         project = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
+        square = _dot(apart_x, apart_y, apart_z, apart_x, apart_y, apart_z)
+        if square + off * (off - 2.0 * project) > most_square:
+            corner_x = plane if axis == 0 else np.floor(x + nudge)
+            corner_y = plane if axis == 1 else np.floor(y + nudge)
+            corner_z = plane if axis == 2 else np.floor(z + nudge)
+            apart_x, apart_y, apart_z = corner_x + 0.5 - x, corner_y + 0.5 - y, corner_z + 0.5 - z
+            project = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
         # The two axes of the face.
         first, second = (1 if axis == 0 else 0), (1 if axis == 2 else 2)
         apart_1, apart_2 = (apart_y if axis == 0 else apart_x), (apart_y if axis == 2 else apart_z)
@@ -256,9 +285,9 @@ def _rank_corners(
             step_2 = (-1 if apart_2 > 0 else 1) if move_2 else 0
             better[first, k] += step_1
             better[second, k] += step_2
-            apart_x += step_1 if axis != 0 else 0
-            apart_y += step_1 if axis == 0 else (step_2 if axis == 2 else 0)
-            apart_z += step_2 if axis != 2 else 0
+            apart_x = better[0, k] + 0.5 - x
+            apart_y = better[1, k] + 0.5 - y
+            apart_z = better[2, k] + 0.5 - z
             if _dot(apart_x, apart_y, apart_z, apart_x, apart_y, apart_z) > 0.5:
                 reach = _dot(apart_x, apart_y, apart_z, along_x, along_y, along_z)
                 foot[k] = reach / length

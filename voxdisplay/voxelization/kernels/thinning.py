@@ -5,7 +5,7 @@ Several threads may be in them at once.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,35 @@ from numpy.typing import NDArray
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.compute.kernel_backend import jit
 from voxdisplay.voxelization.curve_batch import Samples
+from voxdisplay.voxelization.grid_plane import SAME_GAIN
 from voxdisplay.voxelization.index_ranges import Arrays
 from voxdisplay.voxelization.kernels.contiguous import Bytes, Pieces, packed
 from voxdisplay.voxelization.plane_crossings import Crossings
-from voxdisplay.voxelization.thinning import MAX_UNCOVERED, WINDOW
+from voxdisplay.voxelization.thinning import COST_UNITS, FAR, MAX_UNCOVERED, VOXEL_COST, WINDOW
 from voxdisplay.voxelization.voxel_events import VoxelEvents, Voxels
 
 NO_HEADING = -1  # `voxel_events.NO_HEADING`
 NO_POINTS = np.empty((3, 0))
 NO_NUMBERS = np.empty(0)
-NO_PIECES = np.empty(0, dtype=np.int64)
+NO_BOUNDS = np.empty(0, dtype=np.int64)
+TINY = float(np.finfo(float).tiny)
+
+
+class Way(NamedTuple):
+    """Samples along the curve: indices of the first of each piece, parameters, points."""
+
+    bounds: Ints
+    t: Floats
+    points: Floats
+
+
+class Prices(NamedTuple):
+    """The constants of `thinning`."""
+
+    voxel: float
+    units: float
+    far: float
+    farthest: float
 
 
 @jit
@@ -64,6 +83,7 @@ def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
             samples.t,
             packed(samples.points),
             samples.bounds,
+            SAME_GAIN,
         )
     )
 
@@ -79,6 +99,7 @@ def _choose_corners(
     sample_t: Floats,
     points: Floats,
     bounds: Ints,
+    same_gain: float,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
     pieces = bounds.size - 1
     size = inner_t.size + 2 * pieces
@@ -113,12 +134,16 @@ def _choose_corners(
                 voxels[row, k] = nearest[row, k]
     apart = find_gaps(piece, voxels)
     while apart.size:
-        back = np.empty(apart.size, dtype=np.int64)
+        back = np.empty(2 * apart.size, dtype=np.int64)
         count = 0
         for k in apart:
             if not bridged[k]:
-                back[count] = k if gain[k] <= gain[k + 1] else k + 1
-                count += 1
+                if gain[k] <= gain[k + 1] + same_gain:
+                    back[count] = k
+                    count += 1
+                if gain[k + 1] <= gain[k] + same_gain:
+                    back[count] = k + 1
+                    count += 1
         for k in back[:count]:
             gain[k] = np.inf
             voxels[:, k] = nearest[:, k]
@@ -168,15 +193,12 @@ def thin_events(
     events: VoxelEvents, samples: Samples | None = None, *, keep_tips: bool = False
 ) -> VoxelEvents:
     """See `thinning.thin_events`."""
-    known = (
-        (samples.piece, samples.t, packed(samples.points))
-        if samples
-        else (NO_PIECES, NO_NUMBERS, NO_POINTS)
-    )
+    way = Way(NO_BOUNDS, NO_NUMBERS, NO_POINTS)
+    if samples:
+        way = Way(samples.bounds, samples.t, packed(samples.points))
     full = events.piece, events.t, packed(events.voxels), events.heading
-    return VoxelEvents(
-        *_thin_events(*full, *known, keep_tips, WINDOW, MAX_UNCOVERED * MAX_UNCOVERED)
-    )
+    prices = Prices(VOXEL_COST, COST_UNITS, FAR, MAX_UNCOVERED * MAX_UNCOVERED)
+    return VoxelEvents(*_thin_events(*full, way, prices, keep_tips, WINDOW))
 
 
 @jit
@@ -201,35 +223,14 @@ def _near_turns(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> B
 
 
 @jit
-def _furthest_shortcut(
-    voxels: Voxels, i: int, begin: int, end: int, connected: bool, window: int
-) -> int:
-    """Give J(i) - i within a stretch."""
-    ahead = 0
-    while ahead < window and i + ahead + 1 < end and _adjacent(voxels, i, i + ahead + 1):
-        ahead += 1
-    w = min(window, end - 1 - i) + 1
-    while w > 2:
-        w -= 1
-        j = i + w
-        apart = max(
-            abs(voxels[0, i] - voxels[0, j]),
-            abs(voxels[1, i] - voxels[1, j]),
-            abs(voxels[2, i] - voxels[2, j]),
-        )
-        if apart > 2 and connected:
-            w -= apart - 2  # so many steps back it takes until the next one can be near
-        elif apart <= 1:
-            behind = 0
-            while (
-                ahead + behind < w - 1
-                and j - behind - 1 >= begin
-                and _adjacent(voxels, j - behind - 1, j)
-            ):
-                behind += 1
-            if ahead + behind >= w - 1:
-                return w
-    return 1
+def _is_shortcut(voxels: Voxels, i: int, j: int, ahead: int) -> bool:
+    """Tell whether i leads to j; ``ahead`` events after i are adjacent to it."""
+    if not _adjacent(voxels, i, j):
+        return False
+    for k in range(i + 1 + ahead, j):  # noqa: SIM110 - no generators in kernels
+        if not _adjacent(voxels, k, j):
+            return False
+    return True
 
 
 @jit
@@ -257,29 +258,161 @@ def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
 
 
 @jit
+def _uncovers(way: Way, t: Floats, voxels: Voxels, i: int, j: int, p: int, farthest: float) -> bool:
+    """Tell whether a point of the curve, of those from ``p`` on, is far from both ends."""
+    while p < way.t.size and way.t[p] < t[j]:
+        if min(_square(voxels, i, way.points, p), _square(voxels, j, way.points, p)) > farthest:
+            return True
+        p += 1
+    return False
+
+
+@jit
+def _cost(way: Way, prices: Prices, piece: Pieces, t: Floats, voxels: Voxels, k: int) -> int:
+    """See `thinning._costs` and `thinning._squared_distances`."""
+    least = 0.0
+    if way.t.size:
+        first, last = way.bounds[piece[k]], way.bounds[piece[k] + 1] - 1
+        low, high = first, last + 1
+        while low < high:
+            middle = (low + high) // 2
+            if way.t[middle] < t[k]:
+                low = middle + 1
+            else:
+                high = middle
+        high = low
+        while high <= last and way.t[high] <= t[k]:
+            high += 1
+        least = np.inf
+        x, y, z = voxels[0, k] + 0.5, voxels[1, k] + 0.5, voxels[2, k] + 0.5
+        for shift in range(4):
+            begin = min(max(low - 2 + shift, first), last)
+            end = min(begin + 1, high + 1, last)
+            from_x, from_y, from_z = (
+                way.points[0, begin],
+                way.points[1, begin],
+                way.points[2, begin],
+            )
+            along_x = way.points[0, end] - from_x
+            along_y = way.points[1, end] - from_y
+            along_z = way.points[2, end] - from_z
+            off_x, off_y, off_z = x - from_x, y - from_y, z - from_z
+            length = max(along_x * along_x + along_y * along_y + along_z * along_z, TINY)
+            share = (off_x * along_x + off_y * along_y + off_z * along_z) / length
+            share = min(max(share, 0.0), 1.0)
+            off_x, off_y, off_z = (
+                off_x - share * along_x,
+                off_y - share * along_y,
+                off_z - share * along_z,
+            )
+            least = min(least, off_x * off_x + off_y * off_y + off_z * off_z)
+    scaled = (min(least, prices.far) + prices.voxel) * prices.units
+    return int(np.floor(scaled + 0.5))
+
+
+@jit
+def _same(voxels: Voxels, i: int, j: int) -> bool:
+    return bool(
+        voxels[0, i] == voxels[0, j]
+        and voxels[1, i] == voxels[1, j]
+        and voxels[2, i] == voxels[2, j]
+    )
+
+
+@jit
+def _lesser(voxels: Voxels, i: int, j: int) -> bool:
+    """Tell whether voxel i comes before voxel j, by x, then y, then z."""
+    for row in range(3):
+        if voxels[row, i] != voxels[row, j]:
+            return bool(voxels[row, i] < voxels[row, j])
+    return False
+
+
+@jit
+def _take_cheapest(voxels: Voxels, costs: Ints, low: int, links: Ints, skipped: Bools) -> None:
+    """Mark what the cheapest path skips: see `thinning._cheapest_path`.
+
+    ``links``, (2, n), are the starts and stops of shortcuts, ascending; ``costs`` those of the
+    events from ``low`` on.
+    """
+    size, count = costs.size, links.shape[1]
+    total, other = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
+    if _lesser(voxels, low + size - 1, low):
+        total[size - 1] = 0
+        nth = count - 1
+        for i in range(size - 2, -1, -1):
+            while nth >= 0 and links[0, nth] == low + i:
+                j = links[1, nth] - low
+                step = 0 if _same(voxels, low + i, low + j) else costs[i] + costs[j]
+                if total[i] < 0 or total[j] + step <= total[i]:
+                    total[i], other[i] = total[j] + step, j
+                nth -= 1
+            j = i + 1
+            step = 0 if _same(voxels, low + i, low + j) else costs[i] + costs[j]
+            if total[i] < 0 or total[j] + step <= total[i]:
+                total[i], other[i] = total[j] + step, j
+        i = 0
+        while i < size - 1:
+            skipped[low + i + 1 : low + other[i]] = True
+            i = other[i]
+        return
+    total[0] = 0
+    nth = 0
+    for i in range(size - 1):
+        j = i + 1
+        step = 0 if _same(voxels, low + i, low + j) else costs[i] + costs[j]
+        if total[j] < 0 or total[i] + step <= total[j]:
+            total[j], other[j] = total[i] + step, i
+        while nth < count and links[0, nth] == low + i:
+            j = links[1, nth] - low
+            step = 0 if _same(voxels, low + i, low + j) else costs[i] + costs[j]
+            if total[j] < 0 or total[i] + step <= total[j]:
+                total[j], other[j] = total[i] + step, i
+            nth += 1
+    j = size - 1
+    while j:
+        skipped[low + other[j] + 1 : low + j] = True
+        j = other[j]
+
+
+@jit
+def _settle(
+    voxels: Voxels,
+    piece: Pieces,
+    t: Floats,
+    way: Way,
+    prices: Prices,
+    low: int,
+    high: int,
+    links: Ints,
+    skipped: Bools,
+) -> None:
+    """Mark what a group of shortcuts that overlap, from ``low`` to ``high``, skips."""
+    if links.shape[1] == 1:
+        skipped[links[0, 0] + 1 : links[1, 0]] = True
+    elif links.shape[1]:
+        costs = np.empty(high - low + 1, dtype=np.int64)
+        for k in range(low, high + 1):
+            costs[k - low] = _cost(way, prices, piece, t, voxels, k)
+        _take_cheapest(voxels, costs, low, links, skipped)
+
+
+@jit
 def _thin_events(
     full_piece: Pieces,
     full_t: Floats,
     full_voxels: Voxels,
     full_heading: Bytes,
-    sample_piece: Ints,
-    sample_t: Floats,
-    points: Floats,
+    way: Way,
+    prices: Prices,
     keep_tips: bool,
     window: int,
-    farthest: float,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
     whole = full_t.size
     number = np.empty(whole, dtype=np.int64)
     size = 0
     for k in range(whole):
-        if not (
-            k > 0
-            and full_piece[k] == full_piece[k - 1]
-            and full_voxels[0, k] == full_voxels[0, k - 1]
-            and full_voxels[1, k] == full_voxels[1, k - 1]
-            and full_voxels[2, k] == full_voxels[2, k - 1]
-        ):
+        if not (k and full_piece[k] == full_piece[k - 1] and _same(full_voxels, k, k - 1)):
             number[size] = k
             size += 1
     number = number[:size]
@@ -290,13 +423,49 @@ def _thin_events(
         for row in range(3):
             for k in range(size):
                 voxels[row, k] = full_voxels[row, number[k]]
-    look = _near_turns(piece, voxels, heading, window)
+    near_turns = _near_turns(piece, voxels, heading, window)
+
+    skipped = np.zeros(size, dtype=np.bool_)
+    links = np.empty((2, 4 * window), dtype=np.int64)
+    count = low = high = end = p = 0
+    for i in range(size):
+        if not near_turns[i]:
+            continue
+        if i >= end:  # of the stretch within which shortcuts are looked for
+            end = i
+            while end < size and near_turns[end] and piece[end] == piece[i]:
+                end += 1
+        ahead = 0
+        while ahead < window and i + ahead + 1 < end and _adjacent(voxels, i, i + ahead + 1):
+            ahead += 1
+        for j in range(i + 2, min(i + window + 1, end)):
+            if not _is_shortcut(voxels, i, j, ahead):
+                continue
+            if keep_tips and _skips_tip(piece, voxels, i, j):
+                continue
+            if way.t.size:
+                p = max(p, way.bounds[piece[i]])
+                while p < way.bounds[piece[i] + 1] and way.t[p] < t[i]:
+                    p += 1
+                if _uncovers(way, t, voxels, i, j, p, prices.farthest):
+                    continue
+            if i >= high:
+                _settle(voxels, piece, t, way, prices, low, high, links[:, :count], skipped)
+                count, low = 0, i
+            high = max(high, j)
+            if count == links.shape[1]:
+                longer = np.empty((2, 2 * count), dtype=np.int64)
+                longer[:, :count] = links
+                links = longer
+            links[0, count], links[1, count] = i, j
+            count += 1
+    _settle(voxels, piece, t, way, prices, low, high, links[:, :count], skipped)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
-    count = p = i = 0
-    begin = end = 0  # of the stretch that is looked at
-    connected = True
-    while i < size:
+    count = 0
+    for i in range(size):
+        if skipped[i]:
+            continue
         last = kept[count - 1] if count else -1
         if not (
             count
@@ -307,31 +476,6 @@ def _thin_events(
         ):
             kept[count], kept_t[count] = number[i], t[i]
             count += 1
-        leap = 1
-        if look[i]:
-            if i >= end:
-                begin = end = i
-                connected = True
-                while end < size and look[end] and piece[end] == piece[i]:
-                    end += 1
-                    connected &= end == i + 1 or _adjacent(voxels, end - 2, end - 1)
-            leap = _furthest_shortcut(voxels, i, begin, end, connected, window)
-        if leap > 1 and keep_tips and _skips_tip(piece, voxels, i, i + leap):
-            leap = 1
-        if leap > 1 and sample_t.size:
-            j = i + leap
-            while p < sample_t.size and (
-                sample_piece[p] < piece[i] or (sample_piece[p] == piece[i] and sample_t[p] < t[i])
-            ):
-                p += 1
-            q = p
-            while q < sample_t.size and sample_piece[q] == piece[i] and sample_t[q] < t[j]:
-                nearest = min(_square(voxels, i, points, q), _square(voxels, j, points, q))
-                if nearest > farthest:
-                    leap = 1
-                    break
-                q += 1
-        i += leap
 
     at = 0
     for k in range(whole):  # a piece ends where it ends, even if its last voxel was reached before
