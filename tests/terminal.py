@@ -1,4 +1,4 @@
-"""A real terminal: the slave of a pty, with a program on it that thinks it is ours."""
+"""Pseudo-terminal with a program on it, for tests of keys, screen and terminal modes."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ DEADLINE_S = 60
 
 
 class Terminal:
-    """A program in a terminal of 60 by 20 characters.
+    """A program in a terminal of 60 columns and 20 rows.
 
-    Its keyboard, its screen and its controlling terminal are the slave.
+    The slave of the pty is its stdin, stdout, stderr and controlling terminal.
     """
 
     def __init__(self, arguments, *, code=None, stdin=None, **environment):
@@ -52,24 +52,24 @@ class Terminal:
         os.write(self.screen, keys.encode())
 
     def read_until(self, done):
-        """Read the screen until what has come satisfies; give what came meanwhile."""
-        came, deadline_s = "", time.monotonic() + DEADLINE_S
-        while not done(came):
+        """Read the screen until a condition holds for what was read; return what was read."""
+        text, deadline_s = "", time.monotonic() + DEADLINE_S
+        while not done(text):
             if not select.select([self.screen], [], [], deadline_s - time.monotonic())[0]:
                 raise TimeoutError(self.text[-2000:])
-            came += self._read()
-        return came
+            text += self._read()
+        return text
 
     def _read(self):
         try:
-            data = self._decoder.decode(os.read(self.screen, 65536))  # a character may come in two
-        except OSError:  # nobody has the slave any more
+            data = self._decoder.decode(os.read(self.screen, 65536))  # a character may be split
+        except OSError:  # the slave is closed
             data = ""
         self.text += data
         return data
 
     def finish(self):
-        """Wait for the end; give the exit code and everything that was ever on the screen."""
+        """Wait for the program to end; return its exit code and all that it wrote."""
         deadline_s = time.monotonic() + DEADLINE_S
         while self.process.poll() is None and time.monotonic() < deadline_s:
             if select.select([self.screen], [], [], 0.05)[0]:
@@ -79,8 +79,8 @@ class Terminal:
         return self.process.wait(0), self.text
 
     @property
-    def is_as_it_was(self):
-        """Whether the terminal's modes are those of the beginning."""
+    def modes_restored(self):
+        """True if the terminal's modes are those of the beginning."""
         return termios.tcgetattr(self._slave) == self.mode
 
     def close(self):

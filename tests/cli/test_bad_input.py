@@ -1,4 +1,4 @@
-"""Bad scenes: an error that names place and remedy, exit code 2, never a traceback."""
+"""Bad scenes, files and usage: errors with place and remedy, exit code 2, no traceback."""
 
 import json
 import subprocess
@@ -51,8 +51,8 @@ def test_bad_scenes(capsys, scene, name):
     path = str(scene(content))
     for arguments in (["push", path, "--port", "sim:"], ["voxelize", path]):
         code = main(arguments)
-        said = capsys.readouterr()
-        refused(subprocess.CompletedProcess(arguments, code, said.out, said.err), *words)
+        printed = capsys.readouterr()
+        refused(subprocess.CompletedProcess(arguments, code, printed.out, printed.err), *words)
 
 
 @pytest.mark.parametrize("command", ["push", "voxelize", "plan"])
@@ -135,7 +135,7 @@ def test_a_display_that_is_too_large_for_this_machine(monkeypatch, capsys):
 
     monkeypatch.setattr("voxdisplay.Frame", too_large)
     assert main(["plan", PAPER, "--size", "2048,2048,2048"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("voxdisplay: there is not enough memory: Unable to allocate 24.0 GiB")
+    printed = capsys.readouterr().err
+    assert printed.startswith("voxdisplay: there is not enough memory: Unable to allocate 24.0 GiB")
     assert main(["--debug", "plan", PAPER]) == 2
     assert "Traceback" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""What the commands print, and where."""
+"""Results of the commands on stdout, and notes on stderr."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ OBJECT_KEYS = {
 PAPER = "examples/paper-curve.json"
 
 
-def test_push_without_a_port_says_that_it_uses_the_emulator(run):
+def test_push_without_a_port_notes_that_it_uses_the_emulator(run):
     pushed = run("push", PAPER, "--verify")
     assert pushed.returncode == 0
     assert "built-in emulator" in pushed.stderr
@@ -52,9 +52,9 @@ def test_the_port_may_come_from_the_environment(run):
 
 
 def test_info_for_people(run):
-    said = run("info", "--port", "sim:?size=3x5x7").stdout
-    assert "3x5x7" in said
-    assert "read, digest" in said
+    printed = run("info", "--port", "sim:?size=3x5x7").stdout
+    assert "3x5x7" in printed
+    assert "read, digest" in printed
 
 
 def test_a_scene_from_stdin(run):
@@ -64,7 +64,7 @@ def test_a_scene_from_stdin(run):
     assert json.loads(pushed.stdout)["voxels"] == 7
 
 
-def test_another_size_is_fitted_and_said(run):
+def test_another_size_is_fitted_and_noted(run):
     pushed = run("push", PAPER, "--port", "sim:?size=17x64x40")
     assert "scaled by" in pushed.stderr
     kept = run("push", PAPER, "--port", "sim:?size=17x64x40", "--fit", "none")
@@ -72,7 +72,7 @@ def test_another_size_is_fitted_and_said(run):
     assert "outside the display" in kept.stderr
 
 
-def test_a_poorer_display_takes_the_nearest_colour_and_says_so_once(run):
+def test_a_poorer_display_takes_the_nearest_colour_and_notes_it_once(run):
     pushed = run("push", "examples/lissajous.json", "--port", "sim:?format=mono1")
     assert pushed.stderr.count("nearest") == 1
 
@@ -163,7 +163,7 @@ def test_shell_completion(run):
     assert "complete" in script.stdout
 
 
-def test_a_full_disk_is_said():
+def test_a_full_disk_is_an_error():
     command = f"{sys.executable} -m voxdisplay voxelize {PAPER} > /dev/full"
     done = subprocess.run(["/bin/bash", "-c", command], capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -194,17 +194,17 @@ def test_a_capture_has_every_byte_of_both_directions(run, tmp_path):
     assert len(sent) >= json.loads(pushed.stdout)["wire_bytes"]
 
 
-def test_a_capture_that_cannot_be_written_is_said_before_anything_is_sent(run, tmp_path):
+def test_a_capture_that_cannot_be_written_is_an_error_before_anything_is_sent(run, tmp_path):
     pushed = run("push", PAPER, "--port", "sim:", "--capture", tmp_path / "no" / "capture.jsonl")
     assert pushed.returncode == 2
     assert "No such file" in pushed.stderr
 
 
 def test_an_option_of_a_port_means_the_same_everywhere():
-    told = {"baud": set(), "timeout_s": set()}
+    texts = {"baud": set(), "timeout_s": set()}
     for name in ("push", "info", "view", "ports", "plan", "conformance"):
         for option in cli.get_command(None, name).params:
-            if option.name in told:
+            if option.name in texts:
                 text = option.help.split("  [default")[0]
-                told[option.name].add((text, type(option.type), option.metavar))
-    assert [len(words) for words in told.values()] == [1, 1]
+                texts[option.name].add((text, type(option.type), option.metavar))
+    assert [len(words) for words in texts.values()] == [1, 1]

@@ -1,4 +1,4 @@
-"""Pictures by command: of scenes, and of what a display says it shows."""
+"""Image files of ``preview`` (of a scene) and of ``push --preview`` (read back)."""
 
 import subprocess
 import sys
@@ -88,10 +88,10 @@ def test_a_film(run, tmp_path):
 def test_bad_usage(tmp_path, capsys, arguments, words):
     here = [str(tmp_path / word) if word.startswith("x.") else word for word in arguments]
     assert main(here) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "Traceback" not in said.err
-    assert all(word in said.err for word in words)
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "Traceback" not in printed.err
+    assert all(word in printed.err for word in words)
     assert not list(tmp_path.iterdir())
 
 
@@ -141,7 +141,7 @@ def test_a_preview_that_cannot_be_written_does_not_hide_what_was_shown(run):
 
 
 def without(module, *arguments):
-    """Run a command where a module is not installed; give the finished process."""
+    """Run a command as if a module were not installed; return the finished process."""
     code = f"import sys; sys.modules[{module!r}] = None\nfrom voxdisplay.cli import main\n"
     code += "code = main(sys.argv[1:])\nprint(*sys.modules)\nsys.exit(code)"
     return subprocess.run(
@@ -153,7 +153,7 @@ def without(module, *arguments):
 
 
 @pytest.mark.parametrize("command", [["preview", TREFOIL, "-o"], ["push", TREFOIL, "--preview"]])
-def test_without_pillow_it_says_what_to_install(command, tmp_path):
+def test_without_pillow_it_names_what_to_install(command, tmp_path):
     done = without("PIL", *command, tmp_path / "x.png")
     assert done.returncode == 2
     assert "pip install 'voxdisplay[view]'" in done.stderr

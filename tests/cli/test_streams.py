@@ -1,4 +1,4 @@
-"""A command whose stdin, stdout or stderr is closed, full, or read by nobody."""
+"""Commands whose stdin, stdout or stderr is closed, full, or not read."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ FULL = "No space left on device"
 
 
 def shell(ends, command=PUSH):
-    """Run a command with some redirections behind it, in bash; give its exit code and the rest."""
+    """Run a command with redirections in bash; return the finished process."""
     line = f"$vox {command} {ends}; exit ${{PIPESTATUS[0]}}"
     return subprocess.run(
         ["/bin/bash", "-c", line],
@@ -53,5 +53,5 @@ def test_a_disk_that_is_full():
     assert (done.returncode, done.stdout) == (2, "")
     assert FULL in done.stderr
     done = shell("2> /dev/full")
-    assert done.returncode == 0, "what is told by the way is not what was asked for"
+    assert done.returncode == 0, "notes are not the result"
     assert "proved" in done.stdout

@@ -1,4 +1,4 @@
-"""Pictures in a terminal: a real one, which must be as it was in the end."""
+"""Terminal view and thumbnail on a pseudo-terminal, whose modes are restored in the end."""
 
 import os
 import re
@@ -37,7 +37,7 @@ def drawn(came):
 
 
 def plain(text):
-    """What can be read of it, without any escape sequence."""
+    """Return the text without escape sequences."""
     return re.sub(r"\x1b\[[?\d;]*[A-Za-z]", "", text)
 
 
@@ -59,7 +59,7 @@ def test_keys_turn_and_zoom_and_end_it(terminal):
     code, text = view.finish()
     assert code == 0
     assert text.endswith(LEAVE)
-    assert view.is_as_it_was
+    assert view.modes_restored
 
 
 def test_it_spins_and_follows_the_window(terminal):
@@ -89,8 +89,8 @@ def test_however_it_is_ended_the_terminal_is_restored(terminal, how):
     code, text = view.finish()
     assert code == 130
     assert LEAVE in text
-    assert text.index(LEAVE) < text.index("interrupted"), "what is said, is said on the old screen"
-    assert view.is_as_it_was
+    assert text.index(LEAVE) < text.index("interrupted"), "messages are printed on the old screen"
+    assert view.modes_restored
 
 
 def test_a_display_that_goes_away(terminal, emulator):
@@ -101,7 +101,7 @@ def test_a_display_that_goes_away(terminal, emulator):
     code, text = view.finish()
     assert code == 3
     assert "Traceback" not in text
-    assert view.is_as_it_was
+    assert view.modes_restored
     assert text.index(LEAVE) < text.rindex("voxdisplay:")
 
 
@@ -124,10 +124,10 @@ def test_a_scene_from_a_pipe_leaves_the_keyboard_to_the_terminal(terminal):
     view.read_until(drawn)
     view.press("q")
     assert view.finish()[0] == 0
-    assert view.is_as_it_was
+    assert view.modes_restored
 
 
-def test_without_a_terminal_it_says_so(run):
+def test_without_a_terminal_it_is_an_error(run):
     done = run("view", "--terminal", TREFOIL)
     assert done.returncode == 2
     assert "no terminal" in done.stderr

@@ -1,4 +1,4 @@
-"""``voxdisplay test-pattern`` on good displays, and on one whose axes are wired wrongly."""
+"""``voxdisplay test-pattern`` on correct displays, and on one with swapped or mirrored axes."""
 
 import json
 import subprocess
@@ -7,8 +7,8 @@ import sys
 import pytest
 from conftest import ROOT
 
-# The emulator, with a fault of a kind that devices have: voxel (x, y, z) of an op is put elsewhere
-# in memory, while runs are written, memory is read out and its digest taken, in scan order.
+# The emulator with an addressing fault: ops write voxel (x, y, z) to another place in memory, while
+# runs, read-back and digest use scan order.
 FAULTY = """
 import sys
 from array import array

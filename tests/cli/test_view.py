@@ -1,4 +1,4 @@
-"""``voxdisplay view`` for a browser: what it says, and what it refuses."""
+"""``voxdisplay view`` for a browser: output, notes and refused arguments."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_display_that_cannot_be_read_cannot_be_watched(run):
     assert "cannot read its memory back" in done.stderr
 
 
-def test_colours_that_cannot_be_known_are_told_of_once(capsys):
+def test_colours_that_cannot_be_known_are_noted_once(capsys):
     port = "sim:?size=3x5x7&format=index8"
     with vd.open(port) as display:
         watched = _ReadbackDisplay(display)

@@ -1,10 +1,11 @@
-"""What the README shows works as it stands there."""
+"""Commands, code, scene and links of the README, run as they stand there."""
 
 import doctest
 import re
 from pathlib import Path
 
 import voxdisplay as vd
+from voxdisplay.cli.command_table import ENTRIES
 
 TEXT = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
@@ -22,12 +23,16 @@ def test_its_scene_is_the_example():
 
 
 def test_its_commands(run):
-    commands = re.findall(r"^voxdisplay ((?:voxelize|push|info|ports)\b.*)$", TEXT, re.MULTILINE)
-    assert len(commands) >= 5
-    for command in commands:
-        help_text = run(command.split()[0], "--help").stdout
-        for option in re.findall(r"(--?[a-z-]+)(?= |$)", command):
-            assert option in help_text, command
+    """Every command line in a code block or between backticks, down to the options."""
+    commands = re.findall(r"(?:^|`)voxdisplay ([a-z-]+)([^`\n]*)", TEXT, re.MULTILINE)
+    names = {name for name, _ in commands}
+    assert names >= {"push", "info", "ports", "voxelize", "annotate", "conformance"}
+    assert names <= set(ENTRIES)
+    for name in names:
+        help_text = run(name, "--help").stdout
+        for _, rest in (command for command in commands if command[0] == name):
+            for option in re.findall(r" (--?[a-z-]+)(?= |$)", rest):
+                assert f"{option} " in help_text.replace(",", " "), (name, rest)
 
 
 def test_its_links():

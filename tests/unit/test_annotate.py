@@ -58,13 +58,13 @@ def explained(tmp_path, lines, *options):
 
 
 def test_every_packet_and_op_is_explained(tmp_path, captured):
-    said = explained(tmp_path, captured)
-    assert said.returncode == 0, said.stdout + said.stderr
+    printed = explained(tmp_path, captured)
+    assert printed.returncode == 0, printed.stdout + printed.stderr
     for word in ("HELLO", "INFO", "DATA CLEAR|COMMIT", "ACK", "SHOWN", "READ", "PAGE", "3x5x7"):
-        assert word in said.stdout
-    assert "is on display: 7 voxels lit" in said.stdout
-    assert "the pixels are those of the frame on display" in said.stdout
-    assert "nothing violates protocol.md" in said.stdout
+        assert word in printed.stdout
+    assert "is on display: 7 voxels lit" in printed.stdout
+    assert "the pixels are those of the frame on display" in printed.stdout
+    assert "nothing violates protocol.md" in printed.stdout
 
 
 def test_for_scripts(tmp_path, captured):
@@ -90,10 +90,10 @@ def test_a_bad_line_breaks_nothing(tmp_path):
     ]
     command += ["--port", "sim:?fault=flip:1e-3&seed=2&max_payload=200"]
     subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
-    said = annotate(file)
-    assert said.returncode == 0, said.stdout
-    assert "retransmitted" in said.stdout
-    assert "damaged segment" in said.stdout
+    printed = annotate(file)
+    assert printed.returncode == 0, printed.stdout
+    assert "retransmitted" in printed.stdout
+    assert "damaged segment" in printed.stdout
 
 
 def set_byte(at, value):
@@ -118,15 +118,17 @@ def flip(at):
     ],
 )
 def test_a_violation_names_its_section(tmp_path, captured, kind, change, section, text):
-    said = explained(tmp_path, tampered(captured, kind, change), "--violations")
-    assert said.returncode == 1, said.stdout
-    assert f"section {section}:" in said.stdout
-    assert text in said.stdout
+    printed = explained(tmp_path, tampered(captured, kind, change), "--violations")
+    assert printed.returncode == 1, printed.stdout
+    assert f"section {section}:" in printed.stdout
+    assert text in printed.stdout
 
 
 def test_a_digest_is_computed_again(tmp_path, captured):
-    said = explained(tmp_path, tampered(only_shown(captured), 8, flip(DIGEST_AT)), "--violations")
-    assert "section 8: the digest is" in said.stdout
+    printed = explained(
+        tmp_path, tampered(only_shown(captured), 8, flip(DIGEST_AT)), "--violations"
+    )
+    assert "section 8: the digest is" in printed.stdout
 
 
 def only_shown(lines):
@@ -151,8 +153,8 @@ def test_credit_is_counted(tmp_path, captured):
     def small(body):
         body[20:24] = (70).to_bytes(4, "little")
 
-    said = explained(tmp_path, tampered(captured, 9, small), "--violations")
-    assert "section 9.2: credit is exceeded" in said.stdout
+    printed = explained(tmp_path, tampered(captured, 9, small), "--violations")
+    assert "section 9.2: credit is exceeded" in printed.stdout
 
 
 @pytest.mark.parametrize(
@@ -172,26 +174,26 @@ def test_credit_is_counted(tmp_path, captured):
 def test_what_is_no_capture(tmp_path, text):
     file = tmp_path / "no.jsonl"
     file.write_text(text, encoding="latin-1")
-    said = annotate(file)
-    assert said.returncode == 2
-    assert "no.jsonl" in said.stderr
-    assert "fault of this program" not in said.stderr
-    assert "Traceback" not in said.stderr
+    printed = annotate(file)
+    assert printed.returncode == 2
+    assert "no.jsonl" in printed.stderr
+    assert "fault of this program" not in printed.stderr
+    assert "Traceback" not in printed.stderr
 
 
 def test_a_file_that_is_not_there(tmp_path):
     for path in (tmp_path / "none.jsonl", tmp_path):
-        said = annotate(path)
-        assert said.returncode == 2
-        assert str(path) in said.stderr
+        printed = annotate(path)
+        assert printed.returncode == 2
+        assert str(path) in printed.stderr
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no /dev/zero")
 def test_a_line_without_an_end_is_refused():
     """More than the longest line is not read: memory would be filled by it."""
-    said = annotate("/dev/zero")
-    assert said.returncode == 2
-    assert "/dev/zero, line 1" in said.stderr
+    printed = annotate("/dev/zero")
+    assert printed.returncode == 2
+    assert "/dev/zero, line 1" in printed.stderr
 
 
 def test_text_of_a_device_does_not_steer_the_terminal(tmp_path, captured):
@@ -201,6 +203,6 @@ def test_text_of_a_device_does_not_steer_the_terminal(tmp_path, captured):
         at = bytes(body).index(b"voxdisplay emulator")
         body[at : at + 4] = b"\x1b[2J"
 
-    said = explained(tmp_path, tampered(captured, 9, named))
-    assert "\x1b" not in said.stdout
-    assert "[2Jisplay emulator" in said.stdout
+    printed = explained(tmp_path, tampered(captured, 9, named))
+    assert "\x1b" not in printed.stdout
+    assert "[2Jisplay emulator" in printed.stdout

@@ -111,9 +111,7 @@ def plural(count: int, noun: str) -> str:
 
 
 @contextlib.contextmanager
-def progress_bar(
-    label: str, *, hidden: bool = False
-) -> Iterator[Callable[[int, int], None] | None]:
+def progress_bar(label: str) -> Iterator[Callable[[int, int], None] | None]:
     """Show a bar on a terminal, once there is more than one step to wait for.
 
     Yields
@@ -123,14 +121,19 @@ def progress_bar(
 
     """
     stream = sys.stderr
-    if hidden or is_quiet() or not stream.isatty():
+    if is_quiet() or not stream.isatty():
         yield None
         return
-    with click.progressbar(length=1, label=label, file=stream) as bar:
-        bar.hidden = True
+    with contextlib.ExitStack() as stack:
+        bar: Any = None
 
         def update(done: int, total: int) -> None:
-            bar.length, bar.hidden = total, total <= 1
-            bar.update(done - bar.pos)
+            nonlocal bar
+            if bar is None and total > 1:
+                shown = click.progressbar(length=total, label=label, file=stream)
+                bar = stack.enter_context(shown)
+            if bar is not None:
+                bar.length = total
+                bar.update(done - bar.pos)
 
         yield update
