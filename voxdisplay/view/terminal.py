@@ -165,26 +165,31 @@ def _write(text: str) -> None:
 def _cbreak_keyboard() -> Iterator[int]:
     """Yield the descriptor of a keyboard in cbreak mode, without echo; restore it."""
     try:
-        import termios  # noqa: PLC0415 - not everywhere
+        import termios  # noqa: PLC0415 - not on every system
         import tty  # noqa: PLC0415
     except ModuleNotFoundError:
         raise ValueError("this system has no Unix terminal") from None
-    ours = not sys.stdin.isatty()  # the scene may come from stdin
+    opened_here = not sys.stdin.isatty()  # the scene may come from stdin
     try:
-        keyboard = os.open("/dev/tty", os.O_RDONLY) if ours else sys.stdin.fileno()
+        keyboard = os.open("/dev/tty", os.O_RDONLY) if opened_here else sys.stdin.fileno()
     except OSError as error:
         raise ValueError(f"there is no keyboard: {error.strerror}") from error
-    before = termios.tcgetattr(keyboard)
+    before = None
     try:
-        tty.setcbreak(keyboard)
-        mode = termios.tcgetattr(keyboard)
-        mode[6][termios.VSUSP] = b"\0"  # Ctrl-Z would leave the screen as it is
-        termios.tcsetattr(keyboard, termios.TCSADRAIN, mode)
+        try:
+            before = termios.tcgetattr(keyboard)
+            tty.setcbreak(keyboard)
+            mode = termios.tcgetattr(keyboard)
+            mode[6][termios.VSUSP] = b"\0"  # Ctrl-Z would leave the screen as it is
+            termios.tcsetattr(keyboard, termios.TCSADRAIN, mode)
+        except termios.error as error:  # not an OSError
+            raise ValueError(f"the keyboard cannot be read key by key: {error.args[-1]}") from error
         yield keyboard
     finally:
-        with contextlib.suppress(termios.error):  # when the terminal is gone
-            termios.tcsetattr(keyboard, termios.TCSAFLUSH, before)
-        if ours:
+        if before is not None:
+            with contextlib.suppress(termios.error):  # when the terminal is gone
+                termios.tcsetattr(keyboard, termios.TCSAFLUSH, before)
+        if opened_here:
             os.close(keyboard)
 
 
