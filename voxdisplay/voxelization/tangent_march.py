@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from voxdisplay.argument_checks import choice, number
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.singular_points import complete
 from voxdisplay.errors import CurveError
+from voxdisplay.voxelization.adaptive_sampling import check_lengths
 from voxdisplay.voxelization.curve_batch import CurveBatch
 from voxdisplay.voxelization.sequence import Sequence
 
@@ -75,6 +77,7 @@ def march(
 ) -> Sequence:
     """Voxelise a curve by the tangent march. Parameters are those of `follow`."""
     begin = perf_counter()
+    curve = complete(curve)
     trail = follow(curve, variant, tangent=tangent, pitch=pitch, reach=reach, guess=guess)
     return Sequence(
         voxels=trail.voxels,
@@ -133,6 +136,7 @@ def follow(
 
     """
     pitch, reach = search_steps(variant, pitch, reach)
+    curve = complete(curve)
     walk = _MarchingCurve(curve, variant, tangent, (pitch, reach), guess)
     first, last = curve.t_range
     ends = np.floor(walk.position(np.array([first, last])))
@@ -193,6 +197,7 @@ class _MarchingCurve:
         guess: ParameterEstimate | None,
     ) -> None:
         self._batch = CurveBatch([curve])
+        check_lengths(self._batch)
         self._curve = curve
         self._parabola = variant == 3
         has_derivative = curve.derivative(np.array(curve.t_range[:1])) is not None

@@ -1,0 +1,118 @@
+"""Callables that work in place, or return other values for the same t."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import voxdisplay as vd
+from voxdisplay.curves import Curve
+from voxdisplay.errors import CurveError
+from voxdisplay.voxelization import measure
+
+
+def circle(t: np.ndarray) -> np.ndarray:
+    return np.stack((20 + 10 * np.cos(t), 20 + 10 * np.sin(t), 20 + 0 * t))
+
+
+def in_place(t: np.ndarray, change: str) -> np.ndarray:
+    if change == "shift":
+        t -= 1.0
+    elif change == "wrap":
+        t %= 2 * np.pi
+    elif change == "scale":
+        np.multiply(t, 2, out=t)
+    elif change == "sort":
+        t.sort()
+        t.fill(3.0)
+    return circle(t)
+
+
+@pytest.mark.parametrize("change", ["shift", "wrap", "scale", "sort"])
+def test_a_callable_that_works_in_place_changes_nothing_but_its_own(change: str) -> None:
+    t_range = (0, 6 * np.pi)
+    own = vd.Parametric(
+        lambda t: in_place(t, change), t=t_range, derivative=lambda t: in_place(t, change)
+    )
+    clean = vd.Parametric(
+        lambda t: in_place(t.copy(), change),
+        t=t_range,
+        derivative=lambda t: in_place(t.copy(), change),
+    )
+    t = np.linspace(0, 9, 7)
+    own.position(t)
+    own.derivative(t)
+    assert np.array_equal(t, np.linspace(0, 9, 7))
+    one, other = vd.voxelize(own), vd.voxelize(clean)
+    assert np.array_equal(one.voxels, other.voxels)
+    assert np.array_equal(one.t, other.t)
+    assert one.report.e_max == other.report.e_max
+    for tangent in ("analytic", "difference"):
+        one, other = (vd.voxelize(each, method="march", tangent=tangent) for each in (own, clean))
+        assert np.array_equal(one.voxels, other.voxels)
+
+
+def test_a_curve_of_ones_own_that_works_in_place() -> None:
+    class Own(Curve):
+        t_range = (0.0, 6 * np.pi)
+
+        def position(self, t: np.ndarray) -> np.ndarray:
+            t %= 2 * np.pi
+            return circle(t)
+
+    sequence = vd.voxelize(Own())
+    clean = vd.Parametric(lambda t: circle(t % (2 * np.pi)), t=Own.t_range)
+    assert np.array_equal(sequence.voxels, vd.voxelize(clean).voxels)
+    assert sequence.report.e_max < 0.8661
+
+
+@pytest.mark.parametrize("amplitude", [0.01, 1e-4, 5.0])
+def test_noise_is_named(amplitude: float) -> None:
+    random = np.random.default_rng(3)
+
+    def noisy(t: np.ndarray) -> np.ndarray:
+        return circle(t) + amplitude * random.normal(size=(3, t.size))
+
+    curve = vd.Parametric(noisy, t=(0, 6))
+    with pytest.raises(CurveError, match=r"other values for the same t: at t = .*, x = ") as caught:
+        vd.voxelize(curve)
+    assert caught.value.axis == "x"
+    assert "t alone" in str(caught.value.hint)
+    with pytest.raises(CurveError, match="other values for the same t"):
+        measure.distances(np.zeros((1, 3), dtype=int), curve)
+    with pytest.raises(CurveError, match=r"^curve 1: .*other values for the same t"):
+        vd.voxelize_many([vd.Circle((3, 3, 3), 2), curve])
+
+
+def test_a_counter_of_calls_is_named() -> None:
+    calls = itertools.count()
+    curve = vd.Parametric(lambda t: (t, t, 3.0 + next(calls)), t=(0, 6))
+    with pytest.raises(CurveError, match=r"other values for the same t: .* z = "):
+        vd.voxelize(curve)
+
+
+@pytest.mark.parametrize("amplitude", [0.02, 0.3, 3.0])
+def test_measuring_does_no_more_work_than_is_drawn(amplitude: float) -> None:
+    asked = []
+
+    def rough(t: np.ndarray) -> np.ndarray:
+        asked.append(t.size)
+        return circle(t) + amplitude * np.sin(1e12 * t)
+
+    voxels = vd.voxelize(vd.Circle((20, 20, 20), 10)).voxels
+    curve = vd.Parametric(rough, t=(0, 2 * np.pi))
+    try:
+        apart = measure.distances(voxels, curve)
+    except ValueError as error:
+        assert "too rough" in str(error)  # noqa: PT017 - either is right
+    else:
+        assert apart.max() < 2 + 2 * amplitude
+    assert sum(asked) < 40_000 * len(voxels)
+
+
+def test_rounding_is_no_noise() -> None:
+    flip = itertools.cycle((1.0, 1.0 + 1e-12))
+    curve = vd.Parametric(lambda t: circle(t) * next(flip), t=(0, 2 * np.pi))
+    assert len(vd.voxelize(curve)) == len(vd.voxelize(vd.Parametric(circle, t=(0, 2 * np.pi))))
