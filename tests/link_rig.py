@@ -1,4 +1,4 @@
-"""A link and an emulated device with a line between them that delays, damages and loses.
+"""Simulation of a link and an emulated device over a line with delay, damage and loss.
 
 The clock is a number, and every fault comes from a seed.
 """

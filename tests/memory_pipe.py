@@ -1,4 +1,4 @@
-"""A display over a pipe in memory, with an emulated device at its end. The clock is the pipe's."""
+"""Display over an in-memory pipe to an emulated device, with a virtual clock."""
 
 import numpy as np
 

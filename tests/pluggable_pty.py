@@ -1,12 +1,16 @@
-"""An emulated device on a pty that can be pulled out and plugged in again, at a path that stays."""
+"""Emulated device on a pty that can be unplugged and plugged in again, at a path that stays."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import subprocess
+import sys
 import threading
 import tty
 from pathlib import Path
+
+import numpy as np
 
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
@@ -15,19 +19,21 @@ from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.serve import serve_wire
 
 WAIT_S = 20
+ROOT = Path(__file__).parents[1]
+SCENE = "examples/trefoil.json"
 
 
 class Plug:
-    """A cable. ``path`` is where the device is found while it is plugged in."""
+    """Cable to an emulated device, which is found at ``path`` while it is plugged in."""
 
     def __init__(self, path):
         self.path = path
         self._thread = None
         self.device = None
-        self.held = []  # what was not taken
+        self.held = []  # bytes that the device did not take
 
     def plug(self, device=None, **config):
-        """Plug a device in: the one from before, another, or a new one."""
+        """Plug in the same device again, the given one, or a new one."""
         config = {"grid": (17, 9, 5), "pixel_format": "index8", "refresh": 0, **config}
         self.device = device or self.device or Device(Config(**config))
         self.device.disconnect()
@@ -43,14 +49,14 @@ class Plug:
         return self
 
     def _run(self):
-        """Serve until it is pulled out; the pump itself lets go, so that nobody else's file is."""
+        """Serve until it is unplugged. Closing descriptors here, none that is reused is closed."""
         serve_wire(DeviceOnLine(self.device), self._master, self._stop)
         for descriptor in (self._master, self._slave):
             os.close(descriptor)
         os.close(self._stop)
 
     def unplug(self):
-        """Pull it out, now; once more does no harm."""
+        """Unplug the device. Twice is fine."""
         if self._thread is None:
             return
         with contextlib.suppress(FileNotFoundError):
@@ -62,17 +68,20 @@ class Plug:
         self._thread = None
 
     def hold(self):
-        """Once a session is open, have the device take nothing more, and answer nothing."""
+        """Have the device ignore all that comes once a session is open."""
         device = self.device
         take, held = device.receive, self.held
         device.receive = lambda data: held.append(data) if device.session else take(data)
 
     def release(self):
-        """Have it go on; what came meanwhile is lost."""
+        """Have it go on; what came in between is lost."""
         del self.device.receive
 
     def snapshot(self):
         return Bench(self.device).snapshot()
+
+    def shows(self, frame):
+        return self.snapshot().pixels == frame.array().tobytes()
 
     def __enter__(self):
         return self
@@ -82,5 +91,19 @@ class Plug:
 
 
 def open_descriptors():
-    """What this process has open: to be the same afterwards."""
+    """Return the descriptors of this process, to compare with those afterwards."""
     return sorted(path.name for path in Path("/proc/self/fd").iterdir())
+
+
+def noise_frame(display, seed=0):
+    frame = display.frame()
+    array = frame.array()
+    frame.set(np.random.default_rng(seed).integers(0, 256, array.shape).astype(array.dtype))
+    return frame
+
+
+def start_push(port, *arguments, **options):
+    """Start ``voxdisplay push`` as a process of its own."""
+    command = [sys.executable, "-m", "voxdisplay", "push", SCENE, "--port", str(port), *arguments]
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, **options}
+    return subprocess.Popen(command, text=True, **options)

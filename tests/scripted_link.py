@@ -1,4 +1,4 @@
-"""A link, and answers that its device might give, written by hand."""
+"""Link whose device is scripted: answers are written by hand."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Rates of lines that have one: over RFC 2217, which shows them to the device."""
+"""Baud rates, and their detection, over RFC 2217, where the device sees the rate."""
 
 import contextlib
 import os

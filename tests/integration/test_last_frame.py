@@ -11,22 +11,9 @@ import pytest
 from carriers import eventually
 from conftest import DEADLINE_S, ROOT
 from memory_pipe import assert_shows, open_display, random_frame
-from pluggable_pty import Plug
+from pluggable_pty import noise_frame
 
 import voxdisplay as vd
-
-
-@pytest.fixture
-def plug(tmp_path):
-    with Plug(tmp_path / "port") as plug:
-        yield plug
-
-
-def frame_of(display, seed):
-    frame = display.frame()
-    array = frame.array()
-    frame.set(np.random.default_rng(seed).integers(0, 256, array.shape).astype(array.dtype))
-    return frame
 
 
 @pytest.mark.parametrize("count", [1, 2, 20])
@@ -35,7 +22,7 @@ def test_the_last_of_some_frames_is_shown_when_the_block_ends(emulator, tmp_path
     port = emulator("--pty", "--size", "17x9x5", "--format", "index8", "--dump", dump).port
     with vd.open(port) as display:
         for seed in range(count):
-            frame = frame_of(display, seed)
+            frame = noise_frame(display, seed)
             display.present(frame, wait=False)
     eventually(dump.exists, "a frame")
     eventually(lambda: np.array_equal(np.load(dump), frame.array()), "the last frame")
@@ -89,7 +76,7 @@ def test_a_frame_that_cannot_be_shown_is_a_note_and_the_port_is_free(plug):
     notes = []
     display = vd.open(str(plug.plug().path), note=notes.append)
     plug.hold()
-    display.present(frame_of(display, 1), wait=False)
+    display.present(noise_frame(display, 1), wait=False)
     plug.unplug()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -101,9 +88,9 @@ def test_a_frame_that_cannot_be_shown_is_a_note_and_the_port_is_free(plug):
 
 def test_the_last_frame_of_a_device_that_comes_back(plug):
     with vd.open(str(plug.plug().path), reconnect_s=20) as display:
-        display.present(frame_of(display, 1))
+        display.present(noise_frame(display, 1))
         plug.unplug()
-        frame = frame_of(display, 2)
+        frame = noise_frame(display, 2)
         plug.device.power_cycle()
         plug.plug()
         display.present(frame, wait=False)

@@ -9,17 +9,10 @@ import tty
 
 import pytest
 from conftest import DEADLINE_S, ROOT
-from pluggable_pty import Plug
 
 import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-
-
-@pytest.fixture
-def plug(tmp_path):
-    with Plug(tmp_path / "port") as plug:
-        yield plug
 
 
 class NoteThen(list):

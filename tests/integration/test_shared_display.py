@@ -9,29 +9,15 @@ import subprocess
 import sys
 import threading
 
-import numpy as np
 import pytest
 from carriers import eventually
 from conftest import DEADLINE_S, ROOT
-from pluggable_pty import Plug
+from pluggable_pty import noise_frame
 
 import voxdisplay as vd
 from voxdisplay.transport import open_transport
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="threads and forks of POSIX")
-
-
-@pytest.fixture
-def plug(tmp_path):
-    with Plug(tmp_path / "port") as plug:
-        yield plug
-
-
-def frame_of(display, seed):
-    frame = display.frame()
-    array = frame.array()
-    frame.set(np.random.default_rng(seed).integers(0, 256, array.shape).astype(array.dtype))
-    return frame
 
 
 def run_threads(*targets):
@@ -64,7 +50,7 @@ def test_threads_that_present_read_ask_and_poll_take_turns(port, plug):
 
         def present():
             for seed in range(25):
-                frame = frame_of(display, seed)
+                frame = noise_frame(display, seed)
                 assert display.present(frame).digest == frame.digest()
 
         def read():
@@ -78,11 +64,11 @@ def test_threads_that_present_read_ask_and_poll_take_turns(port, plug):
 
         def hand_over():
             for seed in range(25):
-                display.present(frame_of(display, seed), wait=False)
+                display.present(noise_frame(display, seed), wait=False)
                 display.frame(keep=True)
 
         run_threads(present, present, read, ask, hand_over)
-        frame = frame_of(display, 99)
+        frame = noise_frame(display, 99)
         display.present(frame)
         display.verify(frame)
 
@@ -93,7 +79,7 @@ def test_closing_without_flush_ends_the_call_of_another_thread(plug):
 
     def present():
         with pytest.raises(vd.LocalProtocolError, match="closed by another thread"):
-            display.present(frame_of(display, 1))
+            display.present(noise_frame(display, 1))
 
     def close():
         eventually(lambda: plug.held, "a frame on its way")
@@ -110,7 +96,7 @@ def test_closing_waits_for_the_call_of_another_thread(plug):
     receipts = []
 
     def present():
-        receipts.append(display.present(frame_of(display, 1)))
+        receipts.append(display.present(noise_frame(display, 1)))
 
     def close():
         eventually(lambda: plug.held, "a frame on its way")
@@ -210,7 +196,7 @@ def use_all(display):
 
 def test_a_forked_process_is_refused_and_disturbs_nobody(plug):
     with vd.open(str(plug.plug().path)) as display:
-        frame = frame_of(display, 1)
+        frame = noise_frame(display, 1)
         display.present(frame)
         held = threading.Event()
         release = threading.Event()
@@ -235,7 +221,7 @@ def test_a_forked_process_is_refused_and_disturbs_nobody(plug):
 
 def test_a_forked_process_that_closes_leaves_the_display_to_the_other(plug):
     with vd.open(str(plug.plug().path)) as display:
-        display.present(frame_of(display, 1), wait=False)
+        display.present(noise_frame(display, 1), wait=False)
 
         def close():
             display.close()
@@ -244,7 +230,7 @@ def test_a_forked_process_that_closes_leaves_the_display_to_the_other(plug):
         pid, text = in_child(close)
         try:
             assert text == "done"
-            frame = frame_of(display, 2)
+            frame = noise_frame(display, 2)
             assert display.present(frame).digest == frame.digest()
         finally:
             end(pid)
@@ -304,6 +290,6 @@ def test_a_close_in_a_forked_process_does_not_give_the_port_away(plug):
 
 def test_a_display_that_is_closed_twice_from_many_threads(plug):
     display = vd.open(str(plug.plug().path))
-    display.present(frame_of(display, 1), wait=False)
+    display.present(noise_frame(display, 1), wait=False)
     run_threads(*[display.close] * 5)
     vd.open(str(plug.path)).close()

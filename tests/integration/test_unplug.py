@@ -1,21 +1,16 @@
-"""Pulled out at any moment, and plugged in again; told to end at any moment."""
+"""Devices that are unplugged at any moment, and plugged in again."""
 
 import json
-import os
-import pty
 import random
 import re
-import signal
-import subprocess
-import sys
 import threading
 import time
 
 import numpy as np
 import pytest
 from carriers import eventually
-from conftest import DEADLINE_S, ROOT
-from pluggable_pty import Plug, open_descriptors
+from conftest import DEADLINE_S
+from pluggable_pty import noise_frame, open_descriptors, start_push
 
 import voxdisplay as vd
 from firmware_sim.config import Config
@@ -24,25 +19,6 @@ from voxdisplay.cli import main
 from voxdisplay.transport import serial
 
 SCENE = "examples/trefoil.json"
-
-
-@pytest.fixture
-def plug(tmp_path):
-    threads = threading.active_count()
-    with Plug(tmp_path / "port") as plug:
-        yield plug
-    eventually(lambda: threading.active_count() == threads, "the end of all threads")
-
-
-def noise(display, seed=0):
-    frame = display.frame()
-    array = frame.array()
-    frame.set(np.random.default_rng(seed).integers(0, 256, array.shape).astype(array.dtype))
-    return frame
-
-
-def shows(plug, frame):
-    return plug.snapshot().pixels == frame.array().tobytes()
 
 
 # -- pulled out
@@ -119,7 +95,7 @@ def test_pulled_out_a_thousand_times(plug, capsys):
 # -- and back again
 
 
-def told(notes, word):
+def any_has(notes, word):
     return any(word in text for text in notes)
 
 
@@ -127,27 +103,27 @@ def test_a_device_that_comes_back_goes_on(plug):
     notes = []
     plug.plug(serial="A1")
     with vd.open(str(plug.path), reconnect_s=20, note=notes.append) as display:
-        display.present(noise(display, 1))
+        display.present(noise_frame(display, 1))
         plug.unplug()
         threading.Timer(0.1, plug.plug).start()
-        frame = noise(display, 2)
+        frame = noise_frame(display, 2)
         assert display.present(frame).digest == frame.digest()
-        assert shows(plug, frame)
+        assert plug.shows(frame)
         display.verify(frame)
-    assert told(notes, "is gone")
-    assert told(notes, "is back after")
+    assert any_has(notes, "is gone")
+    assert any_has(notes, "is back after")
 
 
 def test_a_device_that_lost_its_memory_gets_its_picture_before_it_is_read(plug):
     plug.plug(serial="A1")
     with vd.open(str(plug.path), reconnect_s=20) as display:
-        frame = noise(display)
+        frame = noise_frame(display)
         display.present(frame)
         plug.unplug()
         plug.device.power_cycle()
         plug.plug()
         display.verify(frame)
-        assert shows(plug, frame)
+        assert plug.shows(frame)
         assert display.present(frame).frame == 2, "what was shown again is no other frame"
 
 
@@ -155,14 +131,14 @@ def test_frames_that_nobody_waits_for_go_on_as_well(plug):
     plug.plug()
     with vd.open(str(plug.path), reconnect_s=20) as display:
         for seed in range(6):
-            frame = noise(display, seed)
+            frame = noise_frame(display, seed)
             display.present(frame, wait=False)
             if seed == 3:
                 plug.unplug()
                 plug.device.power_cycle()
                 plug.plug()
         display.flush()
-        assert shows(plug, frame)
+        assert plug.shows(frame)
 
 
 def test_another_device_is_not_taken_for_it(plug):
@@ -181,10 +157,10 @@ def test_another_device_is_not_taken_for_it(plug):
 
         changer = threading.Thread(target=change)
         changer.start()
-        frame = noise(display)
+        frame = noise_frame(display)
         display.present(frame)
         changer.join()
-        assert shows(plug, frame)
+        assert plug.shows(frame)
     assert other.swaps == 0, "nothing was drawn on it"
 
 
@@ -213,23 +189,17 @@ def test_a_device_that_falls_silent_and_speaks_again(plug):
         plug.device.receive = lambda _data: None
         waker = threading.Timer(0.6, lambda: plug.device.__dict__.pop("receive"))
         waker.start()
-        frame = noise(display)
+        frame = noise_frame(display)
         display.present(frame)
-        assert shows(plug, frame)
+        assert plug.shows(frame)
         waker.join()
-    assert told(notes, "silent")
-
-
-def start(port, *arguments, **pipes):
-    command = [sys.executable, "-m", "voxdisplay", "push", SCENE, "--port", str(port), *arguments]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, **pipes}
-    return subprocess.Popen(command, text=True, **pipes)
+    assert any_has(notes, "silent")
 
 
 def test_the_command_waits_for_the_same_device(plug):
     """In mid-push; it comes back as it is after a start, dark."""
     plug.plug(serial="A1").hold()
-    with start(plug.path, "--reconnect", "30", "--json") as push:
+    with start_push(plug.path, "--reconnect", "30", "--json") as push:
         eventually(lambda: plug.held, "a frame on its way")
         plug.unplug()
         assert any("is gone" in line for line in iter(push.stderr.readline, ""))
@@ -241,85 +211,3 @@ def test_the_command_waits_for_the_same_device(plug):
     assert "is back after" in said
     lit = np.count_nonzero(np.frombuffer(plug.snapshot().pixels, np.uint8))
     assert json.loads(out)["voxels"] == lit > 0
-
-
-# -- told to end
-
-ENDS = {"SIGINT": 130, "SIGTERM": 143, "SIGHUP": 129}
-
-
-@pytest.mark.parametrize("on_exit", ["keep", "blank"])
-@pytest.mark.parametrize("name", ENDS)
-def test_told_to_end_in_mid_push(plug, name, on_exit):
-    plug.plug()
-    with vd.open(str(plug.path)) as display:
-        before = noise(display)
-        display.present(before)
-    plug.device.disconnect()
-    plug.hold()
-    with start(plug.path, "--on-exit", on_exit) as push:
-        eventually(lambda: plug.held, "a frame on its way")
-        plug.release()
-        push.send_signal(getattr(signal, name))
-        out, said = push.communicate(timeout=DEADLINE_S)
-    assert push.returncode == ENDS[name], said
-    assert "Traceback" not in said
-    assert out == ""
-    if on_exit == "blank":
-        assert "the display is dark" in said
-        assert not any(plug.snapshot().pixels)
-    else:
-        assert "keeps its last whole picture" in said
-        assert shows(plug, before)
-    vd.open(str(plug.path)).close()  # the port is free
-
-
-def test_a_display_that_cannot_be_made_dark(plug):
-    plug.plug().hold()
-    with start(plug.path, "--on-exit", "blank") as push:
-        eventually(lambda: plug.held, "a frame on its way")
-        push.send_signal(signal.SIGTERM)
-        _, said = push.communicate(timeout=DEADLINE_S)
-    plug.release()
-    assert push.returncode == 143
-    assert "could not be made dark" in said
-
-
-def test_interrupted_while_it_is_being_imported():
-    """Nothing is open yet; there is a word and the exit code, and no traceback."""
-    command = [sys.executable, "-X", "importtime", "-m", "voxdisplay", "push", SCENE]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as push:
-        assert any("numpy" in line for line in iter(push.stderr.readline, ""))
-        push.send_signal(signal.SIGINT)
-        _, said = push.communicate(timeout=DEADLINE_S)
-    assert push.returncode == 130
-    assert "Traceback" not in said
-    assert said.endswith("interrupted\n")
-
-
-def test_under_nohup_a_closed_terminal_changes_nothing(plug):
-    plug.plug().hold()
-    ignore = lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)  # noqa: E731
-    with start(plug.path, preexec_fn=ignore) as push:
-        eventually(lambda: plug.held, "a frame on its way")
-        push.send_signal(signal.SIGHUP)
-        plug.release()
-        _, said = push.communicate(timeout=DEADLINE_S)
-    assert push.returncode == 0, said
-
-
-def test_a_terminal_that_is_closed(plug):
-    """The real thing: with the terminal goes everything that could be said there."""
-    plug.plug().hold()
-    arguments = ["-m", "voxdisplay", "push", SCENE, "--port", str(plug.path), "--on-exit", "blank"]
-    pid, terminal = pty.fork()
-    if pid == 0:
-        os.chdir(ROOT)
-        os.execv(sys.executable, [sys.executable, *arguments])  # noqa: S606
-    eventually(lambda: plug.held, "a frame on its way")
-    plug.release()
-    os.close(terminal)
-    _, status = os.waitpid(pid, 0)
-    assert os.waitstatus_to_exitcode(status) == 129
-    assert not any(plug.snapshot().pixels)
-    vd.open(str(plug.path)).close()  # the port is free

@@ -1,4 +1,4 @@
-"""A link and an emulated device over a bad line: what is shown is whole, and in the end right."""
+"""Link and emulated device over a lossy line: whole frames only, and in the end the last."""
 
 import random
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Pushes over a line with every fault there is: the front page is whole, and the host knows which.
+"""Pushes over a line with all kinds of faults: only whole frames, and the host knows which.
 
 The display and the emulator are the real ones; their clock is a number, so that hours of stalls
 pass at once.
@@ -90,13 +90,13 @@ def random_frame(rng, display):
     return frame
 
 
-class Truth:
-    """What may be on display, and what the host was told of it."""
+class Oracle:
+    """Pages that may be displayed, and what the host was told of them."""
 
     def __init__(self, line):
         self.line = line
         self.pages = {self.front}
-        self.told = {"shown": 0, "failed": 0}
+        self.counts = {"shown": 0, "failed": 0}
 
     @property
     def front(self):
@@ -108,13 +108,13 @@ class Truth:
         try:
             receipt = display.present(frame)
         except vd.VoxDisplayError:
-            self.told["failed"] += 1
+            self.counts["failed"] += 1
             assert self.front in self.pages, "a page that nobody presented"
             raise
-        self.told["shown"] += 1
+        self.counts["shown"] += 1
         assert receipt.digest == frame.digest()
         if display.info.boot == self.line.wire.device.boot:
-            assert self.front == meant, "told shown, but something else is"
+            assert self.front == meant, "reported as shown, but something else is"
         else:  # shown, and then switched off
             assert not any(self.front)
 
@@ -131,8 +131,8 @@ def session(seed, pushes):
     }
     faults = faults_of(rng)
     line = Line(Device(Config(**config)), faults, seed)
-    truth = Truth(line)
-    truth.pages.add(bytes(len(truth.front)))  # dark: after a start
+    oracle = Oracle(line)
+    oracle.pages.add(bytes(len(oracle.front)))  # dark: after a start
     display, left, opened = None, pushes, 0
     while left:
         try:
@@ -141,25 +141,25 @@ def session(seed, pushes):
                 assert opened < 40 * pushes, f"{faults}: nothing gets through"
                 display = vd.open(line, timeout_s=2.0, clock=line.monotonic)
             left -= 1
-            truth.push(display, random_frame(rng, display))
+            oracle.push(display, random_frame(rng, display))
         except vd.VoxDisplayError:
             line.close()
             display = None
-    return truth.told, faults
+    return oracle.counts, faults
 
 
 @pytest.mark.parametrize("seed", range(60))
 def test_whatever_happens_to_the_line(seed):
-    told, faults = session(seed, 5)
-    assert sum(told.values()) == 5, faults
+    counts, faults = session(seed, 5)
+    assert sum(counts.values()) == 5, faults
 
 
 @pytest.mark.slow
 def test_ten_thousand_pushes():
     shown = failed = 0
     for seed in range(1000, 3000):
-        told, _ = session(seed, 5)
-        shown, failed = shown + told["shown"], failed + told["failed"]
+        counts, _ = session(seed, 5)
+        shown, failed = shown + counts["shown"], failed + counts["failed"]
     assert shown + failed == 10_000
     assert shown > 8000
     assert failed > 100

@@ -1,7 +1,7 @@
-"""What a window believes, against a line and a device of which all is known (protocol.md, 9).
+"""Model-based test of `SendWindow`: what it infers against the true state of line and device.
 
-The device is as free as the document lets it be: which ACKs it leaves out, how its credit shrinks,
-when its tick comes. Packets have their true numbers here, which never come round.
+The device is as free as protocol.md, section 9, allows: which ACKs it omits, how its credit
+shrinks, when its tick comes. The model numbers packets without modulus.
 """
 
 import random
@@ -123,8 +123,8 @@ class Device:
         )
 
 
-class Truth:
-    """Host, line and device; all happens in turns of random length."""
+class Model:
+    """Host, line and device, which act in rounds of random length."""
 
     def __init__(self, seed):
         self.rng = rng = random.Random(seed)
@@ -149,8 +149,8 @@ class Truth:
         self._frame_of += [(self._frames, k + 1 == length) for k in range(length)]
         self._frames += 1
 
-    def enter(self):
-        """Enter a new packet, if window and credit have room for it."""
+    def send_new(self):
+        """Send a new packet, if window and credit allow it."""
         if not (self.window.has_room and self.window.has_credit(LONGEST)):
             return False
         number = len(self.times)
@@ -162,8 +162,8 @@ class Truth:
         self._send(seq)
         return True
 
-    def mend(self):
-        """Send again what is lost, if credit has room for it."""
+    def retransmit(self):
+        """Send a lost packet again, if there is credit for it."""
         seq = self.window.first_lost()
         if seq is None or not self.window.has_credit(len(self.window.outstanding[seq].wire)):
             return False
@@ -177,7 +177,7 @@ class Truth:
         frame, ends_frame = self._frame_of[number]
         self._put(size, packet=number, frame=frame, ends_frame=ends_frame)
 
-    def ask(self):
+    def poll(self):
         self.statuses += 1
         self._tag = (self._tag + 1) % 256
         self.window.send_tagged(self._tag, STATUS_BYTES)
@@ -192,8 +192,8 @@ class Truth:
 
     # -- the device, and back
 
-    def carry(self, count):
-        """Let the device have what comes next."""
+    def deliver(self, count):
+        """Deliver the next transmissions to the device."""
         come = [self.line.popleft() for _ in range(min(count, len(self.line)))]
         while come:
             sent, fate = come[0]
@@ -205,7 +205,7 @@ class Truth:
         self.device.flush()
         self.line.extendleft(reversed(come))
 
-    def hear(self, count):
+    def receive(self, count):
         for _ in range(min(count, len(self.device.answers))):
             answer = self.device.answers.popleft()
             if self.rng.random() >= self.faults:
@@ -214,7 +214,7 @@ class Truth:
                 self.check()
 
     def check(self):
-        """What the window believes is a fact."""
+        """Check that all that the window infers is true."""
         window, device = self.window, self.device
         assert window.taken <= device.taken
         on_the_line = {sent.ordinal for sent, _ in self.line}
@@ -227,16 +227,18 @@ class Truth:
 
     # -- turns
 
-    def turn(self):
-        """Some of all that may happen."""
-        for act in self.rng.choices([self.enter, self.mend], [2, 3], k=self.rng.randrange(12)):
+    def act(self):
+        """Do some of all that may happen."""
+        for act in self.rng.choices(
+            [self.send_new, self.retransmit], [2, 3], k=self.rng.randrange(12)
+        ):
             act()
         if self.rng.random() < 0.2 and self._asked < spec.LIMIT_MAX_STATUS:
-            self.ask()
-        self.carry(self.rng.randrange(12))
+            self.poll()
+        self.deliver(self.rng.randrange(12))
         if self.rng.random() < 0.6:
             self.device.tick()
-        self.hear(self.rng.randrange(8))
+        self.receive(self.rng.randrange(8))
 
     @property
     def _asked(self):
@@ -245,34 +247,34 @@ class Truth:
         return on_the_line + sum(a.flags & spec.ACK_FLAG_ASKED > 0 for a in self.device.answers)
 
     def finish(self):
-        """Let all arrive over a line without faults, in few turns; no new packet is sent."""
+        """Deliver all over a line without faults, in few rounds; no new packet is sent."""
         self.faults = 0
         for _ in range(200):
             if not (self.window.outstanding or self.line):
                 return
             before = len(self.sent)
-            while self.mend():
+            while self.retransmit():
                 pass
             if len(self.sent) == before and not self.line:
-                self.ask()
-            self.carry(100)
+                self.poll()
+            self.deliver(100)
             self.device.tick()
-            self.hear(100)
+            self.receive(100)
         raise AssertionError("it does not end")
 
 
-def play(seed, turns):
-    truth = Truth(seed)
-    for _ in range(turns):
-        truth.turn()
-    truth.finish()
-    assert truth.device.received == set(truth.times)
-    assert all(count == 1 + truth.device.failed[n] for n, count in truth.times.items())
-    return truth
+def run(seed, rounds):
+    model = Model(seed)
+    for _ in range(rounds):
+        model.act()
+    model.finish()
+    assert model.device.received == set(model.times)
+    assert all(count == 1 + model.device.failed[n] for n, count in model.times.items())
+    return model
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(seeds, st.sampled_from([3, 30, 300]))
-def test_what_the_host_believes_is_a_fact(seed, turns):
+def test_what_the_host_infers_is_true(seed, rounds):
     """9.3: "A host therefore never guesses"; and no packet is sent more often than it fails."""
-    play(seed, turns)
+    run(seed, rounds)

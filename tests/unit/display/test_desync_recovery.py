@@ -1,4 +1,4 @@
-"""A display that does not show what was meant, or refuses it."""
+"""Displays that show something else than was sent, or refuse it."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""A display as its user holds it: what it shows, says and reads, and how it ends."""
+"""`Display`: frames, reading back, progress, interrupts, restarts of the device."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Turns of threads that want one lock."""
+"""Fair re-entrant lock: order of the threads that wait for it."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Frames that keep what is on display, and go as their difference from it; palettes."""
+"""Frames that keep what is displayed and are sent as a difference; palettes."""
 
 import document
 import pytest

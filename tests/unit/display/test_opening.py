@@ -1,4 +1,4 @@
-"""What `vd.open` takes for a port, and how a display and a receipt print."""
+"""Arguments of `vd.open`, and the `repr` of displays and receipts."""
 
 import pathlib
 import re

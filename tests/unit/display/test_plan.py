@@ -1,4 +1,4 @@
-"""What a frame costs is what it then costs, and its ops are all that is in it."""
+"""Plans against the bytes that are sent in the end."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Test patterns, and what a page says of a display's axes."""
+"""Test patterns, and the check of axes on a page that was read back."""
 
 import itertools
 

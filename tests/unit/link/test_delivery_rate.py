@@ -1,4 +1,4 @@
-"""How much may be on its way, and how long packets should be."""
+"""Delivery rate, limit on bytes in flight, and payload length."""
 
 import pytest
 from link_rig import Rig, random_frame

@@ -1,4 +1,4 @@
-"""Frames on their way (protocol.md, 6, 9 and 12), with answers by hand."""
+"""Transmission of frames (protocol.md, 6, 9 and 12), against scripted answers."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Window, credit and loss (protocol.md, 9.1 to 9.3), one ACK at a time."""
+"""Send window, credit and loss (protocol.md, 9.1 to 9.3), one ACK at a time."""
 
 import pytest
 

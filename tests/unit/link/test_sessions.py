@@ -1,4 +1,4 @@
-"""Sessions, and what breaks the rules (protocol.md, 5, 11 and 13), with answers by hand."""
+"""Sessions and violations (protocol.md, 5, 11 and 13), against scripted answers."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""What a link asks, and how long it waits (protocol.md, 9.3 and 10), with answers by hand."""
+"""Polls, timeouts and reads (protocol.md, 9.3 and 10), against scripted answers."""
 
 import dataclasses
 
