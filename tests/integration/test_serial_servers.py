@@ -4,6 +4,7 @@ The driver needs the bytes and the rate of a line; it needs no modem lines and n
 """
 
 import contextlib
+import errno
 import os
 import shutil
 import signal
@@ -294,6 +295,37 @@ def test_nothing_that_listens():
         with pytest.raises(vd.OpenError) as refused:
             open_transport(f"{kind}://127.0.0.1:{number}")
         assert "running there?" in refused.value.hint
+
+
+@pytest.mark.parametrize("kind", ["rfc2217", "tcp", "socket", "socket?logging=error"])
+def test_a_host_that_there_is_not(kind):
+    scheme, _, options = kind.partition("?")
+    with pytest.raises(vd.OpenError) as refused:
+        open_transport(f"{scheme}://nowhere.invalid:5000" + (f"?{options}" if options else ""))
+    assert refused.value.hint == "is the name of the host right?"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (TimeoutError("timed out"), "firewall"),
+        (OSError(errno.EHOSTUNREACH, "No route to host"), "is the host on"),
+        (OSError(errno.ENETUNREACH, "Network is unreachable"), "is this machine in a network"),
+        (ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused"), "running there"),
+        (PermissionError(errno.EACCES, "Permission denied"), None),
+        (OSError(errno.EMFILE, "Too many open files"), None),
+    ],
+)
+@pytest.mark.parametrize("scheme", ["rfc2217", "tcp"])
+def test_connections_that_fail_otherwise(scheme, error, words, monkeypatch):
+    def fail(*_arguments, **_named):
+        raise error
+
+    monkeypatch.setattr(socket, "create_connection", fail)
+    with pytest.raises(vd.OpenError) as refused:
+        open_transport(f"{scheme}://127.0.0.1:5000")
+    hint = refused.value.hint
+    assert hint is None if words is None else words in hint
 
 
 def test_an_option_that_there_is_not_is_no_fault_of_the_server():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import socket
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,9 +37,6 @@ _OF_SERVER = (
         "the server is there, and hung up: is its port busy, or not plugged in?",
     ),
 )
-_OF_NETWORK = (
-    errno.ECONNREFUSED, errno.ETIMEDOUT, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNRESET,
-)  # fmt: skip
 
 
 def as_open_error(port: str, error: BaseException) -> OpenError:
@@ -82,22 +80,42 @@ def _url_error(port: str, error: BaseException) -> OpenError:
     """Return the error for a URL of pyserial: with a hint only where the cause is known."""
     text = message_of(error)
     hint = next((hint for parts, hint in _OF_SERVER if any(part in text for part in parts)), None)
-    if hint is None and _errno(error) in _OF_NETWORK:
-        hint = "is the device, or the server for it, running there?"
-    return OpenError(f"{port} cannot be opened: {text}", port=port, hint=hint)
+    return OpenError(
+        f"{port} cannot be opened: {text}", port=port, hint=hint or network_hint(error)
+    )
+
+
+def network_hint(error: BaseException) -> str | None:
+    """Return what to do about a connection that failed; None where the cause is not known."""
+    for cause in _causes(error):
+        match cause:
+            case socket.gaierror():
+                return "is the name of the host right?"
+            case ConnectionRefusedError() | ConnectionResetError():
+                return "is the device, or the server for it, running there?"
+            case TimeoutError():
+                return "is the host on, and does a firewall let this port through?"
+            case OSError(errno=errno.EHOSTUNREACH):
+                return "is the host on, and in a network that is reachable from here?"
+            case OSError(errno=errno.ENETUNREACH):
+                return "is this machine in a network from which the host is reachable?"
+    return None
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    """Yield an error and those that it was raised from, the newest first."""
+    cause: BaseException | None = error
+    while cause is not None:
+        yield cause
+        cause = cause.__cause__ or cause.__context__
 
 
 def _errno(error: BaseException) -> int | None:
     """Return the system's number of an error, or of one that it was raised from."""
-    cause: BaseException | None = error
-    while cause is not None:
-        numbers = (getattr(cause, "errno", None), *cause.args[:1])
-        for number in numbers:
+    for cause in _causes(error):
+        for number in (getattr(cause, "errno", None), *cause.args[:1]):
             if isinstance(number, int):
                 return number
-        if isinstance(cause, TimeoutError):
-            return errno.ETIMEDOUT
-        cause = cause.__cause__ or cause.__context__
     return None
 
 

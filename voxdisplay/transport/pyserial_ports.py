@@ -22,7 +22,7 @@ if sys.platform != "win32":
     import fcntl
     import termios
 
-_ENDED = "the port reads as ended: the device is disconnected, or another program reads it"
+_ENDED = "it reads as ended: the device is disconnected"
 
 
 class NativePort(serial.Serial):

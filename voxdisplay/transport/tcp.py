@@ -12,6 +12,7 @@ import time
 from urllib.parse import urlsplit
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
+from voxdisplay.transport.diagnosis import network_hint
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
 from voxdisplay.transport.telnet import TelnetDetector
 
@@ -53,7 +54,7 @@ class TcpTransport:
             raise OpenError(
                 f"{port} cannot be opened: {message_of(error)}",
                 port=port,
-                hint="is the device, or voxdisplay-sim --tcp, running there?",
+                hint=network_hint(error),
             ) from error
         except LIBRARY_ERRORS as error:  # a name that no host can have
             raise OpenError(
