@@ -1,8 +1,10 @@
 """Help texts, the table of commands, and what is imported for them."""
 
 import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
@@ -93,6 +95,22 @@ def test_each_shell_has_a_script(run, shell):
     done = run(_VOXDISPLAY_COMPLETE=f"{shell}_source")
     assert done.returncode == 0
     assert "_VOXDISPLAY_COMPLETE" in done.stdout
+
+
+@pytest.mark.skipif(not shutil.which("fish"), reason="needs fish")
+def test_fish_completes_behind_a_comma(tmp_path):
+    script = "_VOXDISPLAY_COMPLETE=fish_source voxdisplay | source\n"
+    script += "complete -C 'voxdisplay plan x --features line,o'\n"
+    script += "complete -C 'voxdisplay push --reconn'\n"
+    here = Path(sys.executable).parent
+    variables = {"PATH": f"{here}:/usr/bin:/bin", "HOME": str(tmp_path)}
+    command = [shutil.which("fish"), "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=variables, check=True)
+    first, second = done.stdout.splitlines()
+    assert first == "line,oct"
+    assert second.startswith(
+        "--reconnect\tHow long to wait for a display that is not plugged in yet,"
+    )
 
 
 def test_a_summary_is_the_first_sentence_of_its_command_and_fits_a_line():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from typing import Final
 
@@ -89,6 +90,10 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command line and return its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
     open_streams()
+    if os.environ.get("_VOXDISPLAY_COMPLETE", "").startswith("fish_"):
+        from voxdisplay.cli import fish_completion  # noqa: PLC0415 - only for completion
+
+        fish_completion.register()
     try:
         with raise_termination_signals():
             # A command that ends by click's Exit returns its code; all others return None.

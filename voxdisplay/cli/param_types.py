@@ -226,27 +226,24 @@ class FeaturesType(ParamType[tuple[str, ...]]):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, ...]:
         """Parse names, in the order of protocol.md."""
-        from voxdisplay.display.plan import EVERY_FEATURE  # noqa: PLC0415 - loads numpy
-
+        every = _features()
         text = str(value).lower().strip()
         if text in ("all", "none"):
-            return EVERY_FEATURE if text == "all" else ()
+            return every if text == "all" else ()
         names = [name.strip() for name in text.split(",")]
         for name in names:
-            if name not in EVERY_FEATURE:
-                known = ", ".join(EVERY_FEATURE)
+            if name not in every:
+                known = ", ".join(every)
                 self.fail(f"{name!r} is not a feature: take of {known}; all; none", param, ctx)
-        return tuple(name for name in EVERY_FEATURE if name in names)
+        return tuple(name for name in every if name in names)
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Offer the features that are not named yet."""
-        from voxdisplay.display.plan import EVERY_FEATURE  # noqa: PLC0415 - loads numpy
-
         del ctx, param
         named, comma, _ = incomplete.rpartition(",")
-        names = EVERY_FEATURE if comma else ("all", "none", *EVERY_FEATURE)
+        names = _features() if comma else ("all", "none", *_features())
         rest = [named + comma + name for name in names if name not in named.split(",")]
         return _completions(rest, incomplete)
 
@@ -275,6 +272,14 @@ class ImageFileType(ParamType[Path]):
     ) -> list[CompletionItem]:
         """Let the shell offer file names."""
         return click.Path().shell_complete(ctx, param, incomplete)
+
+
+def _features() -> tuple[str, ...]:
+    """Return the names of protocol.md's features, without the numpy of `display.plan`."""
+    from voxdisplay.wire import spec  # noqa: PLC0415 - only when used
+
+    names = (name for name in vars(spec) if name.startswith("FEATURE_"))
+    return tuple(name.removeprefix("FEATURE_").lower() for name in names)
 
 
 def _completions(words: tuple[str, ...] | list[str], incomplete: str) -> list[CompletionItem]:
