@@ -1,14 +1,16 @@
-"""What kind of device is emulated, and what would be no device of the protocol.
+"""Configuration of an emulated device: validation, and parsing of its values from text.
 
-Everything here is known before the device starts.
+Everything here is checked before the device starts.
 """
 
+import operator
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
 from firmware_sim import spec
+from firmware_sim.excerpt import excerpt
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, PixelFormat
 from firmware_sim.sender import max_wire_bytes
@@ -28,16 +30,17 @@ _INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the for
 LIES: Final = ("grid", "credit", "format", "features", "payload", "boot")
 _INFO_FIXED: Final = 29  # bytes of an INFO's payload before its strings (5)
 _U32: Final = 0xFFFFFFFF
+_MILLI: Final = 1000  # INFO has ticks per 1000 seconds
 
 
 @dataclass(frozen=True)
 class Config:
-    """A device.
+    """Configuration of a device.
 
     Parameters
     ----------
     grid
-        Voxels along x, y and z.
+        Number of voxels along x, y and z.
     pixel_format
         ``"mono1"``, ``"index8"``, ``"rgb565"`` or ``"rgb888"``.
     refresh
@@ -47,15 +50,15 @@ class Config:
     max_payload
         Longest payload in bytes.
     boot
-        Boot id, 0 to 65535; None for one at random.
+        Boot id, 0 to 65535; None for a random one.
     name, firmware, serial
-        What INFO says.
+        Strings of INFO.
     features
-        Names of what is announced, of `FEATURES`; None for all that the pixel format allows.
-    silent
+        Names of the announced features, of `FEATURES`; None for all that the pixel format allows.
+    max_silent_acks
         How many ACKs in a row are left out while more packets can be taken, 0 to 8 (9).
     lies
-        Names of what INFO announces and the device does not do, of `LIES`.
+        Names of what INFO announces but the device does not do, of `LIES`.
 
     Attributes
     ----------
@@ -64,12 +67,14 @@ class Config:
     pixels : PixelFormat
         The pixel format.
     feature_bits : int
-        What is announced, a bit for each ``spec.FEATURE_*``.
+        The announced features, a bit for each ``spec.FEATURE_*``.
 
     Raises
     ------
     ValueError
         If the protocol has no such device; the message says what to change.
+    TypeError
+        If a value is of another type; the message names it.
     """
 
     grid: tuple[int, int, int] = (128, 128, 128)
@@ -89,7 +94,8 @@ class Config:
     feature_bits: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shape", Grid(*self.grid))
+        object.__setattr__(self, "shape", Grid(*_three_numbers(self.grid)))
+        object.__setattr__(self, "grid", self.shape.sides)
         if self.pixel_format not in FORMATS:
             raise ValueError(
                 f"pixel format {self.pixel_format!r}: take one of {', '.join(FORMATS)}"
@@ -100,10 +106,11 @@ class Config:
             for name in FEATURES
             if name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8
         ]
-        features = frozenset(allowed) if self.features is None else self.features
+        features = frozenset(allowed if self.features is None else _names(self.features))
         _check_names("feature", features, allowed, f" with the format {self.pixel_format}")
         bits = sum(1 << FEATURES[name] for name in features)
         object.__setattr__(self, "feature_bits", bits)
+        object.__setattr__(self, "lies", _names(self.lies))
         _check_names("lie", self.lies, LIES)
         _check("refresh", self.refresh, 0, _U32)
         _check("max_payload", self.max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
@@ -126,24 +133,41 @@ class Config:
 
     @property
     def strings(self) -> bytes:
-        """Name, firmware and serial as INFO ends with them."""
+        """Name, firmware and serial in the form in which they end INFO."""
         texts = (text.encode() for text in (self.name, self.firmware, self.serial))
         return b"".join(bytes((len(text),)) + text for text in texts)
 
 
+def _three_numbers(grid: object) -> tuple[int, int, int]:
+    if isinstance(grid, str):
+        return parse_size(grid)
+    try:
+        nx, ny, nz = map(operator.index, grid)  # type: ignore[call-overload]
+    except (TypeError, ValueError):
+        raise TypeError(f"grid is {grid!r}: take three numbers of voxels, (nx, ny, nz)") from None
+    return nx, ny, nz
+
+
+def _names(names: str | Iterable[str]) -> frozenset[str]:
+    return parse_names(names) if isinstance(names, str) else frozenset(names)
+
+
 def _check(what: str, value: int, low: int, high: int) -> None:
+    if not isinstance(value, int):
+        raise TypeError(f"{what} is {value!r}: take a whole number")
     if not low <= value <= high:
         raise ValueError(f"{what} is {value}: take a number from {low} to {high}")
 
 
 def _check_names(what: str, names: Iterable[str], known: Collection[str], where: str = "") -> None:
-    unknown = ", ".join(sorted(name for name in names if name not in known))
+    unknown = sorted(name for name in names if name not in known)
     if unknown:
-        raise ValueError(f"{what} {unknown}: take of {', '.join(known)}{where}")
+        known_names = ", ".join(known)
+        raise ValueError(f"unknown {what} {excerpt(unknown[0])}: take of {known_names}{where}")
 
 
 def parse_number(text: str) -> int:
-    """Read a whole number, decimal or with 0x in front.
+    """Parse a whole number, decimal or with the prefix 0x.
 
     Raises
     ------
@@ -153,11 +177,11 @@ def parse_number(text: str) -> int:
     try:
         return int(text, 0)
     except ValueError:
-        raise ValueError(f"{text!r} is no whole number: write one like 16384") from None
+        raise ValueError(f"{excerpt(text)} is no whole number: write one like 16384") from None
 
 
 def parse_baud(text: str) -> int:
-    """Read the rate of a line in bits per second; 0: bytes take no time.
+    """Parse a line rate in bits per second; 0: unlimited.
 
     Raises
     ------
@@ -181,13 +205,15 @@ def parse_size(text: str) -> tuple[int, int, int]:
     number = "([0-9]{1,9})"
     match = re.fullmatch(f"{number}[x,]{number}[x,]{number}", text, re.IGNORECASE)
     if not match:
-        raise ValueError(f"{text!r} is no grid: write three numbers of voxels like 128x128x128")
+        raise ValueError(
+            f"{excerpt(text)} is no grid: write three numbers of voxels like 128x128x128"
+        )
     nx, ny, nz = map(int, match.groups())
     return nx, ny, nz
 
 
 def parse_refresh(text: str) -> int:
-    """Read a refresh rate in hertz.
+    """Parse a refresh rate in hertz.
 
     Returns
     -------
@@ -197,14 +223,20 @@ def parse_refresh(text: str) -> int:
     Raises
     ------
     ValueError
-        If it is not a number from 0 on.
+        If it is neither 0 nor a rate that INFO can announce.
     """
     try:
-        return round(float(text) * 1000)
+        hertz = float(text)
+        ticks = round(hertz * _MILLI)
     except (ValueError, OverflowError):
-        raise ValueError(f"{text!r} is no number of hertz: write one like 30 or 29.97") from None
+        raise ValueError(
+            f"{excerpt(text)} is no number of hertz: write one like 30 or 29.97"
+        ) from None
+    if hertz and not 1 <= ticks <= _U32:
+        raise ValueError(f"refresh is {hertz:g} Hz: take 0, or from 0.001 to {_U32 / _MILLI} Hz")
+    return ticks
 
 
 def parse_names(text: str) -> frozenset[str]:
-    """Read names, as of features or of lies, with commas between them."""
-    return frozenset(filter(None, text.lower().split(",")))
+    """Parse names joined by commas, as of features or of lies."""
+    return frozenset(filter(None, (name.strip() for name in text.lower().split(","))))

@@ -1,8 +1,8 @@
-"""What goes wrong on a line and at its ends, at given rates, the same for the same seed.
+"""Kinds of faults on a line, reproducible for the same seed.
 
-A fault sees the bytes of one direction and knows of packets only that a 00 ends them. Where it
-strikes depends on the bytes' places in the stream and not on how they are cut into pieces; when
-depends on the times that it is given, and on no clock.
+A fault sees the bytes of one direction and knows of packets only that a 00 ends them. Where it hits
+depends on the position of the bytes in the stream, not on how they are cut into pieces; delays
+depend on the times passed to it, not on a clock.
 """
 
 import math
@@ -11,20 +11,25 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from enum import Enum, auto
-from typing import Final, NamedTuple, Protocol
+from typing import ClassVar, Final, NamedTuple, Protocol
 
 from firmware_sim import spec
 from firmware_sim.sender import max_wire_bytes
 
 _LONGEST: Final = max_wire_bytes(spec.LIMIT_MAX_PAYLOAD + spec.LIMIT_OVERHEAD)  # of a packet
 
+# How the parameters of a kind are written, behind its name.
+RATE: Final = "=RATE"
+TIMED: Final = "=SECONDS@RATE"
+BYTES: Final = "@BYTES"
+
 
 class Event(Enum):
-    """What may happen between two bytes."""
+    """An event between two bytes of the stream."""
 
-    CUT = auto()  # what has come so far is handed over on its own
+    CUT = auto()  # the bytes before are handed over on their own
     REBOOT = auto()  # the device starts again
-    UNPLUG = auto()  # the pipe ends
+    UNPLUG = auto()  # the connection ends
 
 
 class Piece(NamedTuple):
@@ -33,9 +38,9 @@ class Piece(NamedTuple):
     Parameters
     ----------
     at
-        When it arrives, in seconds.
+        Arrival time in seconds.
     what
-        Bytes, or what happens between those before and those after.
+        Bytes, or an event between those before and those after.
     """
 
     at: float
@@ -43,27 +48,27 @@ class Piece(NamedTuple):
 
 
 class HitSelector(Protocol):
-    """Which of a row of chances strike."""
+    """Selection of the trials of a sequence (bits, bytes or packets) that a fault hits."""
 
-    def select(self, chances: int) -> list[int]:
-        """Return which of the next chances strike."""
+    def select(self, trials: int) -> list[int]:
+        """Return the indices of the hits among the next trials."""
 
 
 class RandomHits:
-    """Each chance strikes at a fixed rate.
+    """Hits at random, each trial with the same probability.
 
     Parameters
     ----------
     rate
-        0 to 1.
+        Probability, 0 to 1.
     rng
-        Where chance comes from.
+        Source of random numbers.
     """
 
     def __init__(self, rate: float, rng: random.Random) -> None:
         self._rate = rate
         self._rng = rng
-        self._next = self._gap()  # chances that go by before the next stroke
+        self._next = self._gap()  # trials before the next hit
 
     def _gap(self) -> float:
         if self._rate >= 1:
@@ -72,72 +77,84 @@ class RandomHits:
             return math.inf
         return math.log(1 - self._rng.random()) // math.log1p(-self._rate)
 
-    def select(self, chances: int) -> list[int]:
-        """Return which of the next chances strike."""
+    def select(self, trials: int) -> list[int]:
+        """Return the indices of the hits among the next trials."""
         hits = []
-        while self._next < chances:
+        while self._next < trials:
             hits.append(int(self._next))
             self._next += 1 + self._gap()
-        self._next -= chances
+        self._next -= trials
         return hits
 
 
 class SingleHit:
-    """One chance strikes, and none after it.
+    """Exactly one hit.
 
     Parameters
     ----------
     count
-        Which one, from 1 on.
+        Number of the trial that it hits, from 1 on.
     """
 
     def __init__(self, count: int) -> None:
         self._next: float = count - 1
 
-    def select(self, chances: int) -> list[int]:
-        """Return which of the next chances strike."""
-        hits = [int(self._next)] if self._next < chances else []
-        self._next = math.inf if hits else self._next - chances
+    def select(self, trials: int) -> list[int]:
+        """Return the indices of the hits among the next trials."""
+        hits = [int(self._next)] if self._next < trials else []
+        self._next = math.inf if hits else self._next - trials
         return hits
 
 
 class Fault(ABC):
-    """One kind of fault, on one direction of a line.
+    """A fault on one direction of a line.
 
     Parameters
     ----------
-    strokes
-        What it strikes: bits, bytes or packets, by its kind.
+    hits
+        Selects what it hits: bits, bytes or packets, depending on the kind.
     seconds
-        For how long, if its kind has a time.
+        Duration, if the kind has one.
     rng
-        Where chance comes from besides.
+        Source of all other random numbers.
+
+    Attributes
+    ----------
+    FORMS : tuple of str
+        How its parameters are written.
+    EFFECT : str
+        What it does, in a few words.
     """
 
-    def __init__(self, strokes: HitSelector, seconds: float, rng: random.Random) -> None:
-        self._hits = strokes
+    FORMS: ClassVar[tuple[str, ...]] = (RATE,)
+    EFFECT: ClassVar[str]
+
+    def __init__(self, hits: HitSelector, seconds: float, rng: random.Random) -> None:
+        self._hits = hits
         self._seconds = seconds
         self._rng = rng
         self.connect()
 
-    def connect(self) -> None:  # noqa: B027 - most remember nothing
-        """Begin a connection: nothing of the one before is on its way."""
+    def connect(self) -> None:  # noqa: B027 - most kinds have no state
+        """Begin a connection: nothing of the one before is on the line."""
 
     @abstractmethod
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
-        """Yield what becomes of the next bytes of the stream.
+        """Yield the pieces that the fault makes of the next bytes of the stream.
 
         Parameters
         ----------
         at
-            When they came, never before those that came before.
+            Their time in seconds, not before that of the call before.
         data
             The bytes.
         """
 
 
 class Flip(Fault):
-    """Inverts bits; the rate is that of bits."""
+    """Bit errors; the rate is per bit."""
+
+    EFFECT = "inverts bits"
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes with some bits inverted."""
@@ -148,7 +165,9 @@ class Flip(Fault):
 
 
 class Drop(Fault):
-    """Loses bytes."""
+    """Loss of bytes."""
+
+    EFFECT = "loses bytes"
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes without some of them."""
@@ -159,7 +178,9 @@ class Drop(Fault):
 
 
 class Double(Fault):
-    """Doubles bytes."""
+    """Duplication of bytes."""
+
+    EFFECT = "sends bytes twice"
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, some of them twice."""
@@ -170,7 +191,9 @@ class Double(Fault):
 
 
 class Insert(Fault):
-    """Inserts random bytes before others."""
+    """Insertion of random bytes."""
+
+    EFFECT = "inserts random bytes"
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, random ones between some of them."""
@@ -182,12 +205,12 @@ class Insert(Fault):
 
 
 class _EventFault(Fault):
-    """Something happens behind bytes."""
+    """An event behind bytes."""
 
     event: Event
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
-        """Yield the bytes and what happens between them."""
+        """Yield the bytes and the events between them."""
         begin = 0
         for hit in self._hits.select(len(data)):
             yield Piece(at, data[begin : hit + 1])
@@ -197,29 +220,40 @@ class _EventFault(Fault):
 
 
 class Short(_EventFault):
-    """Writes and reads take or give a part of what is offered: the rate is that of ends."""
+    """Short writes and reads: the rate is that of cuts per byte."""
+
+    EFFECT = "cuts writes and reads into pieces behind a byte"
 
     event = Event.CUT
 
 
 class Reboot(_EventFault):
-    """The device starts again behind a byte: another boot id, no session, dark pages."""
+    """Restart of the device: another boot id, no session, dark pages."""
+
+    FORMS = (RATE, BYTES)
+    EFFECT = "restarts the device behind a byte, or once after BYTES bytes"
 
     event = Event.REBOOT
 
 
 class Unplug(_EventFault):
-    """The pipe ends behind a byte."""
+    """End of the connection."""
+
+    FORMS = (RATE, BYTES)
+    EFFECT = "ends the connection behind a byte, or once after BYTES bytes"
 
     event = Event.UNPLUG
 
 
 class Stall(Fault):
-    """The line stands still before a byte, for some seconds after all that was held back before."""
+    """Standstill of the line before a byte; standstills add up."""
+
+    FORMS = (TIMED,)
+    EFFECT = "stops the line before a byte for SECONDS"
 
     def connect(self) -> None:
         """Begin with a line that moves."""
-        self._free = -math.inf  # until when it stands still
+        self._free = -math.inf  # end of the standstill
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, some later than they came."""
@@ -233,28 +267,30 @@ class Stall(Fault):
 
 
 class _PacketFault(Fault):
-    """Strikes packets: bytes up to and including a 00, which may stand alone."""
+    """A fault on packets: bytes up to and including a 00, which may stand alone."""
 
     def connect(self) -> None:
-        """Begin with a packet."""
+        """Begin between packets."""
         self._begun = False
 
     def _parts(self, data: bytes) -> Iterator[tuple[bytes, bool, bool]]:
-        """Yield the parts of packets, and whether each begins one and ends one."""
+        """Yield parts of packets, and whether each begins a packet and whether it ends one."""
         for part in re.findall(rb"[^\0]*\0|[^\0]+", data):
             begins, ends = not self._begun, part.endswith(b"\0")
             self._begun = not ends
             yield part, begins, ends
 
-    def _strikes(self) -> bool:
+    def _hit(self) -> bool:
         return bool(self._hits.select(1))
 
 
 class Lose(_PacketFault):
-    """Loses packets."""
+    """Loss of packets."""
+
+    EFFECT = "loses packets"
 
     def connect(self) -> None:
-        """Begin with a packet."""
+        """Begin between packets."""
         super().connect()
         self._losing = False
 
@@ -263,56 +299,61 @@ class Lose(_PacketFault):
         kept = bytearray()
         for part, begins, _ in self._parts(data):
             if begins:
-                self._losing = self._strikes()
+                self._losing = self._hit()
             if not self._losing:
                 kept += part
         yield Piece(at, bytes(kept))
 
 
 class Delay(_PacketFault):
-    """Holds packets back; those behind come no sooner, so that the order stays."""
+    """Delay of packets; those behind wait, so that the order stays."""
+
+    FORMS = (TIMED,)
+    EFFECT = "delays packets, and all behind them, by SECONDS"
 
     def connect(self) -> None:
         """Begin with nothing held back."""
         super().connect()
-        self._free = -math.inf  # until when something is held back
+        self._free = -math.inf  # end of the delay
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
         """Yield the bytes, some later than they came."""
         for part, begins, _ in self._parts(data):
-            if begins and self._strikes():
+            if begins and self._hit():
                 self._free = max(self._free, at + self._seconds)
             yield Piece(max(self._free, at), part)
 
 
 class Reorder(_PacketFault):
-    """Exchanges a packet with the one behind it.
+    """Exchange of a packet with the one behind it.
 
-    protocol.md has the order of bytes from the pipe (9.3), so that such a line is outside of what
-    it promises. What holds all the same: a DATA packet is applied at most once in a session,
-    nothing is shown before it is whole, and the digest tells what is on display. What does not
-    hold: that a packet which the host takes for lost was lost, so that some are sent twice; that
-    credit is counted right, so that there may be an OVERRUN; and that a DATA packet belongs to
-    the session of the last HELLO. One that comes late, behind a new HELLO, may be taken for a
-    packet of the new session with the same number, and only the digest shows it.
+    protocol.md requires that the pipe keeps the order of bytes (9.3), so such a line is outside of
+    its guarantees. These hold all the same: a DATA packet is applied at most once in a session, no
+    frame is shown before it is whole, and the digest is that of what is on display. These do not:
+    that a packet which the host regards as lost was lost, so some are sent twice; that credit is
+    counted right, so there may be an OVERRUN; that a DATA packet belongs to the session of the last
+    HELLO. A packet that comes late, behind a new HELLO, may be taken for the packet of the new
+    session with the same number; only the digest reveals it.
     """
+
+    EFFECT = "exchanges a packet with the next one"
 
     def connect(self) -> None:
         """Begin with nothing held back."""
         super().connect()
         self._held = bytearray()
-        self._holding = False  # the packet that is held back still comes
+        self._holding = False  # the held packet has not ended yet
 
     def apply(self, at: float, data: bytes) -> Iterator[Piece]:
-        """Yield the bytes in the order in which they come now."""
+        """Yield the bytes in their new order."""
         out = bytearray()
         for part, begins, ends in self._parts(data):
             if begins and not self._held:
-                self._holding = self._strikes()
+                self._holding = self._hit()
             if self._holding:
                 self._held += part
                 self._holding = not ends
-                release = len(self._held) > _LONGEST  # that is no packet
+                release = len(self._held) > _LONGEST  # longer than any packet
             else:
                 out += part
                 release = ends

@@ -1,6 +1,6 @@
-"""A bad line: which faults a text asks for, and one direction of a line that has them.
+"""Faults of a line: parsing of fault specifications, and one direction of a line with faults.
 
-It knows nothing of what the faults do.
+Knows nothing of what the faults do.
 """
 
 import difflib
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim import fault_types
-from firmware_sim.fault_types import Event, Fault, HitSelector, Piece
+from firmware_sim.excerpt import excerpt
+from firmware_sim.fault_types import BYTES, TIMED, Event, Fault, HitSelector, Piece
 
 KINDS: Final[dict[str, type[Fault]]] = {
     "flip": fault_types.Flip,
@@ -28,14 +29,12 @@ KINDS: Final[dict[str, type[Fault]]] = {
     "unplug": fault_types.Unplug,
 }
 DIRECTIONS: Final = ("down", "up")  # to the device, and from it
-_WITH_DURATION: Final = ("delay", "stall")
-_AT_BYTE: Final = ("reboot", "unplug")
 _FAULT: Final = re.compile(r"(?:(\w+)\.)?(\w+)(?:[=:]([^@]*))?(?:@(.*))?")
 
 
 @dataclass(frozen=True)
 class FaultSpec:
-    """A fault as a text asks for it.
+    """A fault as specified.
 
     Parameters
     ----------
@@ -44,11 +43,11 @@ class FaultSpec:
     directions
         Some of `DIRECTIONS`.
     rate
-        Chance of each bit, byte or packet, by its kind.
+        Probability per bit, byte or packet, depending on the kind.
     seconds
-        For how long, if its kind has a time.
+        Duration, if the kind has one.
     after
-        Behind so many bytes, once, instead of a rate.
+        Number of bytes after which the fault occurs once; None if it has a rate.
     """
 
     kind: str
@@ -58,60 +57,65 @@ class FaultSpec:
     after: int | None = None
 
 
+def forms(kind: str) -> list[str]:
+    """Return how a fault of a kind is written, such as ``["reboot=RATE", "reboot@BYTES"]``."""
+    return [kind + form for form in KINDS[kind].FORMS]
+
+
 def parse_faults(text: str) -> tuple[FaultSpec, ...]:
-    """Read a list of faults such as ``flip=1e-5,down.drop=1e-6,stall=0.2@0.01,reboot@5000``.
+    """Parse a list of faults such as ``flip=1e-5,down.drop=1e-6,stall=0.2@0.01,reboot@5000``.
 
     Parameters
     ----------
     text
-        Faults with commas between them: ``KIND=RATE``, for delay and stall ``KIND=SECONDS@RATE``,
-        for reboot and unplug also ``KIND@BYTES``. A colon may stand for ``=``. ``down.`` or
-        ``up.`` in front has it on one direction; otherwise it is on both, but reboot and unplug
-        are on that to the device.
+        Faults joined by commas, each in one of the `forms` of its kind. A colon may stand for the
+        equals sign. The prefix ``down.`` or ``up.`` limits a fault to one direction; otherwise it
+        applies to both, but reboot and unplug to the direction to the device.
 
     Returns
     -------
-    tuple of Spec
-        The faults, in the order in which they work.
+    tuple of FaultSpec
+        The faults, in the order in which they act on the stream.
 
     Raises
     ------
     ValueError
-        If a kind is not known, or what stands behind it cannot be; the message says what can.
+        If a kind is unknown or its values are invalid; the message says what is possible.
     """
-    return tuple(_parse(part) for part in text.split(",") if part)
+    return tuple(_parse(part.strip()) for part in text.split(",") if part.strip())
 
 
 def _parse(part: str) -> FaultSpec:
-    match = _FAULT.fullmatch(part.strip())
+    match = _FAULT.fullmatch(part)
     direction, kind, value, behind = match.groups() if match else (None, part, None, None)
     if kind not in KINDS:
-        near = difflib.get_close_matches(kind, KINDS, 1)
+        near = difflib.get_close_matches(kind[:20], KINDS, 1)
         hint = f"did you mean {near[0]}? " if near else ""
-        raise ValueError(f"fault {kind!r} is not known: {hint}there are {', '.join(KINDS)}")
+        raise ValueError(f"fault {excerpt(kind)} is unknown: {hint}there are {', '.join(KINDS)}")
     if direction not in (None, *DIRECTIONS):
-        raise ValueError(f"fault {part!r}: write down. (to the device) or up. (from it) in front")
-    one_way = DIRECTIONS[:1] if kind in _AT_BYTE else DIRECTIONS
+        raise ValueError(
+            f"fault {excerpt(part)}: the prefix is down. (to the device) or up. (from it)"
+        )
+    allowed = KINDS[kind].FORMS
+    one_way = DIRECTIONS[:1] if BYTES in allowed else DIRECTIONS
     directions = one_way if direction is None else (direction,)
-    if kind in _WITH_DURATION:
+    if TIMED in allowed:
         seconds, rate = _non_negative(value), _non_negative(behind)
         if seconds < math.inf and rate <= 1:
             return FaultSpec(kind, directions, rate, seconds)
-        raise ValueError(
-            f"fault {part!r}: write {kind}=SECONDS@RATE with a time and a rate from 0 to 1"
-        )
-    if kind in _AT_BYTE and value is None and behind is not None and re.fullmatch("[0-9]+", behind):
-        after = int(behind)
-        if after:
+    elif BYTES in allowed and value is None and behind and re.fullmatch("[0-9]{1,18}", behind):
+        if after := int(behind):
             return FaultSpec(kind, directions, after=after)
-    if behind is None and _non_negative(value) <= 1:
+    elif behind is None and _non_negative(value) <= 1:
         return FaultSpec(kind, directions, _non_negative(value))
-    also = f" or {kind}@BYTES with a number from 1 on" if kind in _AT_BYTE else ""
-    raise ValueError(f"fault {part!r}: write {kind}=RATE with a rate from 0 to 1{also}")
+    raise ValueError(
+        f"fault {excerpt(part)}: write {' or '.join(forms(kind))}, with a RATE from 0 to 1"
+        + (" and BYTES from 1 on" if BYTES in allowed else "")
+    )
 
 
 def _non_negative(text: str | None) -> float:
-    """Return a number from 0 on, infinity if it is none."""
+    """Return a number that is not negative; infinity for anything else."""
     try:
         number = float(text or "")
     except ValueError:
@@ -127,14 +131,14 @@ class FaultyLine:
     faults
         As from `parse_faults`.
     seed
-        Equal seeds strike equal places.
+        Seed of the random numbers: equal seeds hit equal places.
     direction
         One of `DIRECTIONS`.
 
     Attributes
     ----------
     backlog : int
-        How many bytes are on their way.
+        Number of bytes on the line.
     """
 
     def __init__(self, faults: tuple[FaultSpec, ...], seed: int, direction: str) -> None:
@@ -146,20 +150,20 @@ class FaultyLine:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a connection; what was on its way is gone."""
+        """Begin a connection; what was on the line is lost."""
         self._pieces: deque[Piece] = deque()
-        self._last = -math.inf  # when the last piece comes
+        self._last = -math.inf  # arrival time of the last piece
         self.backlog = 0
         for fault in self._faults:
             fault.connect()
 
     def send(self, at: float, data: bytes) -> None:
-        """Let bytes set out.
+        """Put bytes on the line.
 
         Parameters
         ----------
         at
-            When, in seconds, never before those that set out before.
+            Time in seconds, not before that of the call before.
         data
             The bytes.
         """
@@ -174,14 +178,14 @@ class FaultyLine:
 
     @property
     def due(self) -> float:
-        """When the next piece comes, in seconds; infinity if none is on its way."""
+        """Arrival time of the next piece in seconds; infinity if none is on the line."""
         return self._pieces[0].at if self._pieces else math.inf
 
     def take(self, now: float) -> bytes | Event:
-        """Return what has come by now: bytes as far as an event, or the event.
+        """Return what has arrived by now: the bytes up to an event, or the event.
 
-        Nothing is no bytes. Bytes that set out together come together, unless a fault has it
-        otherwise.
+        No bytes if nothing has arrived. Bytes sent together arrive together unless a fault parts
+        them.
         """
         come = bytearray()
         while self._pieces and self._pieces[0].at <= now:
@@ -199,16 +203,16 @@ class FaultyLine:
 
 
 def _build(fault: FaultSpec, seed: str) -> Fault:
-    strokes: HitSelector = (
+    hits: HitSelector = (
         fault_types.RandomHits(fault.rate, random.Random(seed))
         if fault.after is None
         else fault_types.SingleHit(fault.after)
     )
-    return KINDS[fault.kind](strokes, fault.seconds, random.Random(f"{seed} besides"))
+    return KINDS[fault.kind](hits, fault.seconds, random.Random(f"{seed} besides"))
 
 
 def _apply(fault: Fault, piece: Piece) -> list[Piece]:
-    """Return what becomes of a piece; what happens, happens."""
+    """Return the pieces that a fault makes of one; events pass unchanged."""
     if isinstance(piece.what, Event):
         return [piece]
     return list(fault.apply(piece.at, piece.what))

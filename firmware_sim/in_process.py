@@ -1,6 +1,6 @@
-"""A device in the host's own process, behind a port of the kind ``sim:``.
+"""Device in the host's own process, behind a port of the kind ``sim:``.
 
-It moves bytes and lets time pass; it knows nothing of packets.
+Moves bytes and advances the device's time; knows nothing of packets.
 """
 
 import difflib
@@ -23,9 +23,10 @@ from firmware_sim.config import (
 )
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
+from firmware_sim.excerpt import excerpt
 from firmware_sim.faults import parse_faults
 
-# Key of the URL: what it sets, a field of the config if not the line, and how to read its value.
+# Key of the URL: what it sets (a field of Config, or a property of the line), and its parser.
 _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "size": ("grid", parse_size),
     "format": ("pixel_format", str.lower),
@@ -46,7 +47,7 @@ _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
 
 
 class InProcessPort:
-    """A device that runs while the host reads and writes.
+    """Port of a device whose time advances while the host reads and writes.
 
     One thread may read while another one writes.
 
@@ -58,7 +59,7 @@ class InProcessPort:
     Attributes
     ----------
     bench : Bench
-        The device's bench face.
+        Test controls of the device.
     """
 
     def __init__(self, wire: DeviceOnLine | PacedDevice) -> None:
@@ -68,17 +69,17 @@ class InProcessPort:
         self._closed = False
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what the device has sent.
+        """Return what the device has sent, waiting for the first byte.
 
         Parameters
         ----------
         timeout_s
-            How many seconds to wait for the first byte.
+            Longest wait in seconds.
 
         Returns
         -------
         bytes
-            What has come; nothing if the time is over.
+            What has arrived; empty after the timeout.
 
         Raises
         ------
@@ -101,17 +102,16 @@ class InProcessPort:
         Parameters
         ----------
         data
-            Any bytes. What the device has no room for is lost, and it says so.
+            Any bytes. Those that the device cannot buffer are lost, which it reports (OVERRUN).
         timeout_s
-            How many seconds to wait for a line that stands still and holds all that it can. Any
-            other takes bytes at once.
+            Longest wait in seconds for a line that is full. Any other takes the bytes at once.
 
         Raises
         ------
         ConnectionError
             If the port is closed, or the device unplugged.
         TimeoutError
-            If the line stood still all the time; it has taken nothing.
+            If the line stayed full; it has taken nothing.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -124,13 +124,13 @@ class InProcessPort:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Close the port; once more does no harm."""
+        """Close the port. Calling it again has no effect."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     def _wait(self, deadline: float) -> bool:
-        """Wait until something happens; return whether there was time for it."""
+        """Wait for the next event; return False if the deadline has passed."""
         left = deadline - time.monotonic()
         if left <= 0:
             return False
@@ -149,11 +149,11 @@ def open_in_process(url: str) -> InProcessPort:
     Parameters
     ----------
     url
-        ``sim:``, or ``sim:?KEY=VALUE&KEY=VALUE...`` with the keys ``size`` (64x64x64), ``format``
-        (mono1, index8, rgb565, rgb888), ``refresh`` (hertz; 0: at once), ``rx_buffer`` and
-        ``max_payload`` (bytes), ``boot``, ``silent``, ``seed`` (numbers), ``features``
-        (line,read,digest), ``lie`` (credit,boot), ``name``, ``firmware``, ``serial`` (text),
-        ``fault`` (flip:1e-6,stall:0.2@0.01; see `parse_faults`).
+        ``sim:``, or ``sim:?KEY=VALUE&KEY=VALUE...`` with the keys ``size`` (64x64x64 or 64,64,64),
+        ``format`` (mono1, index8, rgb565, rgb888), ``refresh`` (hertz; 0: at once), ``rx_buffer``
+        and ``max_payload`` (bytes), ``baud`` (bits a second; 0: no limit), ``boot``, ``silent``,
+        ``seed`` (numbers), ``features`` (line,read,digest), ``lie`` (credit,boot), ``name``,
+        ``firmware``, ``serial`` (text), ``fault`` (flip:1e-6,stall:0.2@0.01; see `parse_faults`).
 
     Returns
     -------
@@ -163,7 +163,7 @@ def open_in_process(url: str) -> InProcessPort:
     Raises
     ------
     ValueError
-        If a key is not known or a value cannot be; the message names it.
+        If a key is unknown or a value invalid; the message names it.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def open_in_process(url: str) -> InProcessPort:
 def parse_url(
     url: str, kind: str, more: Mapping[str, tuple[str, Callable[[str], Any]]] = MappingProxyType({})
 ) -> dict[str, Any]:
-    """Read the name of a port of an emulator in this process.
+    """Parse the name of a port of an emulator in this process.
 
     Parameters
     ----------
@@ -191,32 +191,35 @@ def parse_url(
     kind
         Such as ``sim:``.
     more
-        Keys of this kind: what they set, and how to read their values.
+        Further keys of this kind: what they set, and their parsers.
 
     Returns
     -------
     dict
-        What the keys set.
+        Values by what the keys set.
 
     Raises
     ------
     ValueError
-        If a key is not known or a value cannot be; the message names it.
+        If a key is unknown or a value invalid; the message names it.
     """
     keys = {**_KEYS, **more}
     scheme, mark, query = url.partition("?")
     if scheme != kind or (mark and not query):
-        raise ValueError(f"port {url!r}: write {kind} or {kind}?KEY=VALUE&KEY=VALUE...")
+        raise ValueError(f"port {excerpt(url)}: write {kind} or {kind}?KEY=VALUE&KEY=VALUE...")
     fields: dict[str, Any] = {}
     for key, text in parse_qsl(query, keep_blank_values=True):
         if key not in keys:
-            near = difflib.get_close_matches(key, keys, n=1, cutoff=0)
-            raise ValueError(f"key {key!r} in {url!r} is not known: did you mean {near[0]!r}?")
+            near = difflib.get_close_matches(key[:20], keys, n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise ValueError(
+                f"unknown key {excerpt(key)} in {excerpt(url)}: {hint}there are {', '.join(keys)}"
+            )
         name, parse = keys[key]
         if name in fields:
-            raise ValueError(f"key {key!r} in {url!r} stands there twice: write it once")
+            raise ValueError(f"key {key!r} occurs twice in {excerpt(url)}: write it once")
         try:
             fields[name] = parse(text)
         except ValueError as error:
-            raise ValueError(f"{key} in {url!r}: {error}") from None
+            raise ValueError(f"{key} in {excerpt(url)}: {error}") from None
     return fields

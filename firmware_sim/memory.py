@@ -1,9 +1,10 @@
 """Video memory: two pages of pixels in scan order, palette and digest of each (2.1, 6, 7.6, 8).
 
-A pixel stands in memory as it does on the wire; MONO1 has a byte for each voxel. The memory knows
-nothing of packets and ops: its callers give it voxels that are on the grid.
+Pixels have the same bytes in memory as on the wire, except that MONO1 has a byte per voxel. Knows
+nothing of packets and ops: callers pass voxels that are on the grid.
 """
 
+import os
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +15,9 @@ from firmware_sim.digest import mix_sum
 from firmware_sim.grid import Grid
 
 _COLOR: Final = 3  # bytes of a colour: red, green, blue
-_LOG_VOXELS: Final = 4096  # so many voxels are written before the digest catches up with them
-_DIRECT_VOXELS: Final = 256  # so many voxels in scan order are worth a calculation of their own
+_LOG_VOXELS: Final = 4096  # written voxels to collect before the digest is updated with them
+_DIRECT_VOXELS: Final = 256  # writes of so many voxels update the digest at once
+_MEGABYTE: Final = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,9 @@ class PixelFormat:
     code
         One of ``spec.FORMAT_*``.
     name
-        Its name, in small letters.
+        Its name in lower case.
     size
-        Bytes of a pixel.
+        Number of bytes of a pixel.
     full
         The full pixel.
     """
@@ -52,7 +54,7 @@ FORMATS: Final = {
 
 
 def _default_palette() -> bytes:
-    """Return the default palette (2.1), its values times 255 rounded to the nearest (8)."""
+    """Return the default palette (2.1), its values times 255 rounded to nearest (8)."""
     return bytes(
         (2 * 255 * level + top) // (2 * top)
         for i in range(spec.LIMIT_MAX_COLORS)
@@ -64,21 +66,21 @@ DEFAULT_PALETTE: Final = _default_palette()
 
 
 class Page:
-    """Video memory for one whole picture, dark at first.
+    """Video memory for one frame, initially dark.
 
     Parameters
     ----------
     volume
         Number of voxels.
     pixel_size
-        Bytes of a pixel.
+        Number of bytes of a pixel.
 
     Attributes
     ----------
     pixels : bytearray
         All pixels in scan order, `volume` times `pixel_size` bytes.
     palette : bytearray
-        256 colours of red, green and blue, a byte each. Of use with INDEX8 only.
+        256 colours of red, green and blue, a byte each. Used with INDEX8 only.
     """
 
     def __init__(self, volume: int, pixel_size: int) -> None:
@@ -94,7 +96,7 @@ class Page:
         self._clear_log()
 
     def copy_from(self, other: "Page") -> None:
-        """Take over picture and palette of another page of the same shape."""
+        """Copy pixels and palette of another page of the same size."""
         self.pixels[:] = other.pixels
         self.palette[:] = other.palette
         self._digest = other.digest
@@ -108,7 +110,7 @@ class Page:
         start
             Index of the first voxel.
         pixels
-            Pixels of voxels on the grid, one behind the other.
+            Pixels of consecutive voxels on the grid.
         """
         size = self.pixel_size
         place = slice(start * size, start * size + len(pixels))
@@ -117,30 +119,30 @@ class Page:
         self._log_replaced(range(start, start + len(pixels) // size), old, pixels)
 
     def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
-        """Write one pixel to runs of voxels in scan order.
+        """Write the same pixel to runs of voxels in scan order.
 
         Parameters
         ----------
         starts
             Index of the first voxel of each run.
         count
-            How many voxels each run has, all on the grid.
+            Length of each run in voxels, all on the grid.
         pixel
-            The pixel that all of them get.
+            The pixel.
         """
         run = pixel * count
         for start in starts:
             self.put(start, run)
 
     def plot(self, indices: "array[int]", pixel: bytes) -> None:
-        """Write one pixel to many voxels.
+        """Write the same pixel to many voxels.
 
         Parameters
         ----------
         indices
-            Array of type ``"Q"`` of the voxels' indices, each on the grid and no two equal.
+            Array of type ``"Q"`` of distinct indices on the grid.
         pixel
-            The pixel that all of them get.
+            The pixel.
         """
         pixels = self.pixels
         size = self.pixel_size
@@ -160,7 +162,7 @@ class Page:
         first
             The first entry.
         colors
-            Red, green and blue of each; none behind the palette's end.
+            Red, green and blue of each entry, none beyond the end of the palette.
         """
         place = slice(first * _COLOR, first * _COLOR + len(colors))
         gain = -self._color_terms(place)
@@ -171,7 +173,7 @@ class Page:
 
     @property
     def digest(self) -> int:
-        """Section 8: of the picture as it is now."""
+        """Digest of the page as it is now, section 8."""
         size = self.pixel_size
         gain = mix_sum(self._written, self._new, size) - mix_sum(self._written, self._old, size)
         self._digest = (self._digest + gain) & 0xFFFFFFFF
@@ -179,10 +181,10 @@ class Page:
         return self._digest
 
     def _clear_log(self) -> None:
-        """Begin a new log of what has been written and is not in the digest yet."""
-        self._written = array("Q")  # indices in the order of the writes, the same one perhaps twice
-        self._old = bytearray()  # their pixels before
-        self._new = bytearray()  # and after
+        """Begin a new log of writes that are not in the digest yet."""
+        self._written = array("Q")  # indices in the order of the writes, possibly repeated
+        self._old = bytearray()  # pixels before each write
+        self._new = bytearray()  # pixels after it
 
     def _log_replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
         if old == new:
@@ -198,7 +200,7 @@ class Page:
             self._digest = self.digest
 
     def _color_terms(self, place: slice) -> int:
-        """Return what a part of the palette adds to the digest."""
+        """Return the digest terms of a part of the palette."""
         entries = [
             at
             for at in range(place.start, place.stop, _COLOR)
@@ -222,6 +224,11 @@ class Memory:
     ----------
     front, back : Page
         The page that is shown, and the one that is written.
+
+    Raises
+    ------
+    ValueError
+        If this machine has not enough memory for the pages.
     """
 
     PAGES: Final = 2
@@ -229,11 +236,21 @@ class Memory:
     def __init__(self, grid: Grid, pixel_format: PixelFormat) -> None:
         self.grid = grid
         self.pixel_format = pixel_format
-        self.front = Page(grid.volume, pixel_format.size)
-        self.back = Page(grid.volume, pixel_format.size)
+        needed = (self.PAGES + 1) * grid.volume * pixel_format.size  # one more while one is cleared
+        too_large = ValueError(
+            f"a grid of {grid} {pixel_format.name} needs {needed // _MEGABYTE} MB of memory, more "
+            "than this machine has: take a smaller one"
+        )
+        if needed > _memory_bytes():
+            raise too_large
+        try:
+            self.front = Page(grid.volume, pixel_format.size)
+            self.back = Page(grid.volume, pixel_format.size)
+        except MemoryError:
+            raise too_large from None
 
     def begin_frame(self, dark: bool) -> None:
-        """Prepare the back page for a frame: dark, or a copy of the front page and its palette."""
+        """Prepare the back page for a frame: dark, or a copy of the front page with its palette."""
         if dark:
             self.back.clear()
         else:
@@ -242,3 +259,11 @@ class Memory:
     def swap(self) -> None:
         """Exchange the pages."""
         self.front, self.back = self.back, self.front
+
+
+def _memory_bytes() -> int:
+    """Return the physical memory of this machine; a very large number if it is not known."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return 1 << 62

@@ -1,9 +1,10 @@
-"""A page as a ``.npy`` file, format version 1.0, for whoever looks on with numpy.
+"""Export of a page as a ``.npy`` file, format version 1.0, for numpy.
 
-It knows nothing of the device but the snapshot that it is given.
+Knows nothing of the device but the snapshot that it is given.
 """
 
-import os
+import secrets
+import stat
 import struct
 from pathlib import Path
 from typing import Final
@@ -11,7 +12,7 @@ from typing import Final
 from firmware_sim.bench import Snapshot
 
 _MAGIC: Final = b"\x93NUMPY\x01\x00"
-_ALIGN: Final = 64  # the data begin at a multiple of this
+_ALIGN: Final = 64  # the data begin at a multiple of this offset
 _DTYPES: Final = {
     "mono1": ("|u1", ()),
     "index8": ("|u1", ()),
@@ -21,7 +22,7 @@ _DTYPES: Final = {
 
 
 def npy_header(snapshot: Snapshot) -> bytes:
-    """Return what stands in the file before the pixels.
+    """Return the header of the file, before the pixels.
 
     The array has the shape (nz, ny, nx), for RGB888 (nz, ny, nx, 3).
     """
@@ -34,26 +35,30 @@ def npy_header(snapshot: Snapshot) -> bytes:
 
 
 def write_npy(path: Path, snapshot: Snapshot) -> None:
-    """Write a snapshot to a file, at once for all who read it.
+    """Write a snapshot to a file, atomically for all who read it.
 
     Parameters
     ----------
     path
-        The file. It is written beside its place first and then put there.
+        The file. It is written under another name beside it first, then renamed.
     snapshot
         What was on display.
 
     Raises
     ------
     OSError
-        If the file cannot be written.
+        If the file cannot be written, or if the path is not that of a file: a device such as
+        /dev/null would be replaced, too.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    if path.exists() and not stat.S_ISREG(path.stat().st_mode):
+        raise FileExistsError(f"{path} exists and is no regular file: take another path")
+    # A new file under a name that nobody can guess: no link laid there beforehand is followed.
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
     try:
-        with beside.open("wb") as file:
+        with beside.open("xb") as file:  # exclusive: fails if anything is there
             file.write(npy_header(snapshot))
             file.write(snapshot.pixels)
         beside.replace(path)
-    except OSError:
+    except OSError as error:
         beside.unlink(missing_ok=True)
-        raise
+        raise OSError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -1,18 +1,18 @@
-"""The tap: lets one watcher at a time see the front page, out of band.
+"""Tap: out-of-band access to the front page for one watcher at a time.
 
 It is no part of protocol.md: no device has it and no host may need it. It shows what *is* on
 display, as a person in front of the display would see it, whoever speaks to the device meanwhile.
 
-The tap listens on TCP, on this machine only. The watcher asks, and gets one answer:
+The tap listens on TCP, on this machine only. A watcher sends requests and gets a response to each:
 
-- The question is 6 bytes: which picture the watcher has, as the u16 ``boot`` and the u32 ``swaps``
-  of the answer that brought it. A watcher that has none asks with FF in all bytes.
-- The answer comes as soon as another picture than that is on display: a header, and the front page
-  as it stands in memory, that is ``nx * ny * nz`` pixels in scan order (protocol.md, section 2.1),
-  with a byte for each voxel of MONO1. Behind a page of INDEX8 comes its palette: 256 times red,
-  green and blue, a byte each. Pictures in between are left out: only the newest counts.
+- The request is 6 bytes: the picture that the watcher has, as the u16 ``boot`` and the u32
+  ``swaps`` of its header. A watcher that has none sends FF in all bytes.
+- The response comes as soon as another picture is on display: a header, and the front page as it is
+  in memory, that is ``nx * ny * nz`` pixels in scan order (protocol.md, section 2.1), with a byte
+  per voxel of MONO1. A page of INDEX8 is followed by its palette: 256 times red, green and blue, a
+  byte each. Pictures in between are left out: only the newest counts.
 
-The header is 40 bytes, its integers unsigned and little-endian, one behind the other:
+The header is 40 bytes, its integers unsigned and little-endian:
 
 - ``VXT1``, 4 bytes
 - u16 boot: boot id of the device
@@ -21,12 +21,12 @@ The header is 40 bytes, its integers unsigned and little-endian, one behind the 
 - u16 format: number of the pixel format (protocol.md, section 2.1)
 - u32 swaps since the device started
 - u32 digest of the page (protocol.md, section 8)
-- u32 packets taken, u32 packets refused, u32 damaged segments, and u32 how many times bytes found
-  no room in the receive ring; all since the device started, modulo 2^32 like the swaps
+- u32 packets taken, u32 packets refused, u32 damaged segments, and u32 overruns of the receive
+  ring; all since the device started, modulo 2^32 like the swaps
 
-A watcher that asks again before its answer has come is cut off. Being watched may not slow the
-device down: a page is copied only for a question, and the copying never takes more than about a
-twentieth of the time.
+A watcher that sends a request before the response to the one before is disconnected. The tap must
+not slow the device down: a page is copied only for a request, and copying takes no more than about
+a twentieth of the time.
 """
 
 import contextlib
@@ -40,23 +40,24 @@ from firmware_sim import spec
 from firmware_sim.bench import Bench
 from firmware_sim.device import Device
 from firmware_sim.readiness import wait_ready
+from firmware_sim.serve import accept
 
 _HOST: Final = "127.0.0.1"
-_QUESTION: Final = struct.Struct("<HI")
+_REQUEST: Final = struct.Struct("<HI")
 _HEADER: Final = struct.Struct("<4sHHHHHHIIIIII")
 _MAGIC: Final = b"VXT1"
 _NO_FRAME: Final = 0xFFFF
-_IDLE_FACTOR: Final = 20  # times as long as it took to copy a page, none is copied
+_IDLE_FACTOR: Final = 20  # pause after copying a page, in multiples of the time that it took
 _U32: Final = 0xFFFFFFFF
 
 
 class Tap:
-    """Serves watchers in a thread of its own. Use it as a context manager, or `close` it.
+    """Server of watchers, in a thread of its own. Use it as a context manager, or `close` it.
 
     Parameters
     ----------
     device
-        What is watched. Its ``on_swap`` has to call `notice`.
+        The device. Its ``on_swap`` has to call `notice`.
 
     Attributes
     ----------
@@ -78,19 +79,19 @@ class Tap:
         self._thread.start()
 
     def notify_swap(self) -> None:
-        """Take notice of a swap. Costs next to nothing unless a watcher waits for it."""
+        """Wake a watcher that waits for a swap. Costs next to nothing if none does."""
         if self._waiting:
             self._waiting = False
             self._wake()
 
     def close(self) -> None:
-        """Stop; the watcher is cut off. Twice is fine."""
+        """Stop, and disconnect the watcher. Calling it again has no effect."""
         if self._closing.is_set():
             return
         self._closing.set()
         self._wake()
         if connection := self._connection:
-            with contextlib.suppress(OSError):  # it has just gone by itself
+            with contextlib.suppress(OSError):  # it has just disconnected
                 connection.shutdown(socket.SHUT_RDWR)
         self._thread.join()
         for one in (self._listener, self._bell, self._ringer):
@@ -103,28 +104,32 @@ class Tap:
         self.close()
 
     def _wake(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # then it rings already
+        with contextlib.suppress(BlockingIOError):  # full: the thread wakes up anyway
             self._ringer.send(b"\0")
 
-    # What follows runs in the thread.
+    # The rest runs in the thread.
 
     def _run(self) -> None:
         while self._readable(self._listener):
-            self._connection, _ = self._listener.accept()
-            with self._connection, contextlib.suppress(OSError):
-                self._serve(self._connection)
+            connection = accept(self._listener, self._bell)
+            if connection is None:
+                continue
+            self._connection = connection
+            with connection, contextlib.suppress(OSError):
+                connection.setblocking(True)
+                self._serve(connection)
             self._connection = None
 
     def _serve(self, watcher: socket.socket) -> None:
-        """Answer a watcher until it goes.
+        """Respond to a watcher until it disconnects.
 
-        The socket blocks: so the system takes a whole page in one call, and Python's lock changes
-        hands once. In many small calls it would do so each time, and either the device would
-        stand still or this thread.
+        The socket blocks, so that the system takes a whole page in one call and the interpreter
+        lock is released once. With many small calls it would change hands each time, and stall
+        either the device or this thread.
         """
         while self._readable(watcher):
-            question = watcher.recv(_QUESTION.size, socket.MSG_WAITALL)
-            if len(question) < _QUESTION.size or not self._await_new_picture(watcher, question):
+            request = watcher.recv(_REQUEST.size, socket.MSG_WAITALL)
+            if len(request) < _REQUEST.size or not self._await_new_picture(watcher, request):
                 return
             began = time.thread_time()
             header, page = self._capture()
@@ -135,16 +140,16 @@ class Tap:
             self._closing.wait(_IDLE_FACTOR * spent)
 
     def _readable(self, one: socket.socket) -> bool:
-        """Wait until a socket has something; return False if the tap is closed instead."""
+        """Wait until a socket is readable; return False if the tap is closed instead."""
         while not self._closing.is_set():
             if one in self._wait(one):
                 return True
         return False
 
-    def _await_new_picture(self, watcher: socket.socket, question: bytes) -> bool:
-        """Wait for another picture than the watcher has; return whether there is one for it."""
-        self._waiting = True  # before looking, so that no swap goes unnoticed
-        while self._current_picture() == question:
+    def _await_new_picture(self, watcher: socket.socket, request: bytes) -> bool:
+        """Wait for another picture than the requested one; return False if the watcher is gone."""
+        self._waiting = True  # before the comparison, so that no swap is missed
+        while self._current_picture() == request:
             if self._wait(watcher) or self._closing.is_set():
                 return False
             self._waiting = True
@@ -152,7 +157,7 @@ class Tap:
         return True
 
     def _wait(self, one: socket.socket) -> list[socket.socket]:
-        """Wait for a socket or the bell; return the socket if it has something."""
+        """Wait for a socket or the bell; return the socket if it is readable."""
         readable, _ = wait_ready([self._bell, one])
         if self._bell in readable:
             self._bell.recv(64)
@@ -160,8 +165,8 @@ class Tap:
         return readable
 
     def _current_picture(self) -> bytes:
-        """Return the question of a watcher that has the picture which is on display."""
-        return _QUESTION.pack(self._device.boot, self._device.swaps & _U32)
+        """Return the request of a watcher that has the picture on display."""
+        return _REQUEST.pack(self._device.boot, self._device.swaps & _U32)
 
     def _capture(self) -> tuple[bytes, bytes]:
         shown = self._bench.snapshot()

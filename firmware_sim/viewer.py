@@ -1,33 +1,37 @@
-"""Shows the tap in a browser, by a program that another package brings.
+"""Start of a viewer: a program of another package that shows the tap in a browser.
 
-The emulator draws nothing itself. A viewer is a module named in the entry point group
-``voxdisplay_sim.viewer``; it runs in a process of its own, so that its work is not the device's:
+The emulator renders nothing itself. A viewer is a module named in the entry point group
+``voxdisplay_sim.viewer``. It runs in a process of its own, so that it takes no time of the device:
 ``python -m MODULE --tap HOST:PORT --listen HOST:PORT --title TEXT``, and ``--allow-origin ORIGIN``
-for each origin whose pages may watch besides its own. Its first line on stdout is a
-JSON object with ``url``, where a browser finds it; without such a line it has failed, and has said
-why on stderr. It ends when the tap does.
+for each further origin whose pages may show it. Its first line on stdout is a JSON object with ``url``, the address for the browser; without such a line it has failed, and has
+reported why on stderr. It ends when the tap does.
 """
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
 from typing import Final
 
+from firmware_sim.readiness import wait_ready
 from firmware_sim.tap import Tap
 
 GROUP: Final = "voxdisplay_sim.viewer"
-_WAIT_S: Final = 5  # for the viewer's end; then it is made to
+_WAIT_S: Final = 5  # for the viewer to end; then it is killed
+_MAX_LINE_BYTES: Final = 4096
 
 
 class ViewerError(OSError):
-    """There is no viewer, or it did not start."""
+    """No viewer is installed, or it did not start."""
 
 
 @contextlib.contextmanager
-def viewer(tap: Tap, address: str, title: str, allow_origins: Iterable[str] = ()) -> Iterator[str]:
+def viewer(
+    tap: Tap, address: str, title: str, stop: int, allow_origins: Iterable[str] = ()
+) -> Iterator[str]:
     """Run a viewer.
 
     Parameters
@@ -37,14 +41,16 @@ def viewer(tap: Tap, address: str, title: str, allow_origins: Iterable[str] = ()
     address
         Where it listens for browsers, as HOST:PORT; port 0 is any that is free.
     title
-        What is written over the picture.
+        Title of the page.
+    stop
+        File descriptor that becomes readable when it is time to stop.
     allow_origins
-        Origins whose pages may watch, too, such as ``https://cube.example.com``.
+        Further origins whose pages may show it, such as ``https://cube.example.com``.
 
     Yields
     ------
     url : str
-        Where a browser finds it.
+        Address for the browser; empty if it was told to stop before the viewer started.
 
     Raises
     ------
@@ -61,7 +67,7 @@ def viewer(tap: Tap, address: str, title: str, allow_origins: Iterable[str] = ()
     # In a session of its own: it is ours to end, not the terminal's.
     process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)  # noqa: S603 - no shell
     try:
-        yield _url(process, module)
+        yield _url(process, module, stop)
     finally:
         process.terminate()
         try:
@@ -71,10 +77,19 @@ def viewer(tap: Tap, address: str, title: str, allow_origins: Iterable[str] = ()
             process.communicate()
 
 
-def _url(process: subprocess.Popen[bytes], module: str) -> str:
+def _url(process: subprocess.Popen[bytes], module: str, stop: int) -> str:
     assert process.stdout is not None  # noqa: S101 - it is a pipe
-    line = process.stdout.readline()
+    output = process.stdout.fileno()
+    line = b""
+    while b"\n" not in line and len(line) < _MAX_LINE_BYTES:
+        readable, _ = wait_ready([output, stop])
+        if stop in readable:
+            return ""
+        data = os.read(output, _MAX_LINE_BYTES)
+        if not data:
+            break
+        line += data
     try:
         return str(json.loads(line)["url"])
     except (ValueError, KeyError, TypeError):
-        raise ViewerError(f"the viewer {module} did not start; it says why above") from None
+        raise ViewerError(f"the viewer {module} did not start; see its message above") from None

@@ -1,8 +1,8 @@
-"""A device behind USB/IP: a Linux kernel attaches it like one that is plugged in.
+"""USB/IP server of one device, which a Linux kernel attaches like one that is plugged in.
 
-One host has the device at a time; others may ask what there is. It moves messages and transfers;
-it knows nothing of what is transferred. A transfer that the device lets wait is answered when it
-is done, which is how a device holds its host back.
+One host owns the device at a time; others may list it. Moves messages and transfers and knows
+nothing of their data. A transfer that the device answers with NAK is completed later, which is how
+the device slows its host down.
 """
 
 import contextlib
@@ -10,31 +10,31 @@ import socket
 from typing import Final
 
 from firmware_sim.readiness import wait_ready
+from firmware_sim.serve import accept
 from firmware_sim.usb import usbip
 from firmware_sim.usb.descriptors import IN
 from firmware_sim.usb.device import DONE, ECONNRESET, EPIPE, Urb, UsbDevice
 
 _CHUNK: Final = 1 << 18
-# What a host may have under way, as Linux limits it for programs; and what it may leave unread.
-MAX_PENDING_BYTES: Final = 16 << 20
-MAX_UNREAD_BYTES: Final = 1 << 20
-_MOST_CONNECTIONS: Final = 16
+MAX_PENDING_BYTES: Final = 16 << 20  # of submitted transfers: Linux's own limit for programs
+MAX_UNREAD_BYTES: Final = 1 << 20  # of output that a host has not read
+_MAX_CONNECTIONS: Final = 16
 
 
 class Connection:
-    """One connection from a host: bytes in, bytes out, no socket.
+    """Protocol state of one connection: bytes in, bytes out, no socket.
 
     Parameters
     ----------
     server
-        Whose device it is about.
+        The server, which has the device.
 
     Attributes
     ----------
     out : bytearray
-        What is to be sent.
-    over : bool
-        Whether the host broke the protocol, or has had its answer: close when `out` is sent.
+        Bytes to be sent.
+    closing : bool
+        True if the host broke the protocol, or has its reply: close when `out` is sent.
     """
 
     def __init__(self, server: "Server") -> None:
@@ -50,14 +50,14 @@ class Connection:
         self.process()
 
     def process(self) -> None:
-        """Take what the host has sent, as long as it reads the answers."""
+        """Process what the host has sent, as long as it reads the replies."""
         while not self.closing and len(self.out) < MAX_UNREAD_BYTES:
             if not (self._message() if self.imported else self._operation()):
                 return
 
     @property
     def imported(self) -> bool:
-        """Whether this host has the device."""
+        """True if this host owns the device."""
         return self._server.owner is self
 
     # Before the import
@@ -149,7 +149,7 @@ class Connection:
         return True
 
     def _unlink(self, message: usbip.Unlink) -> None:
-        """Give a transfer up. If some of it was moved, it ends as a short one: nothing is lost."""
+        """Cancel a transfer. If a part was moved, it ends as a short one: nothing is lost."""
         urb = self._urbs.get(message.target)
         status = DONE
         if urb:
@@ -161,7 +161,7 @@ class Connection:
         self.out += usbip.UnlinkReply(message.seqnum, -status).pack()
 
     def complete(self) -> None:
-        """Answer the transfers that are done."""
+        """Send the replies of the transfers that are done."""
         for seqnum, urb in list(self._urbs.items()):
             if urb.status is not None:
                 del self._urbs[seqnum]
@@ -170,7 +170,7 @@ class Connection:
 
 
 class Server:
-    """Serves one device.
+    """Server of one device.
 
     Parameters
     ----------
@@ -180,9 +180,9 @@ class Server:
     Attributes
     ----------
     device : UsbDevice
-        The same.
+        The device.
     owner : Connection or None
-        Who has imported it.
+        The connection that has imported it.
     """
 
     def __init__(self, device: UsbDevice) -> None:
@@ -191,7 +191,7 @@ class Server:
         self._connections: dict[socket.socket, Connection] = {}
 
     def serve(self, listener: socket.socket, stop: int) -> None:
-        """Serve until something tells it to stop.
+        """Serve until ``stop`` becomes readable.
 
         Parameters
         ----------
@@ -210,26 +210,26 @@ class Server:
                 if stop in ready:
                     return
                 if listener in ready:
-                    self._accept(listener)
+                    self._accept(listener, stop)
                 for sock in taking:
                     if sock in ready:
                         self._read(sock)
                 self.device.advance()
                 if self.owner and self.device.plugged:
                     self.owner.complete()
-                elif self.owner:  # the end of the connection says it all
+                elif self.owner:  # unplugged: the end of the connection tells the host
                     self.owner.out.clear()
                     self.owner.closing = True
                 for sock in list(self._connections):
                     self._write(sock)
 
-    def _accept(self, listener: socket.socket) -> None:
-        sock, _ = listener.accept()
-        if len(self._connections) >= _MOST_CONNECTIONS:
+    def _accept(self, listener: socket.socket, stop: int) -> None:
+        sock = accept(listener, stop)
+        if sock is None:
+            return
+        if len(self._connections) >= _MAX_CONNECTIONS:
             sock.close()
             return
-        sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connections[sock] = Connection(self)
 
     def _read(self, sock: socket.socket) -> None:
@@ -259,7 +259,7 @@ class Server:
             self._close(sock)
 
     def _close(self, sock: socket.socket) -> None:
-        """Close a connection; who had the device has unplugged it."""
+        """Close a connection; if it owned the device, the device is unplugged."""
         connection = self._connections.pop(sock)
         sock.close()
         if self.owner is connection:

@@ -163,8 +163,8 @@ def exchange_badly(port: InProcessPort, wire: bytes) -> None:
         ("sim:x", "write sim:"),
         ("sim:?", "write sim:"),
         ("tcp:?size=1x1x1", "write sim:"),
-        ("sim:?sise=1x1x1", "'sise' .* did you mean 'size'"),
-        ("sim:?qqqq=1", "did you mean"),
+        ("sim:?sise=1x1x1", "'sise' .* did you mean size"),
+        ("sim:?qqqq=1", "there are size, format"),
         ("sim:?size=1x1x1&size=1x1x1", "'size' .* twice"),
         ("sim:?size=1", "size in .* three numbers"),
         ("sim:?size", "size in .* three numbers"),
@@ -174,8 +174,8 @@ def exchange_badly(port: InProcessPort, wire: bytes) -> None:
         ("sim:?fault=flap:1", "did you mean flip"),
         ("sim:?baud=9", "baud in .* 50 to"),
         ("sim:?seed=x", "seed in .* whole number"),
-        ("sim:?features=palette", "palette: take of line, box"),
-        ("sim:?lie=all", "lie all: take of grid"),
+        ("sim:?features=palette", "'palette': take of line, box"),
+        ("sim:?lie=all", "lie 'all': take of grid"),
     ],
 )
 def test_a_bad_url_is_refused_with_the_remedy(url: str, message: str) -> None:

@@ -1,13 +1,15 @@
-"""The program: its lines, its arguments, and how it ends."""
+"""``voxdisplay-sim``: output, arguments, signals, and a hostile environment."""
 
 import contextlib
 import json
 import os
+import resource
 import runpy
 import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from device_packets import (
     CLEAR,
     COMMIT,
     DOT,
+    INFO,
     SHOWN,
     data,
     hello,
@@ -24,16 +27,25 @@ from device_packets import (
     receive,
 )
 
-from firmware_sim import __main__ as program
+from firmware_sim import __main__ as entry
+from firmware_sim import faults, memory, npy, program, serve
+from firmware_sim.__main__ import main
 from firmware_sim.config import Config
 from firmware_sim.device import Device
-from firmware_sim.serve import (
-    listen_tcp,
-)
+from firmware_sim.device_on_line import DeviceOnLine
+from firmware_sim.in_process import open_in_process
+from firmware_sim.serve import listen_tcp, serve_tcp
 
 WAIT = 20  # seconds after which a test has failed; none takes so long
 
 ROOT = Path(__file__).parents[3]
+
+
+def exit_code(arguments: list[str]) -> int:
+    try:
+        return main(arguments)
+    except SystemExit as end:
+        return end.code
 
 
 @contextlib.contextmanager
@@ -91,14 +103,25 @@ def test_the_program_on_tcp() -> None:
         (["--size", "3x5"], "three numbers of voxels like 128x128x128"),
         (["--size", "0x5x5"], "take sides from 1 to 65535"),
         (["--format", "rgb"], "choose from"),
+        (["--size", "64x64"], "three numbers of voxels like 128x128x128"),
         (["--refresh", "fast"], "number of hertz"),
+        (["--refresh", "1e-9"], "take 0, or from 0.001"),
+        (["--refresh=-1"], "take 0, or from 0.001"),
+        (["--refresh", "1e9"], "take 0, or from 0.001"),
         (["--baud", "fast"], "whole number"),
         (["--baud", "49"], "take a number from 50"),
         (["--rx-buffer", "9"], "take a number from 1101"),
         (["--fault", "flop=1"], "did you mean flip"),
-        (["--features", "palette"], "palette: take of line, box"),
-        (["--lie", "all"], "lie all: take of grid"),
+        (["--fault", "delay=0.1"], "write delay=SECONDS@RATE"),
+        (["--fault", "reboot@0"], "write reboot=RATE or reboot@BYTES"),
+        (["--fault", "side.flip=1"], "the prefix is down. (to the device) or up. (from it)"),
+        (["--features", "palette"], "unknown feature 'palette': take of line, box"),
+        (["--lie", "all"], "unknown lie 'all': take of grid"),
         (["--seed", "x"], "whole number"),
+        (["--seed", "9" * 5000], "9...' is no whole number"),
+        (["--dump", ""], "'' is no file name"),
+        (["--dump", "/"], "'/' is no file name"),
+        (["--link", "."], "'.' is no file name"),
         (["--tcp", "5000"], "HOST:PORT like 127.0.0.1:5000"),
         (["--tcp", "localhost:99999"], "HOST:PORT like 127.0.0.1:5000"),
         (["--tcp", "0.0.0.0:0"], "--allow-remote"),
@@ -109,26 +132,38 @@ def test_the_program_on_tcp() -> None:
         (["--usbip", "0.0.0.0:0"], "--allow-remote"),
         (["--usb-class", "vendor"], "--usb-class is for --usbip"),
         (["--dump", "/nowhere/at/all.npy"], "/nowhere"),
-        (["--link", "/nowhere/at/all"], "/nowhere"),
+        (["--link", "/nowhere/at/all"], "link /nowhere/at/all: No such file or directory"),
+        (["--tcp", "no.such.host.invalid:1"], "no address 'no.such.host.invalid'"),
+        (["--tcp", "." * 300 + ":1"], "no address '....."),
     ],
 )
 def test_bad_arguments_are_refused_with_the_remedy(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit) as end:
-        program.main(arguments)
-    assert end.value.code == 2
-    assert message in capsys.readouterr().err
+    assert exit_code(arguments) == 2
+    err = capsys.readouterr().err
+    assert message in err
+    assert len(err) < 500, "it is not buried in a list of all options"
 
 
-def test_help_has_examples(
+def test_help_lists_examples_and_every_fault_with_its_syntax(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["voxdisplay-sim", "--help"])
     with pytest.raises(SystemExit) as end:
-        runpy.run_path(program.__file__, run_name="__main__")
+        runpy.run_path(entry.__file__, run_name="__main__")
     assert end.value.code == 0
-    assert "voxdisplay-sim --tcp 127.0.0.1:5000" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "voxdisplay-sim --tcp 127.0.0.1:5000" in text
+    assert "64x64x64 or 64,64,64" in text
+    assert len(faults.KINDS) == 11
+    for kind in faults.KINDS:
+        for form in faults.forms(kind):
+            assert f"  {form} " in text or f" or {form} " in text
+            written = form.replace("SECONDS", "0.1").replace("RATE", "1e-3").replace("BYTES", "9")
+            assert [spec.kind for spec in faults.parse_faults(written)] == [kind]
+    assert text.isascii()
+    assert max(map(len, text.splitlines())) <= 100
 
 
 @pytest.mark.parametrize(
@@ -164,7 +199,7 @@ def test_the_program_in_this_process(
     monkeypatch.setattr(program, "_announce", announce_and_end)
     arguments = [str(tmp_path / "port") if a == "LINK" else a for a in arguments]
     before = signal.getsignal(signal.SIGTERM)
-    assert program.main(arguments) == 0
+    assert main(arguments) == 0
     assert signal.getsignal(signal.SIGTERM) is before
     assert json.loads(capsys.readouterr().out)["port"].startswith(port)
     assert list(tmp_path.iterdir()) == []
@@ -184,3 +219,245 @@ def test_a_picture_that_cannot_be_dumped_does_not_stop_the_device(
     device.receive(data(1, 1, b"", CLEAR | COMMIT))
     assert "not dumped" in capsys.readouterr().err
     assert device.swaps == 2
+
+
+# Signals
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_before_anything_is_open_ends_the_program_cleanly(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with entry._stop_on_signal() as stop:
+        for _ in range(70_000 if name == "SIGINT" else 1):  # more than a pipe holds
+            signal.raise_signal(getattr(signal, name))
+        assert program.run(["--size", "3x5x7"], stop) == 0
+    assert json.loads(capsys.readouterr().out)["size"] == "3x5x7"
+
+
+def test_the_end_of_the_terminal_ends_the_program_and_removes_its_link(tmp_path: Path) -> None:
+    with started("--link", str(tmp_path / "port"), "--size", "3x5x7", end=signal.SIGHUP):
+        assert (tmp_path / "port").is_symlink()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_under_nohup_the_program_outlives_its_terminal() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with entry._stop_on_signal():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+# Output that cannot be written
+
+
+def run_with(redirection: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program in a shell with some redirection; its own dump ends it by SIGTERM."""
+    script = f"exec {sys.executable} -c '{ENDS_ITSELF}' {' '.join(arguments)} {redirection}"
+    return subprocess.run(
+        ["/bin/sh", "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        timeout=WAIT,
+    )
+
+
+ENDS_ITSELF = """
+import os, signal, sys
+from firmware_sim import program
+from firmware_sim.__main__ import main
+announce = program._announce
+def announce_and_end(place):
+    announce(place)
+    os.kill(os.getpid(), signal.SIGTERM)
+program._announce = announce_and_end
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("redirection", [">&-", ">&- 2>&-", "<&- >&- 2>&-", "2>&-"])
+def test_closed_output_does_not_stop_the_program(redirection: str) -> None:
+    done = run_with(redirection, "--size", "3x5x7")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no /dev/full here")
+@pytest.mark.parametrize("redirection", [">/dev/full", ">/dev/full 2>/dev/full"])
+def test_output_to_a_full_disk_does_not_stop_the_program(redirection: str) -> None:
+    done = run_with(redirection, "--size", "3x5x7", "--tcp", "127.0.0.1:0")
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    if "2>" not in redirection:
+        assert "No space left on device" in done.stderr
+        assert '"port": "tcp://127.0.0.1:' in done.stderr, "the port is told all the same"
+
+
+def test_a_dump_that_fails_with_stderr_closed_does_not_stop_the_device(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device = Device(Config((3, 5, 7), refresh=0))
+    program._dump_swaps(device, tmp_path / "front.npy")
+    monkeypatch.setattr(program, "write_npy", _fail)
+    monkeypatch.setattr(sys, "stderr", None)
+    device.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
+    assert device.swaps == 1
+
+
+def _fail(*_: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("locale", ["C", "en_US.ISO-8859-1", "tr_TR.UTF-8"])
+def test_any_locale_and_any_path(locale: str, tmp_path: Path) -> None:
+    dump = os.fsencode(tmp_path) + b"/\xc4\x9f\xff.npy"  # no text in any locale
+    environment = {**os.environ, "LC_ALL": locale, "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-c", ENDS_ITSELF, "--size", "3x5x7", "--dump", dump]
+    for arguments, code in ((command, 0), ([*command, "--link", dump], 2)):
+        done = subprocess.run(
+            arguments, env=environment, capture_output=True, check=False, cwd=ROOT, timeout=WAIT
+        )
+        assert done.returncode == code, done.stderr
+        assert b"Traceback" not in done.stderr
+    assert [os.fsencode(path) for path in tmp_path.iterdir()] == [dump]
+
+
+# Files
+
+
+def test_only_files_are_replaced_by_a_dump(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program of root must not replace /dev/null."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    for name in ("pipe", "link", ""):
+        assert exit_code(["--dump", str(tmp_path / name)]) == 2
+        assert "exists and is no regular file" in capsys.readouterr().err
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_nothing_is_written_through_a_link_laid_beside_the_dump(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(npy.secrets, "token_hex", lambda _: "guessed")
+    (tmp_path / "victim").write_text("precious")
+    (tmp_path / ".front.npy.guessed.tmp").symlink_to(tmp_path / "victim")
+    with pytest.raises(OSError, match=r"front\.npy cannot be written"):
+        program._dump_swaps(Device(Config((3, 5, 7))), tmp_path / "front.npy")
+    assert (tmp_path / "victim").read_text() == "precious"
+
+
+def test_a_full_disk_leaves_no_half_of_a_dump(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"ulimit -f 1; exec {sys.executable} -m firmware_sim --dump front.npy"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        timeout=WAIT,
+    )
+    assert done.returncode == 2
+    assert "front.npy cannot be written: File too large" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_that_another_program_took_over_stays(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    with serve.symbolic_link(link, "/dev/one"):
+        with serve.symbolic_link(link, "/dev/two"):
+            assert str(link.readlink()) == "/dev/two"
+        with serve.symbolic_link(link, "/dev/three"):
+            link.unlink()
+        link.symlink_to("/dev/four")
+    assert str(link.readlink()) == "/dev/four"
+
+
+# Ports and limits of the system
+
+
+def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with listen_tcp("127.0.0.1", 0) as listener:
+        port = listener.getsockname()[1]
+        for kind in ("--tcp", "--usbip"):
+            assert exit_code([kind, f"127.0.0.1:{port}"]) == 2
+            err = capsys.readouterr().err
+            assert f"cannot listen on 127.0.0.1 port {port}: it is in use" in err
+
+
+def test_connections_are_accepted_again_when_descriptors_are_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The device goes on when the process has too many files open, and when a client has gone."""
+    failures = iter([OSError(24, "Too many open files"), ConnectionAbortedError()])
+    accept = socket.socket.accept
+
+    def fail_twice(listener: socket.socket) -> tuple[socket.socket, object]:
+        for error in failures:
+            raise error
+        return accept(listener)
+
+    monkeypatch.setattr(socket.socket, "accept", fail_twice)
+    monkeypatch.setattr(serve, "_ACCEPT_RETRY_S", 0.01)
+    stop, stopper = os.pipe()
+    wire = DeviceOnLine(Device(Config((3, 5, 7))))
+    with listen_tcp("127.0.0.1", 0) as listener:
+        server = threading.Thread(target=serve_tcp, args=(wire, listener, stop))
+        server.start()
+        try:
+            with socket.create_connection(listener.getsockname(), WAIT) as connection:
+                connection.sendall(hello())
+                assert receive(connection, 1)[0].kind == INFO
+        finally:
+            os.write(stopper, b"\0")
+            server.join(WAIT)
+    os.close(stop)
+    os.close(stopper)
+    assert next(failures, None) is None
+
+
+def test_more_open_files_than_select_takes() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 1300:
+        pytest.skip("this process may not have so many files open")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1300), hard))
+    with contextlib.ExitStack() as stack:
+        stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        files = [stack.enter_context(Path(os.devnull).open()) for _ in range(1100)]
+        command = [sys.executable, "-m", "firmware_sim", "--size", "3x5x7", "--tcp", "127.0.0.1:0"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, cwd=ROOT, pass_fds=[file.fileno() for file in files]
+        )
+        stack.callback(process.communicate)
+        stack.callback(process.kill)
+        _, _, port = json.loads(process.stdout.readline())["port"].rpartition(":")
+        with socket.create_connection(("127.0.0.1", int(port)), WAIT) as connection:
+            connection.sendall(hello())
+            assert receive(connection, 1)[0].kind == INFO
+        process.terminate()
+        assert process.wait(WAIT) == 0
+
+
+def test_a_grid_beyond_the_memory_of_the_machine(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(memory, "_memory_bytes", lambda: 3_000_000)
+    assert exit_code(["--size", "128x128x128"]) == 2
+    assert "needs 18 MB of memory, more than this machine has" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="take a smaller one"):
+        open_in_process("sim:?size=128x128x128")
+
+
+@pytest.mark.parametrize("size", ["3x5x7", "3,5,7", "3X5X7"])
+def test_both_notations_of_sizes(size: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with entry._stop_on_signal() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        assert program.run(["--size", size], stop) == 0
+    assert json.loads(capsys.readouterr().out)["size"] == "3x5x7"
+    port = open_in_process(f"sim:?size={size}")
+    assert port.bench.snapshot().grid == (3, 5, 7)
+    port.close()

@@ -1,6 +1,7 @@
 """The tap, from its own description alone; and the viewer that shows it."""
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -18,8 +19,9 @@ from pathlib import Path
 import pytest
 from device_packets import CLEAR, COMMIT, DOT, data, hello
 
-from firmware_sim import __main__ as program
+from firmware_sim import program, serve
 from firmware_sim import viewer as viewers
+from firmware_sim.__main__ import main
 from firmware_sim.bench import Bench
 from firmware_sim.config import Config
 from firmware_sim.device import Device
@@ -254,8 +256,17 @@ def install(monkeypatch: pytest.MonkeyPatch, folder: Path, text: str | None) -> 
     monkeypatch.setattr(viewers, "entry_points", lambda **_: entries)
 
 
+@pytest.fixture
+def never() -> Iterator[int]:
+    """Yield a descriptor that never becomes readable."""
+    reader, writer = os.pipe()
+    yield reader
+    os.close(reader)
+    os.close(writer)
+
+
 def test_a_viewer_runs_as_long_as_it_is_wanted(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int
 ) -> None:
     install(
         monkeypatch,
@@ -266,7 +277,7 @@ def test_a_viewer_runs_as_long_as_it_is_wanted(
         time.sleep(60)
         """,
     )
-    with Tap(device()) as tap, viewers.viewer(tap, "127.0.0.1:0", "a title") as url:
+    with Tap(device()) as tap, viewers.viewer(tap, "127.0.0.1:0", "a title", never) as url:
         told, _, number = url.rpartition(" ")
         assert told == f"--tap {tap.address} --listen 127.0.0.1:0 --title a title"
         os.kill(int(number), 0)
@@ -276,19 +287,55 @@ def test_a_viewer_runs_as_long_as_it_is_wanted(
 
 @pytest.mark.parametrize("line", ["", "oops", '["url"]', '{"place": 1}'])
 def test_a_viewer_that_does_not_start(
-    line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int
 ) -> None:
     install(monkeypatch, tmp_path, f"print({line!r})")
     with (
         Tap(device()) as tap,
         pytest.raises(viewers.ViewerError, match="a_viewer did not start"),
-        viewers.viewer(tap, "127.0.0.1:0", ""),
+        viewers.viewer(tap, "127.0.0.1:0", "", never),
     ):
         pass
 
 
+def test_a_signal_ends_the_program_while_a_viewer_has_not_started(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(
+        monkeypatch,
+        tmp_path,
+        """
+        import os, signal, time
+        os.kill(os.getppid(), signal.SIGTERM)
+        time.sleep(60)
+        """,
+    )
+    assert main(["--size", "3x5x7", "--view"]) == 0
+    assert json.loads(capsys.readouterr().out)["view"] == ""
+
+
+def test_a_watcher_for_which_no_descriptor_is_left_is_served_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The thread of the tap survives that the process has too many files open."""
+    failures = iter([OSError(errno.EMFILE, "Too many open files"), ConnectionAbortedError()])
+    accept = socket.socket.accept
+
+    def fail_twice(listener: socket.socket) -> tuple[socket.socket, object]:
+        for error in failures:
+            raise error
+        return accept(listener)
+
+    monkeypatch.setattr(serve.socket.socket, "accept", fail_twice)
+    monkeypatch.setattr(serve, "_ACCEPT_RETRY_S", 0.01)
+    with tapped(device()) as tap, watch(tap) as watcher:
+        watcher.sendall(NOTHING)
+        assert take(watcher)[0][0] == b"VXT1"
+    assert next(failures, None) is None
+
+
 def test_a_viewer_that_does_not_end_is_ended(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int
 ) -> None:
     install(
         monkeypatch,
@@ -302,7 +349,7 @@ def test_a_viewer_that_does_not_end_is_ended(
     )
     monkeypatch.setattr(viewers, "_WAIT_S", 0.05)
     began = time.monotonic()
-    with Tap(device()) as tap, viewers.viewer(tap, "127.0.0.1:0", ""):
+    with Tap(device()) as tap, viewers.viewer(tap, "127.0.0.1:0", "", never):
         pass
     assert time.monotonic() - began < WAIT
 
@@ -311,17 +358,14 @@ def test_without_a_viewer_the_program_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     install(monkeypatch, tmp_path, None)
-    with pytest.raises(SystemExit) as end:
-        program.main(["--size", "3x5x7", "--view"])
-    assert end.value.code == 2
+    assert main(["--size", "3x5x7", "--view"]) == 2
     assert "no viewer is installed: pip install 'voxdisplay[view]'" in capsys.readouterr().err
 
 
 def test_the_program_shows_itself_here_only(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit):
-        program.main(["--size", "3x5x7", "--view", "0.0.0.0:0"])
+    assert main(["--size", "3x5x7", "--view", "0.0.0.0:0"]) == 2
     assert "anyone who reaches 0.0.0.0 could look on" in capsys.readouterr().err
     install(
         monkeypatch,
@@ -342,7 +386,7 @@ def test_the_program_shows_itself_here_only(
     dump = tmp_path / "front.npy"
     for arguments, address in (([], "127.0.0.1:0"), (["[::1]:5"], "[::1]:5")):
         command = ["--size", "3x5x7", "--dump", str(dump), "--view", *arguments]
-        assert program.main(command) == 0
+        assert main(command) == 0
         assert json.loads(capsys.readouterr().out)["view"] == address
 
 

@@ -311,7 +311,7 @@ def test_closing_wakes_who_waits():
 
 
 def test_one_connection_too_many_is_cut_and_others_may_go_as_they_like(monkeypatch):
-    monkeypatch.setattr(usbip_server, "_MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(usbip_server, "_MAX_CONNECTIONS", 3)
     with serving(GadgetDevice()) as address, contextlib.ExitStack() as stack:
         socks = [stack.enter_context(socket.create_connection(address)) for _ in range(4)]
         cut, _, _ = select.select(socks, [], [], WAIT_S)
