@@ -3,8 +3,9 @@
 The emulator renders nothing itself. A viewer is a module named in the entry point group
 ``voxdisplay_sim.viewer``. It runs in a process of its own, so that it takes no time of the device:
 ``python -m MODULE --tap HOST:PORT --listen HOST:PORT --title TEXT``, and ``--allow-origin ORIGIN``
-for each further origin whose pages may show it. Its first line on stdout is a JSON object with ``url``, the address for the browser; without such a line it has failed, and has
-reported why on stderr. It ends when the tap does.
+for each further origin whose pages may show it. Its first line on stdout is a JSON object with
+``url``, the address for the browser; without such a line it has failed, and has reported why on
+stderr. It ends when the tap does.
 """
 
 import contextlib
