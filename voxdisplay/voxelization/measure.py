@@ -6,15 +6,18 @@ no code with the methods it judges: curves are sampled here anew, by bisection.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import complete
+from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges
 from voxdisplay.voxelization.length_estimate import estimated_min_length
-from voxdisplay.voxelization.spatial_hash import COLUMNS, SpatialHash
+from voxdisplay.voxelization.spatial_hash import COLUMNS, PAIRS_PER_BLOCK, SpatialHash
 
 Voxels = NDArray[np.integer]
 
@@ -28,6 +31,8 @@ MAX_SEGMENTS = 50_000_000
 MIN_SAG_SAMPLES, SAG_SAMPLES_PER_VOXEL = 1 << 15, 256
 # A candidate segment may be this much further away than the nearest, and hold the nearest point.
 SLACK = 4 * SAG
+# Size of the cells, in voxels, of which consecutive segments have one box.
+BOX = 0.25
 GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -185,27 +190,84 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
     t, begin, solid = _polyline(curve, _sag_budget(voxels), hints)
     after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
     t_end, end = t[after], begin[:, after]
-    middle = (begin + end) / 2
+    boxes = _Boxes(begin, end)
     best = np.full(centres.shape[1], np.inf)
     todo = np.arange(best.size)
     size = 1.5
     while todo.size:
-        cells = SpatialHash(np.floor(middle / size))
-        for of, segment in cells.neighbours(np.floor(centres[:, todo] / size)):
-            centre = centres[:, todo[of]]
-            rough = _segment_distances(centre, begin[:, segment], end[:, segment])
-            voxel, nearest = _group_minima(of, rough)
-            close = rough <= nearest[np.searchsorted(voxel, of)] + SLACK
-            arc = segment[close]
-            exact = _arc_distances(curve, centre[:, close], t[arc], t_end[arc])
-            _, best[todo[voxel]] = _group_minima(of[close], exact)
-        # Whatever was not looked at is further off than a cell, less half a segment.
-        todo = todo[best[todo] > size - SEGMENT / 2 - SLACK]
+        cells = SpatialHash(np.floor(boxes.middle / size))
+        for of, box in cells.neighbours(np.floor(centres[:, todo] / size)):
+            for voxel_of, segment in boxes.candidates(centres[:, todo], of, box):
+                centre = centres[:, todo[voxel_of]]
+                rough = _segment_distances(centre, begin[:, segment], end[:, segment])
+                voxel, nearest = _group_minima(voxel_of, rough)
+                close = rough <= nearest[np.searchsorted(voxel, voxel_of)] + SLACK
+                arc = segment[close]
+                exact = _arc_distances(curve, centre[:, close], t[arc], t_end[arc])
+                _, best[todo[voxel]] = _group_minima(voxel_of[close], exact)
+        # Whatever was not looked at is further off than a cell, less half a box.
+        todo = todo[best[todo] > size - boxes.largest - SLACK]
         size *= 4
     return best
 
 
-@np.errstate(all="ignore")
+class _Boxes:
+    """Boxes around consecutive segments in one small cell: one for many where they are short.
+
+    Parameters
+    ----------
+    begin, end : (3, n) float64 arrays
+        The ends of the segments, along the curve.
+
+    """
+
+    def __init__(self, begin: Floats, end: Floats) -> None:
+        cell = np.floor((begin + end) / (2 * BOX))
+        opens = np.append(True, (cell[:, 1:] != cell[:, :-1]).any(axis=0)).nonzero()[0]
+        self._first = opens
+        self._count = np.diff(opens, append=begin.shape[1])
+        low = np.minimum.reduceat(np.minimum(begin, end), opens, axis=1)
+        high = np.maximum.reduceat(np.maximum(begin, end), opens, axis=1)
+        self.middle = (low + high) / 2
+        half = high - self.middle
+        self._radius = np.sqrt((half * half).sum(axis=0))
+        self.largest = float(self._radius.max(initial=0.0))
+
+    def candidates(self, centres: Floats, of: Ints, box: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Pair voxels with the segments among which their nearest ones are.
+
+        Parameters
+        ----------
+        centres : (3, m) float64 array
+            Of the voxels.
+        of, box : (k,) int64 arrays
+            Indices of voxels, ascending, and of boxes near them.
+
+        Yields
+        ------
+        of, segment : (j,) int64 arrays
+            Indices of voxels, ascending, and of segments. All pairs of a voxel come together.
+
+        """
+        offset = centres[:, of] - self.middle[:, box]
+        apart = np.sqrt((offset * offset).sum(axis=0))
+        voxel, farthest = _group_minima(of, apart + self._radius[box])
+        near = apart - self._radius[box] <= farthest[np.searchsorted(voxel, of)] + SLACK
+        of, box = of[near], box[near]
+        count = self._count[box]
+        total = np.cumsum(count)
+        firsts = np.flatnonzero(np.diff(of, prepend=-1, append=-1))  # of voxels, and the end
+        start = 0
+        while start < firsts.size - 1:
+            done = int(total[firsts[start] - 1]) if firsts[start] else 0
+            reached = np.searchsorted(total[firsts[1:] - 1], done + PAIRS_PER_BLOCK, side="right")
+            stop = max(int(reached), start + 1)
+            some = slice(firsts[start], firsts[stop])
+            segments = expand_ranges(self._first[box[some]], count[some])
+            yield np.repeat(of[some], count[some]), segments
+            start = stop
+
+
 def coverage(voxels: Voxels, curve: Curve) -> float:
     """Measure how far a curve gets away from the voxels that should show it.
 
@@ -294,7 +356,10 @@ def _polyline(
         if t.size > unchecked:
             unchecked = MAX_SEGMENTS
             if t.size > MAX_SEGMENTS or estimated_min_length(curve)[0] > MAX_SEGMENTS * SEGMENT:
-                raise ValueError("the curve is too long or too rough to measure distances from it")
+                raise CurveError(
+                    "the curve is too long or too rough to measure distances from it",
+                    hint="measure a shorter range of t, or a smoother curve",
+                )
     length = np.diff(points, axis=1)
     return t, points, np.asarray((length * length).sum(axis=0) <= 4 * SEGMENT * SEGMENT)
 

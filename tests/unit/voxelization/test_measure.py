@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from space_curves import Function, chain, paper_curve
 
+from voxdisplay.curves import Polyline
 from voxdisplay.voxelization import measure
 
 
@@ -144,3 +145,22 @@ def test_a_curve_without_end_is_not_measured(monkeypatch: pytest.MonkeyPatch) ->
         measure.distances(
             np.zeros((1, 3), dtype=int), Function(lambda t: (t, t, 40 * np.sin(1e9 * t)))
         )
+
+
+def test_work_grows_with_the_points_of_a_dense_curve_and_no_faster() -> None:
+    def asked(count: int) -> int:
+        """Count the points asked for to measure 90 voxels along so many vertices."""
+        t = np.linspace(0, 1, count)
+        curve = Polyline(np.stack((5 + 90 * t, 20 + 9 * np.sin(5 * t), 3 + 2 * t), axis=1))
+        asked_for = []
+
+        def counted(t: np.ndarray) -> tuple[np.ndarray, ...]:
+            asked_for.append(t.size)
+            return tuple(curve.position(t))
+
+        same = Function(counted, *curve.t_range)
+        same.breaks = curve.breaks
+        measure.distances(np.array([[x, 20, 3] for x in range(5, 95)]), same)
+        return sum(asked_for)
+
+    assert asked(40_000) < 5 * asked(10_000)
