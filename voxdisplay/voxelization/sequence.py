@@ -5,7 +5,7 @@ A sequence is a value. It knows no colour and no display; ``clip`` is told a dis
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -63,8 +63,22 @@ class Report:
     undefined: tuple[SingularPoint, ...] = ()
     jumps: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        rarely = [f"{name}={getattr(self, name)}" for name in ("undefined", "jumps")]
+        return "Report({})".format(
+            ", ".join(
+                [
+                    f"voxels={self.voxels}, closed={self.closed}, pieces={self.pieces}",
+                    f"e_max={self.e_max:.4g}, e_av={self.e_av:.4g}",
+                    f"gaps={self.gaps}, contacts={self.contacts}",
+                    f"seconds={self.seconds:.2g}, certified={self.certified}",
+                    *[each for each in rarely if not each.endswith("=()")],
+                ]
+            )
+        )
 
-@dataclass(eq=False, init=False)
+
+@dataclass(eq=False, init=False, repr=False)
 class Sequence:
     """An ordered, 26-connected list of voxels along a curve.
 
@@ -91,10 +105,10 @@ class Sequence:
     voxels: NDArray[np.int32]
     closed: bool
     starts: NDArray[np.int64]
-    t: NDArray[np.float64] = field(repr=False)
-    curve: Curve = field(repr=False)
-    seconds: float = field(default=0.0, repr=False)
-    proof: Certificate | str | None = field(default=None, repr=False)
+    t: NDArray[np.float64]
+    curve: Curve
+    seconds: float = 0.0
+    proof: Certificate | str | None = None
 
     def __init__(
         self,
@@ -121,6 +135,18 @@ class Sequence:
 
     def __len__(self) -> int:
         return len(self.voxels)
+
+    def __repr__(self) -> str:
+        count, pieces = len(self), len(self.starts)
+        low, high = (
+            tuple(bound(axis=0).tolist()) if count else ()
+            for bound in (self.voxels.min, self.voxels.max)
+        )
+        return (
+            f"<Sequence: {count} voxel{'s' * (count != 1)}, "
+            f"{'closed' if self.closed else 'open'}, {pieces} piece{'s' * (pieces != 1)}, "
+            f"from {low} to {high}>"
+        )
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Pickling forgets that arrays are read-only.

@@ -322,7 +322,9 @@ def test_voxelize_is_a_public_function() -> None:
     curve = Function(lambda t: (9 * t, t, t))
     assert np.array_equal(vd.voxelize(curve).voxels, voxelize(curve).voxels)
     assert vd.voxelize is voxelize
-    with pytest.raises(ValueError, match="no method 'magic'"):
+    with pytest.raises(
+        ValueError, match="method: one of 'grid-plane', 'march' is wanted, not 'magic'"
+    ):
         voxelize(curve, method="magic")
 
 
@@ -334,6 +336,15 @@ def test_sequences_are_values() -> None:
         sequence.voxels[0] = 0
     assert sequence.report is sequence.report
     assert sequence.report.seconds > 0
+
+
+def test_representations_fit_on_a_line() -> None:
+    sequence = voxelize(Function(lambda t: (9.5 * t, 2.0 + 5 * (t > 0.5), t)))
+    assert repr(sequence) == "<Sequence: 11 voxels, open, 2 pieces, from (0, 2, 0) to (9, 7, 1)>"
+    assert repr(sequence.report).startswith("Report(voxels=11, closed=False, pieces=2, e_max=0.")
+    assert "jumps=(0.50" in repr(sequence.report)
+    whole = voxelize(Function(lambda t: (9.5 * t, 2.0, t)))
+    assert "jumps" not in repr(whole.report)
 
 
 # ---------------------------------------------------------------------------------- clipping
