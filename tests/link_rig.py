@@ -122,7 +122,7 @@ class Rig:
         self._tickets[ticket] = frame
         return ticket
 
-    def present_on(self, base, frame):
+    def present_difference(self, base, frame):
         """Present a frame as its difference from another, which is on display."""
         most = self.device.config.max_payload
         self._pages.add(frame.array().tobytes())
@@ -212,7 +212,7 @@ class Rig:
         assert snapshot.pixels == frame.array().tobytes()
         assert snapshot.digest == frame.digest()
 
-    def assert_told(self, ticket):
+    def assert_reported(self, ticket):
         """The host was told that a frame is on display, with its digest, and of none twice."""
         assert len(set(self.shown)) == len(self.shown)
         last = [event for event in self.events if isinstance(event, FrameShown)][-1]

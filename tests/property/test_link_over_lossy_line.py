@@ -63,7 +63,7 @@ def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, dev
     tickets = [rig.present(frame) for frame in drawn]
     rig.run()
     rig.assert_shows(drawn[-1])
-    rig.assert_told(tickets[-1])
+    rig.assert_reported(tickets[-1])
     assert rig.link.counters.retransmitted == 0
     assert rig.link.counters.sessions == 1
     sent = Counter(body[0] >> 4 for body in rig.sent)
@@ -98,7 +98,7 @@ def test_after_the_last_fault_the_last_frame_is_shown(seed, device, where):
     tickets = [rig.present(frame) for frame in drawn[2:]]
     rig.run()
     rig.assert_shows(drawn[-1])
-    rig.assert_told(tickets[-1])
+    rig.assert_reported(tickets[-1])
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
@@ -143,7 +143,7 @@ def test_a_device_that_loses_its_power(seed, device, when, times):
     tickets.append(rig.present(drawn[0]))
     rig.run()
     rig.assert_shows(drawn[0])
-    rig.assert_told(tickets[-1])
+    rig.assert_reported(tickets[-1])
     assert rig.restarts <= times
 
 
@@ -160,7 +160,7 @@ def test_a_line_that_stalls(seed, device, stall_s, when):
     last = rig.present(drawn[0])
     rig.run()
     rig.assert_shows(drawn[0])
-    rig.assert_told(last)
+    rig.assert_reported(last)
     if stall_s < 0.7:  # fewer than four questions long: it is sat out
         assert rig.link.counters.sessions == 1
 
@@ -197,7 +197,7 @@ def test_numbers_wrap_around():
     rig.down.faults = None
     rig.run()
     rig.assert_shows(drawn[699 % 6])
-    rig.assert_told(last)
+    rig.assert_reported(last)
     assert rig.link.counters.packets > 5 * 256
     assert rig.link.counters.sessions == 1
     assert len({body[2] for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA}) == 256
@@ -237,18 +237,18 @@ def test_differences_on_a_bad_line(seed, device, what, when):
             rig.down.faults = faults_of(rig.rng)
         if what in {"up", "both"}:
             rig.up.faults = faults_of(rig.rng)
-        ticket = rig.present_on(base, frame)
+        ticket = rig.present_difference(base, frame)
         for _ in range(when):
             rig.step()
         if what == "power":
             was_shown = ticket in rig.shown
             rig.power_cycle()
             if was_shown:
-                ticket = rig.present_on(frame, frame)
+                ticket = rig.present_difference(frame, frame)
         rig.down.faults = rig.up.faults = None
         rig.run()
         rig.assert_shows(frame)
-        rig.assert_told(ticket)
+        rig.assert_reported(ticket)
     if not what:
         data = [body for body in rig.sent if body[0] >> 4 == spec.TYPE_DATA]
         flags = [body[0] & spec.DATA_FLAG_CLEAR for body in data]
@@ -319,7 +319,7 @@ def test_a_refused_frame_is_told_and_the_next_is_shown():
         ticket = rig.present(frame)
         rig.run()
         rig.assert_shows(frame)
-        rig.assert_told(ticket)
+        rig.assert_reported(ticket)
     assert rig.restarts == 0
 
 
