@@ -42,20 +42,20 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
             "device_commands", "read", "Save what a display shows as a numpy array."
         ),
         "view": TableEntry("view", "view", "Show a display live, in a browser or this terminal."),
+        "bench": TableEntry("bench", "bench", "Measure the speed of this machine and a port."),
     },
     "Work without a display": {
         "voxelize": TableEntry("voxelize", "voxelize", "Write the voxels of a scene's curves."),
         "preview": TableEntry("preview", "preview", "Draw a scene as a picture or a film."),
         "plan": TableEntry("plan", "plan_command", "Print bytes and frames per second of a scene."),
+        "schema": TableEntry("documents", "schema", "Print the path of the JSON Schema of scenes."),
     },
     "Develop a device": {
         "conformance": TableEntry(
             "conformance", "conformance", "Check a device against protocol.md."
         ),
         "annotate": TableEntry("annotate", "annotate", "Explain a capture of push --capture."),
-        "bench": TableEntry("bench", "bench", "Measure this machine and a port."),
         "protocol": TableEntry("documents", "protocol", "Print the path of protocol.md."),
-        "schema": TableEntry("documents", "schema", "Print the path of the scene schema."),
     },
 }
 ENTRIES: Final = {name: entry for group in COMMANDS.values() for name, entry in group.items()}

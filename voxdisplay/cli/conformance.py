@@ -34,7 +34,7 @@ _EXIT_BROKEN = 1
     epilog="""\b
     Examples:
       voxdisplay conformance --port /dev/ttyUSB0
-      voxdisplay conformance --port tcp://10.0.0.9:5000 --only 7.3 --only 9/ack-*
+      voxdisplay conformance --port tcp://10.0.0.9:5000 --only 7.3 --only 9/status
       voxdisplay conformance --only digest --list
 
     Exit codes: 0 all that concerns the device holds; 1 something does not, or could not be
@@ -65,7 +65,7 @@ _EXIT_BROKEN = 1
     type=int,
     default=0,
     metavar="N",
-    help="Seed of all that is random.  [default: 0]",
+    help="Seed of the random numbers.  [default: 0]",
 )
 @click.option("--verbose", "-v", is_flag=True, help="Show all packets of every check.")
 @quiet_option

@@ -58,8 +58,12 @@ def _print_version(context: click.Context, _parameter: click.Parameter, value: b
     3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted;
     143 ended by SIGTERM; 129 the terminal was closed.
 
-    Shell completion: eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)", likewise zsh_source
-    and fish_source.""",
+    \b
+    Shell completion, for the start-up file of the shell:
+      bash  eval "$(_VOXDISPLAY_COMPLETE=bash_source voxdisplay)"
+      zsh   eval "$(_VOXDISPLAY_COMPLETE=zsh_source voxdisplay)"
+      fish  _VOXDISPLAY_COMPLETE=fish_source voxdisplay | source
+    """,
 )
 @click.option(
     "--version",

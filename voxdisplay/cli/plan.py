@@ -84,8 +84,8 @@ def plan_command(
 ) -> None:
     """Print how many packets and bytes SCENE takes, and how many frames per second a line carries.
 
-    SCENE is a JSON file, or - for stdin. Nothing is shown. Counted is what `push` sends to a
-    display that shows something else, once the rate of the line is known.
+    SCENE is a JSON file, or - for stdin. Nothing is shown. Counts what `push` sends to a display
+    that shows something else, once the rate of the line is known.
     """
     from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415 - as in push
     from voxdisplay.display.plan import COMMON_LINES, Line, Receiver, plan  # noqa: PLC0415

@@ -89,7 +89,7 @@ _MAX_PIXELS: Final = 1 << 29
     metavar="FPS",
     help="Pictures per second of a film, 1 to 60.  [default: 20]",
 )
-@click.option("--plain", is_flag=True, help="Draw no box, axes and halo.")
+@click.option("--plain", is_flag=True, help="Draw without box, axes and halo.")
 @quiet_option
 def preview(
     *,

@@ -60,7 +60,7 @@ _ONE_COLOR_LEGENDS: Final = {
 @click.option(
     "--check",
     is_flag=True,
-    help="Read the page back and print of each axis whether it is right, mirrored or swapped in "
+    help="Read the page back and report for each axis whether it is right, mirrored or swapped in "
     "the display's memory. Exit code 1 if one is not right.",
 )
 @quiet_option
@@ -77,7 +77,7 @@ def test_pattern(
 ) -> None:
     """Show a pattern that tells the axes of a display apart.
 
-    The check is of the display's memory. Whether its optics show that memory the right way round,
+    --check examines the display's memory. Whether the optics show that memory the right way round,
     only eyes can see: the pattern is made for them.
     """
     from voxdisplay.cli.thumbnail import print_thumbnail  # noqa: PLC0415 - help starts fast

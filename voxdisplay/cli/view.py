@@ -79,7 +79,7 @@ def view(
     terminal: bool,
     size: vd.Grid | None,
 ) -> None:
-    """Show a display live; with SCENE, what it would show of a JSON file.
+    """Show a display live, or with SCENE, a JSON file, what a display would show of it.
 
     The display is read back: it needs the feature READ, and its port to itself. To watch the
     emulator while others draw on it, start it by voxdisplay-sim --view. Ctrl-C ends it.
