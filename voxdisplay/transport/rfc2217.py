@@ -91,7 +91,8 @@ class _CommandSocket:
 
     def shutdown(self, how: int) -> None:
         self.mark_ended()
-        self._inner.shutdown(how)
+        with contextlib.suppress(OSError):  # pyserial would not close it then
+            self._inner.shutdown(how)
 
     def close(self) -> None:
         self.mark_ended()

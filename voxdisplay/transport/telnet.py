@@ -1,14 +1,17 @@
 """Telnet's framing (RFC 854): data with IAC doubled, between commands. Knows no socket, no packet.
 
-Servers of serial lines such as ser2net speak it on ports that are named as plain TCP, too. A device
-of protocol.md never begins with what telnet begins with: its first byte after a COBS code of FF
-would be the header of a packet of a type that there is not.
+Servers of serial lines such as ser2net speak it on ports that are named as plain TCP, too. No
+packet of protocol.md begins as telnet does: after a COBS code of FF, its header would be of a type
+that does not exist.
 """
 
 from __future__ import annotations
 
 IAC, SB, SE = 0xFF, 0xFA, 0xF0
 WITH_OPTION = range(0xFB, 0xFF)  # WILL, WONT, DO, DONT
+# Binary, echo, suppress go-ahead, terminal type, window size, line mode, COM port control.
+OPTIONS = (0, 1, 3, 24, 31, 34, 44)
+_NEGOTIATION_BYTES = 3
 _ESCAPE = bytes((IAC,))
 
 
@@ -55,7 +58,7 @@ class TelnetDetector:
     """
 
     def __init__(self) -> None:
-        self._beginning: bytes | None = b""  # None: known what is spoken
+        self._beginning: bytes | None = b""  # None: it is known what is spoken
         self._decoder: TelnetDecoder | None = None
 
     @property
@@ -64,17 +67,24 @@ class TelnetDetector:
         return self._decoder is not None
 
     def received(self, data: bytes) -> bytes:
-        """Return the data among received bytes. A first byte that may be IAC is held back."""
+        """Return the data among received bytes; the first are held back until they are decided."""
         if self._beginning is not None:
             data = self._beginning + data
-            if data in {b"", _ESCAPE}:
+            if len(data) < _NEGOTIATION_BYTES and _begins_negotiation(data):
                 self._beginning = data
                 return b""
             self._beginning = None
-            if data[0] == IAC and (data[1] in WITH_OPTION or data[1] == SB):
+            if _begins_negotiation(data):
                 self._decoder = TelnetDecoder()
         return data if self._decoder is None else self._decoder.feed(data)[0]
 
     def escaped(self, data: bytes) -> bytes:
         """Return the bytes to send for data."""
         return data.replace(_ESCAPE, 2 * _ESCAPE) if self.is_telnet else data
+
+
+def _begins_negotiation(data: bytes) -> bool:
+    """Return whether bytes are, or may become, IAC, a command and an option that servers use."""
+    return all(
+        byte in wanted for byte, wanted in zip(data, ((IAC,), WITH_OPTION, OPTIONS), strict=False)
+    )

@@ -73,3 +73,13 @@ def test_who_waits_is_woken_at_the_end_and_gets_what_has_come(command_socket):
     assert command_socket.read_data(5, 20) == b"bye"
     with pytest.raises(serial.SerialException, match="closed the connection"):
         command_socket.read_data(1, 20)
+
+
+def test_a_socket_that_the_server_has_reset_is_closed(command_socket):
+    """Pyserial gives up closing when `shutdown` fails."""
+    socket_, theirs = command_socket
+    theirs.close()
+    socket_._inner.shutdown(socket.SHUT_RDWR)
+    socket_._inner.close()
+    socket_.shutdown(socket.SHUT_RDWR)
+    assert socket_._ended
