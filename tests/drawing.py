@@ -1,4 +1,4 @@
-"""What payloads draw, by the emulator's decoder or a plain one; the simplest possible segmenter."""
+"""Pages that payloads draw, by the emulator or the plain decoder; a brute-force segmenter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEADER = bytes(3)
 
 
 def page_after(payloads, grid, pixel_format):
-    """The emulator's page after the payloads, each in a packet of its own."""
+    """Return the emulator's page after the payloads, each in a packet of its own."""
     shape, format_ = DeviceGrid(*grid), FORMATS[pixel_format.value]
     page = Page(shape.volume, format_.size)
     bits = Config(tuple(grid), pixel_format.value).feature_bits
@@ -28,13 +28,13 @@ def page_after(payloads, grid, pixel_format):
 
 
 def values_of(page, pixel_format):
-    """Pixel values of a page in scan order."""
+    """Return the pixel values of a page in scan order."""
     raw = np.frombuffer(bytes(page.pixels), dtype=np.uint8).reshape(-1, pixel_format.bytes)
     return (raw.astype(np.uint32) << np.arange(pixel_format.bytes, dtype=np.uint32) * 8).sum(axis=1)
 
 
 def fits_one_octant(steps):
-    """Whether one octant has all steps, by trying all 24."""
+    """Return whether one octant has all steps, by trying all 24."""
     return any(
         all(
             step[main] == 1 - 2 * falls[main]
@@ -47,7 +47,7 @@ def fits_one_octant(steps):
 
 
 def fewest_segments(voxels, pens, longest=256):
-    """Least number of segments and lone voxels, by trying every cut of what hangs together."""
+    """Return the least number of segments and lone voxels, by trying every cut of each chain."""
     chains = [[]]
     for here, there, pen, next_pen in zip(voxels, voxels[1:], pens, pens[1:], strict=False):
         step = tuple(int(b) - int(a) for a, b in zip(here, there, strict=True))
@@ -59,7 +59,7 @@ def fewest_segments(voxels, pens, longest=256):
 
 
 def _fewest_cuts(steps, longest):
-    """Least number of segments of steps that follow each other."""
+    """Return the least number of segments of consecutive steps."""
     best = [0] + [len(steps)] * len(steps)
     for end in range(1, len(steps) + 1):
         for first in range(max(0, end - longest), end):
@@ -69,7 +69,7 @@ def _fewest_cuts(steps, longest):
 
 
 def decode_plainly(payloads, grid, pixel_format, base=None):
-    """A plain decoder after the payloads, each in a packet of its own, on a page of values."""
+    """Return the plain decoder after the payloads, each in its own packet, from a base page."""
     mono = pixel_format is PixelFormat.MONO1
     page = None if base is None else [int(value) for value in base]
     decoder = PlainDecoder(grid, pixel_format.bytes, pixel_format.full, mono=mono, page=page)
@@ -79,7 +79,7 @@ def decode_plainly(payloads, grid, pixel_format, base=None):
 
 
 def chains_in(payload, grid, pixel_format):
-    """Ops of a payload of chains, taken apart by hand: (op, octant, steps) each."""
+    """Return the ops of a payload of chains as (op, octant, steps)."""
     size = 1 if max(grid) <= 256 else 2
     at, found = 0, []
     while at < len(payload):

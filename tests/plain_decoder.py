@@ -1,6 +1,6 @@
-"""What ops do, said once more as plainly as it goes, from protocol.md, section 7. Trusts its input.
+"""Plain decoder of ops, transcribed from protocol.md, section 7, for valid input.
 
-It stands beside the emulator: two readings of one document.
+Independent of the emulator: two readings of one document.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ OCT_CHILDREN = [(c & 1, c >> 1 & 1, c >> 2) for c in range(8)]
 
 
 class PlainDecoder:
-    """A page, and what payloads make of it. Keeps account of ops, and of what was written."""
+    """A page to which payloads are applied; records the ops and the voxels written."""
 
     def __init__(self, grid, pixel_bytes, full, *, mono=False, page=None):
         self.grid, self.pixel_bytes, self.full, self.mono = tuple(grid), pixel_bytes, full, mono
@@ -23,7 +23,7 @@ class PlainDecoder:
         self.two_pixels = set()  # voxels that got two pixels in two payloads
 
     def draw(self, payload):
-        """Do the ops of one payload."""
+        """Apply the ops of one payload."""
         self.data, self.at, self.cursor, self.pen = payload, 0, 0, self.full
         self.now = {}
         while self.at < len(payload):

@@ -1,4 +1,4 @@
-"""Ops at random, and the plainest decoder there is, which says what may be drawn: section 7."""
+"""Random valid ops, and a voxelwise decoder that tracks what they draw (protocol.md, section 7)."""
 
 import random
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ class VoxelwiseDecoder:
         )
 
 
-def leb(op: int, count: int) -> bytes:
+def counted_op(op: int, count: int) -> bytes:
     if count < 32:
         return bytes((op | count - 1,))
     out = [op | 31]
@@ -89,7 +89,7 @@ def leb(op: int, count: int) -> bytes:
 
 
 def random_ops(rng: random.Random, plain: VoxelwiseDecoder, name: str) -> bytes:
-    """Draw at random, with a plain decoder beside; return the ops."""
+    """Return random ops, and draw them by a voxelwise decoder."""
     out = b""
     for _ in range(rng.randrange(1, 12)):
         room = plain.volume - plain.cursor
@@ -105,7 +105,7 @@ def random_ops(rng: random.Random, plain: VoxelwiseDecoder, name: str) -> bytes:
             places = [random_dot(rng, plain) for _ in range(rng.choice((1, 2, 256)))]
             out += bytes((5, len(places) - 1)) + b"".join(places)
         elif kind == "oct":
-            out += random_brick(rng, plain)
+            out += random_oct(rng, plain)
         elif kind in ("line", "box") and count:
             target = plain.at(rng.randrange(plain.volume))
             (plain.line if kind == "line" else plain.box)(target)
@@ -145,8 +145,8 @@ def coordinates(plain: VoxelwiseDecoder, place: Sequence[int]) -> bytes:
     return b"".join(axis.to_bytes(width, "little") for axis in place)
 
 
-def random_brick(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
-    """Section 7.4, node by node, along one voxel at least that is on the grid."""
+def random_oct(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
+    """Return a random OCT with at least one voxel on the grid, node by node."""
     level = rng.randrange(5)
     seed = plain.at(rng.randrange(plain.volume))
     origin = [axis >> level << level for axis in seed]
@@ -183,25 +183,25 @@ def random_brick(rng: random.Random, plain: VoxelwiseDecoder) -> bytes:
 def random_run(rng: random.Random, plain: VoxelwiseDecoder, kind: str, count: int) -> bytes:
     if kind == "skip":
         plain.cursor += count
-        return leb(0x80, count)
+        return counted_op(0x80, count)
     if kind == "run":
         for _ in range(count):
             plain.write()
-        return leb(0xA0, count)
+        return counted_op(0xA0, count)
     if kind == "diff":
         steps = [rng.randrange(-8, 8) for _ in range(count)]
         for step in steps:
             plain.pen = (plain.pen + step) % 256
             plain.write()
         nibbles = sum((step & 15) << 4 * k for k, step in enumerate(steps))
-        return leb(0xE0, count) + nibbles.to_bytes((count + 1) // 2, "little")
+        return counted_op(0xE0, count) + nibbles.to_bytes((count + 1) // 2, "little")
     values = [random_pixel(rng, plain) for _ in range(count)]
     for plain.pen in values:
         plain.write()
     if plain.mono:
         bits = sum(value << k for k, value in enumerate(values))
-        return leb(0xC0, count) + bits.to_bytes((count + 7) // 8, "little")
-    return leb(0xC0, count) + b"".join(v.to_bytes(plain.size, "little") for v in values)
+        return counted_op(0xC0, count) + bits.to_bytes((count + 7) // 8, "little")
+    return counted_op(0xC0, count) + b"".join(v.to_bytes(plain.size, "little") for v in values)
 
 
 def random_chain(rng: random.Random, plain: VoxelwiseDecoder) -> tuple[int, bytes] | None:

@@ -1,4 +1,4 @@
-"""What a frame is coded as: what was meant, with what there is, in no more bytes than need be."""
+"""Encoding of frames: right pixels, by announced features only, in the fewest bytes."""
 
 from itertools import chain
 
@@ -12,8 +12,7 @@ import voxdisplay as vd
 from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.wire import encoding_selection
-from voxdisplay.wire import raw_pixels as plainly
+from voxdisplay.wire import encoding_selection, raw_pixels
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.spans import encode_spans
@@ -31,7 +30,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 @st.composite
 def devices(draw):
-    """A grid, a format, a longest payload, and features that the format allows."""
+    """Grid, format, longest payload, and features that the format allows."""
     format_ = draw(st.sampled_from(PixelFormat))
     index8 = format_ is PixelFormat.INDEX8
     allowed = [name for name in OPS_OF if index8 or name not in {"diff", "palette"}]
@@ -48,8 +47,8 @@ def line(start, end):
     return start + (2 * k * way + length) // (2 * max(1, length))
 
 
-def draw_something(rng, frame, times):
-    """Draw what people draw: curves, lines, solids, dots, noise; some of it off the grid."""
+def draw_random(rng, frame, times):
+    """Draw curves, lines, solids, dots and noise at random, some of it off the grid."""
     grid = np.array(frame.grid)
     for _ in range(times):
         color = COLORS[rng.integers(len(COLORS))]
@@ -75,15 +74,15 @@ def draw_something(rng, frame, times):
             frame.set(array)
 
 
-def some_frame(rng, device):
+def random_frame(rng, device):
     grid, format_, _, features = device
     frame = Frame(grid, format_, own_palette="palette" in features)
-    draw_something(rng, frame, rng.integers(0, 4))
+    draw_random(rng, frame, rng.integers(0, 4))
     return frame
 
 
 def assert_draws(payloads, frame, base=None):
-    """Drawn in any order, on what was there, the payloads make the frame; and nothing twice."""
+    """The payloads, in any order on the base, make the frame; no voxel gets two pixels."""
     *_, most, features = frame.device
     assert all(0 < len(payload) <= most for payload in payloads)
     shuffled = [payloads[k] for k in np.random.default_rng(0).permutation(len(payloads))]
@@ -104,7 +103,7 @@ def assert_draws(payloads, frame, base=None):
 @given(devices(), seeds)
 def test_a_frame_is_drawn_with_what_was_announced(device, seed):
     """5: "A host MUST NOT send what the device has not announced"."""
-    frame = some_frame(np.random.default_rng(seed), device)
+    frame = random_frame(np.random.default_rng(seed), device)
     frame.device = device
     assert_draws(frame.payloads(*device[2:]), frame)
 
@@ -112,13 +111,13 @@ def test_a_frame_is_drawn_with_what_was_announced(device, seed):
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(devices(), seeds, st.sampled_from([0.0, 0.3e6, 1.2e6, 1e9]))
 def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_per_s):
-    frame = some_frame(np.random.default_rng(seed), device)
+    frame = random_frame(np.random.default_rng(seed), device)
     frame.device = device
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(encoding_selection, "_LARGE_SET", 100)
         patch.setattr(encoding_selection, "_SLAB_VOXELS", 1)
         patch.setattr(encoding_selection, "_PARSED_VOXELS", 150)
-        patch.setattr(plainly, "_SLAB_VOXELS", 160)
+        patch.setattr(raw_pixels, "_SLAB_VOXELS", 160)
         portions = list(frame.iter_payloads(*device[2:], bytes_per_s))
     assert_draws([payload for portion in portions for payload in portion], frame)
 
@@ -134,7 +133,7 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
 
     assert portions(11_520) == 1, "in one piece it is shorter, and the line is busy for seconds"
     assert portions(1.2e6) == voxels // encoding_selection._PARSED_VOXELS
-    assert portions(1e9) == voxels // plainly._SLAB_VOXELS
+    assert portions(1e9) == voxels // raw_pixels._SLAB_VOXELS
     solid = Frame((128, 128, 32), "index8")
     solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
     assert (
@@ -176,10 +175,10 @@ def test_a_curve_on_a_fast_line_goes_as_its_chain():
 @given(devices(), seeds)
 def test_a_difference_makes_one_frame_of_another(device, seed):
     rng = np.random.default_rng(seed)
-    base = some_frame(rng, device)
-    frame = base.copy() if rng.random() < 0.7 else some_frame(rng, device)
+    base = random_frame(rng, device)
+    frame = base.copy() if rng.random() < 0.7 else random_frame(rng, device)
     before = base.array()
-    draw_something(rng, frame, rng.integers(0, 3))
+    draw_random(rng, frame, rng.integers(0, 3))
     assert (base.array() == before).all(), "a copy is drawn on for itself"
     frame.device = device
     assert_draws(frame.difference(base, *device[2:]), frame, base)
@@ -194,7 +193,7 @@ def test_no_coder_alone_takes_fewer_bytes(device, seed):
     grid, format_, most, features = device
     rng = np.random.default_rng(seed)
     features = features - {"palette"}
-    frame = some_frame(rng, (grid, format_, most, features))
+    frame = random_frame(rng, (grid, format_, most, features))
     size = sum(map(len, frame.payloads(most, features)))
     coding = frame._encoder_config(most, features)
     values = format_.values(frame.array())

@@ -1,4 +1,4 @@
-"""What the driver codes, the emulator draws; and any bytes whatever go through a stream."""
+"""Driver's encoders against the emulator's decoder; the packet reader on arbitrary bytes."""
 
 import contextlib
 
@@ -130,7 +130,7 @@ some_packets = st.lists(
 )
 
 
-def taken(stream, data):
+def read_all(stream, data):
     """All packets, also those behind one that breaks the protocol."""
     found = []
     while True:
@@ -166,7 +166,7 @@ def test_a_flipped_bit_loses_only_what_it_touches(sent, random):
     # A 00 that is no 00 any more joins two packets.
     touched = {hit, hit + 1} if bit // 8 == ends[hit] - 1 else {hit}
     left = [packet for k, packet in enumerate(sent) if k not in touched]
-    assert taken(PacketStream(), bytes(data)) == left
+    assert read_all(PacketStream(), bytes(data)) == left
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)
@@ -174,8 +174,10 @@ def test_a_flipped_bit_loses_only_what_it_touches(sent, random):
 def test_any_bytes_go_through_and_the_next_packet_is_read(pieces):
     stream = PacketStream()
     for piece in pieces:
-        taken(stream, piece)
-    assert taken(stream, b"\0" + packets.encode(packets.Status(seq=5)))[-1] == packets.Status(seq=5)
+        read_all(stream, piece)
+    assert read_all(stream, b"\0" + packets.encode(packets.Status(seq=5)))[-1] == packets.Status(
+        seq=5
+    )
     assert len(stream.noise) <= 64
 
 
@@ -183,7 +185,7 @@ def test_any_bytes_go_through_and_the_next_packet_is_read(pieces):
 @given(st.binary(min_size=3, max_size=60))
 def test_any_packet_is_a_value_or_breaks_the_protocol(body):
     """What the driver has read it can write, but for reserved bytes and text that is no UTF-8."""
-    for packet in taken(PacketStream(), document.on_wire(body)):
+    for packet in read_all(PacketStream(), document.on_wire(body)):
         again = packets.decode(packets.pack(packet))
         assert again == packet
         assert packets.pack(packet)[:3] == body[:3]

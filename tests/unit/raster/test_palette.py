@@ -1,4 +1,4 @@
-"""Palettes: which colours get an entry, and what the entries show."""
+"""Palettes: allocation of entries to colours, and the colours shown."""
 
 import numpy as np
 import pytest

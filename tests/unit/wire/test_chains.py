@@ -1,4 +1,4 @@
-"""Chains (protocol.md, 7.1): what they draw is what was meant, in the fewest segments."""
+"""Chain encoder (protocol.md, 7.1): the right voxels, in the fewest segments."""
 
 import numpy as np
 import pytest

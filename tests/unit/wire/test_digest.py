@@ -1,4 +1,4 @@
-"""The digest (protocol.md, section 8)."""
+"""Digest of pages (protocol.md, section 8)."""
 
 import document
 import numpy as np

@@ -1,4 +1,4 @@
-"""Packets (protocol.md, 4, 5, 9 to 11): what the vectors do not say."""
+"""Packet types (protocol.md, 4, 5, 9 to 11), beyond the vectors of the document."""
 
 import document
 import pytest
@@ -14,7 +14,7 @@ INFO = packets.Info(
 )  # fmt: skip
 
 
-def with_check(body):
+def with_crc(body):
     return document.cobs_decode(document.on_wire(body)[:-1])
 
 
@@ -24,45 +24,45 @@ def test_a_payload_that_is_too_short_for_its_type(cls):
     for size in range(cls.BODY.size):
         body = bytes((cls.TYPE << 4, 0, 0)) + bytes((1,)) * size  # an INFO of our own major
         with pytest.raises(RemoteProtocolError, match=cls.__name__.upper()) as caught:
-            packets.decode(with_check(body))
+            packets.decode(with_crc(body))
         assert caught.value.section == cls.SECTION
         assert caught.value.offset == 3 + size
-        assert caught.value.raw == with_check(body)
+        assert caught.value.raw == with_crc(body)
 
 
 @pytest.mark.parametrize("kind", sorted(set(range(16)) - set(packets.TYPES)))
 def test_a_type_that_is_not_known(kind):
     with pytest.raises(RemoteProtocolError, match=f"type {kind}"):
-        packets.decode(with_check(bytes((kind << 4, 0, 0, 1, 2, 3))))
+        packets.decode(with_crc(bytes((kind << 4, 0, 0, 1, 2, 3))))
 
 
 def test_an_info_cut_off_in_its_strings():
     body = packets.pack(INFO)[:-4]
-    assert packets.decode(with_check(body)) == INFO
+    assert packets.decode(with_crc(body)) == INFO
     strings = 1 + len("würfel".encode()) + 2 + 1
     for lost in range(1, strings + 1):
         with pytest.raises(RemoteProtocolError, match="ends inside its string") as caught:
-            packets.decode(with_check(body[:-lost]))
+            packets.decode(with_crc(body[:-lost]))
         assert caught.value.offset <= len(body) - lost
-        assert caught.value.raw == with_check(body[:-lost])
+        assert caught.value.raw == with_crc(body[:-lost])
 
 
 def test_bytes_behind_the_last_string_are_ignored():
     """5: "A host MUST ignore bytes after the last string"."""
-    assert packets.decode(with_check(packets.pack(INFO)[:-4] + b"more")) == INFO
+    assert packets.decode(with_crc(packets.pack(INFO)[:-4] + b"more")) == INFO
 
 
 @pytest.mark.parametrize("size", [8, 9, 20, 60])
 def test_an_info_of_another_major_is_known_by_its_first_eight_bytes(size):
     """15: "Another major may change all else"."""
     body = (bytes.fromhex("90 00 00 02 17 5A 07 B0") + b"\xff" * 60)[:size]
-    info = packets.decode(with_check(body))
+    info = packets.decode(with_crc(body))
     assert (info.major, info.session, info.boot) == (2, 0x5A17, 0xB007)
     assert (info.rx_buffer, info.name) == (0, "")
 
 
 def test_text_that_is_no_utf_8_is_no_error():
-    error = packets.decode(with_check(bytes.fromhex("B0 00 00 0C 00 00 00 00 61 FF")))
+    error = packets.decode(with_crc(bytes.fromhex("B0 00 00 0C 00 00 00 00 61 FF")))
     assert error.text == "a\N{REPLACEMENT CHARACTER}"
 
 
@@ -82,7 +82,7 @@ def as_dict(packet):
             "boot", "received", "credit", "digest", "damaged")}  # fmt: skip
 
 
-@pytest.mark.parametrize("raw", [b"", b"123456", with_check(b"\x40\0\0")[:-1], bytes(7)])
+@pytest.mark.parametrize("raw", [b"", b"123456", with_crc(b"\x40\0\0")[:-1], bytes(7)])
 def test_what_is_no_packet_is_not_intact(raw):
     assert not packets.has_valid_crc(raw)
 

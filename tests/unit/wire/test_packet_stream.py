@@ -1,4 +1,4 @@
-"""Bytes -> packets (protocol.md, section 3)."""
+"""Packet reader: delimiting, CRC and resynchronisation (protocol.md, section 3)."""
 
 import document
 import pytest
@@ -12,21 +12,21 @@ STATUS = packets.Status(seq=119)
 WIRE = packets.encode(STATUS)
 
 
-def fed(*pieces):
+def feed_all(*pieces):
     stream = PacketStream()
     found = [packet for piece in pieces for packet in stream.feed(piece)]
     return stream, found
 
 
 def test_an_empty_segment_is_nothing():
-    stream, found = fed(b"\0\0\0" + WIRE + b"\0\0" + WIRE)
+    stream, found = feed_all(b"\0\0\0" + WIRE + b"\0\0" + WIRE)
     assert found == [STATUS, STATUS]
     assert (stream.counters.damaged, stream.counters.noise_bytes) == (0, 0)
 
 
 @pytest.mark.parametrize("size", range(1, 8))
 def test_a_segment_that_cannot_hold_a_packet_is_not_counted_as_damaged(size):
-    stream, found = fed(b"\x11" * size + b"\0" + WIRE)
+    stream, found = feed_all(b"\x11" * size + b"\0" + WIRE)
     assert found == [STATUS]
     assert (stream.counters.damaged, stream.counters.noise_bytes) == (0, size)
     assert stream.noise == b"\x11" * size
@@ -41,7 +41,7 @@ def test_a_segment_that_cannot_hold_a_packet_is_not_counted_as_damaged(size):
     ],
 )
 def test_a_damaged_segment_is_counted_and_dropped(segment):
-    stream, found = fed(segment + b"\0" + WIRE)
+    stream, found = feed_all(segment + b"\0" + WIRE)
     assert found == [STATUS]
     assert (stream.counters.damaged, stream.counters.noise_bytes) == (1, 8)
     assert stream.counters.packets == 1
@@ -49,7 +49,7 @@ def test_a_damaged_segment_is_counted_and_dropped(segment):
 
 def test_an_unknown_type_is_counted_and_dropped():
     """12: unknown type: "drops and counts it"."""
-    stream, found = fed(document.on_wire(b"\x70\0\0later") + WIRE)
+    stream, found = feed_all(document.on_wire(b"\x70\0\0later") + WIRE)
     assert found == [STATUS]
     assert stream.counters.unknown == 1
     assert stream.counters.damaged == 0
@@ -58,7 +58,9 @@ def test_an_unknown_type_is_counted_and_dropped():
 def test_the_longest_packet_is_taken_and_a_longer_one_is_not():
     """4: "A host MUST take every packet of up to 65542 bytes"."""
     longest = packets.Data(ops=b"\x11" * 65535)
-    stream, found = fed(packets.encode(longest), packets.encode(packets.Data(ops=b"\x11" * 65536)))
+    stream, found = feed_all(
+        packets.encode(longest), packets.encode(packets.Data(ops=b"\x11" * 65536))
+    )
     assert found == [longest]
     assert stream.counters.damaged == 1
 
@@ -84,15 +86,16 @@ def test_memory_is_bounded_and_the_next_packet_is_received():
 
 
 def test_the_end_of_an_overlong_segment_is_no_packet():
-    stream, found = fed(b"\xaa" * 200_000, WIRE + WIRE)
+    stream, found = feed_all(b"\xaa" * 200_000, WIRE + WIRE)
     assert found == [STATUS]
     assert stream.counters.damaged == 1
 
 
 def test_noise_is_told_before_it_ends():
-    assert fed(b"boot> ")[0].noise == b"boot> "
+    assert feed_all(b"boot> ")[0].noise == b"boot> "
     assert (
-        fed(b"Hello, this is a console.\0" * 5)[0].noise == (b"Hello, this is a console." * 3)[:64]
+        feed_all(b"Hello, this is a console.\0" * 5)[0].noise
+        == (b"Hello, this is a console." * 3)[:64]
     )
 
 

@@ -1,4 +1,4 @@
-"""Range-coded chains: what the emulator draws of them, and when they are sent."""
+"""Range-coded chains, drawn by the emulator; and the selection of ARC."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pages that go as they lie in memory: what they draw, what they cost, when they are worth it."""
+"""Raw pages: what they draw, what they cost, and when they are selected."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.wire import raw_pixels as plainly
+from voxdisplay.wire import raw_pixels
 from voxdisplay.wire.op_encoding import EncoderConfig
 
 GRIDS = [Grid(3, 5, 7), Grid(17, 12, 20), Grid(300, 4, 3), Grid(1, 1, 1)]
 
 
-def some_page(rng, format_, voxels, lit):
+def random_page(rng, format_, voxels, lit):
     """Noise of which so much is lit, a part at either end, and a part dark."""
     page = rng.integers(1, format_.full + 1, voxels, dtype=np.uint32)
     page[rng.random(voxels) > lit] = 0
@@ -36,10 +36,10 @@ def some_page(rng, format_, voxels, lit):
 )
 def test_a_page_is_drawn_in_any_order_of_its_payloads(grid, format_, most, lit, slab, seed):
     rng = np.random.default_rng(seed)
-    page = some_page(rng, format_, grid.voxels, lit)
+    page = random_page(rng, format_, grid.voxels, lit)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plainly, "_SLAB_VOXELS", slab)
-        portions = list(plainly.encode_raw(page, EncoderConfig(grid, format_, most)))
+        patch.setattr(raw_pixels, "_SLAB_VOXELS", slab)
+        portions = list(raw_pixels.encode_raw(page, EncoderConfig(grid, format_, most)))
     payloads = [payload for portion in portions for payload in portion]
     assert all(1 <= len(payload) <= most for payload in payloads)
     rng.shuffle(payloads)
@@ -55,7 +55,7 @@ def test_a_full_page_costs_its_pixels_and_hardly_more(format_):
     grid = Grid(64, 32, 32)
     page = format_.pixels(np.full(grid.voxels, format_.full))
     payloads = [
-        p for ps in plainly.encode_raw(page, EncoderConfig(grid, format_, 1024)) for p in ps
+        p for ps in raw_pixels.encode_raw(page, EncoderConfig(grid, format_, 1024)) for p in ps
     ]
     pixels = -(-grid.voxels * (1 if format_ is PixelFormat.MONO1 else 8 * format_.bytes) // 8)
     assert pixels < sum(map(len, payloads)) <= pixels * 1.01
@@ -68,7 +68,7 @@ def test_narrow_gaps_are_written_and_wide_ones_skipped():
     page[[4, 8, 13]] = 9
     # SKIP 4, LIT of 5 with three that are dark between, SKIP 4, LIT of 1.
     expected = bytes([0x83, 0xC4, 9, 0, 0, 0, 9, 0x83, 0xC0, 9])
-    assert list(plainly.encode_raw(page, coding)) == [[expected]]
+    assert list(raw_pixels.encode_raw(page, coding)) == [[expected]]
 
 
 def test_noise_is_told_from_what_has_runs():
@@ -77,7 +77,7 @@ def test_noise_is_told_from_what_has_runs():
 
     def noise(format_, values):
         page = format_.pixels(np.asarray(values, dtype=np.uint32).reshape(-1))
-        return plainly.is_incompressible(page, EncoderConfig(grid, format_, 1024))
+        return raw_pixels.is_incompressible(page, EncoderConfig(grid, format_, 1024))
 
     z, y, x = np.indices((32, 32, 32))
     ball = (x - 16) ** 2 + (y - 16) ** 2 + (z - 16) ** 2 < 200

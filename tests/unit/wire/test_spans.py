@@ -1,4 +1,4 @@
-"""Pixels in scan order (protocol.md, 7.2 and 10)."""
+"""Encoder and decoder of pixels in scan order (protocol.md, 7.2 and 10)."""
 
 import numpy as np
 import pytest
@@ -17,18 +17,18 @@ FORMATS = pytest.mark.parametrize("format_", PixelFormat)
 EDGES = [1, 2, 31, 32, 33, 127, 128, 159, 160, 161, 255, 256, 257, 16415, 16416, 16417]
 
 
-def some(format_, count, seed=1):
+def random_values(format_, count, seed=1):
     """Lit pixels of which no two neighbours are equal, where the format has enough of them."""
     values = np.random.default_rng(seed).integers(1, format_.full, count, endpoint=True)
     return values.astype(np.uint32)
 
 
-def op_of(op, count):
+def counted_op(op, count):
     (row,), (size,) = counted_ops(op, np.array([count]))
     return row[:size].tobytes()
 
 
-def drawn(values, format_, max_payload=1024, grid=None):
+def decode(values, format_, max_payload=1024, grid=None):
     grid = grid or Grid(len(values), 1, 1)
     payloads = encode_spans(values, EncoderConfig(grid, format_, max_payload))
     assert all(0 < len(payload) <= max_payload for payload in payloads)
@@ -48,37 +48,45 @@ def drawn(values, format_, max_payload=1024, grid=None):
     ],
 )
 def test_counts(count, ops):
-    assert op_of(0xA0, count) == bytes.fromhex(ops)
+    assert counted_op(0xA0, count) == bytes.fromhex(ops)
 
 
 @FORMATS
 @pytest.mark.parametrize("count", EDGES)
 def test_runs_of_a_length_at_the_limits(format_, count):
     """One pixel repeated, in the dark and among others, that ends with the page or does not."""
-    run = np.full(count, some(format_, 1)[0], dtype=np.uint32)
+    run = np.full(count, random_values(format_, 1)[0], dtype=np.uint32)
     dark = np.zeros(count, dtype=np.uint32)
     for values in (
         run,
         np.concatenate((dark, run)),
         np.concatenate((run, dark)),
-        np.concatenate((some(format_, 5), run, some(format_, 3), dark, some(format_, 2))),
+        np.concatenate(
+            (
+                random_values(format_, 5),
+                run,
+                random_values(format_, 3),
+                dark,
+                random_values(format_, 2),
+            )
+        ),
     ):
-        assert (drawn(values, format_)[1] == values).all()
+        assert (decode(values, format_)[1] == values).all()
 
 
 @FORMATS
 @pytest.mark.parametrize("count", EDGES)
 @pytest.mark.parametrize("max_payload", [64, 65, 1024])
 def test_literals_of_a_length_at_the_limits(format_, count, max_payload):
-    values = some(format_, count)
+    values = random_values(format_, count)
     if format_ is PixelFormat.MONO1:
         values = np.arange(count, dtype=np.uint32) % 3 % 2
-    assert (drawn(values, format_, max_payload)[1] == values).all()
+    assert (decode(values, format_, max_payload)[1] == values).all()
 
 
 @FORMATS
 def test_a_dark_page_is_no_payload(format_):
-    assert drawn(np.zeros(105, dtype=np.uint32), format_)[0] == []
+    assert decode(np.zeros(105, dtype=np.uint32), format_)[0] == []
     assert (
         encode_spans(np.zeros(0, dtype=np.uint32), EncoderConfig(Grid(0, 1, 1), format_, 64)) == []
     )
@@ -87,8 +95,8 @@ def test_a_dark_page_is_no_payload(format_):
 @FORMATS
 def test_a_full_page_is_one_run(format_):
     """7: the pen begins as the full pixel."""
-    payloads, _ = drawn(np.full(105, format_.full, dtype=np.uint32), format_)
-    assert payloads == [op_of(0xA0, 105)]
+    payloads, _ = decode(np.full(105, format_.full, dtype=np.uint32), format_)
+    assert payloads == [counted_op(0xA0, 105)]
 
 
 @pytest.mark.parametrize(
@@ -101,7 +109,7 @@ def test_a_long_way_is_a_move(index, ops):
     grid = Grid(256, 256, 40)
     values = np.zeros(grid.voxels, dtype=np.uint32)
     values[[0, index]] = 255
-    payloads, page = drawn(values, PixelFormat.INDEX8, 64, grid)
+    payloads, page = decode(values, PixelFormat.INDEX8, 64, grid)
     assert (page == values).all()
     assert payloads == [bytes.fromhex(ops)]
 
@@ -109,21 +117,21 @@ def test_a_long_way_is_a_move(index, ops):
 @pytest.mark.parametrize("format_", [f for f in PixelFormat if f is not PixelFormat.MONO1])
 def test_payloads_of_literals_are_filled(format_):
     """But for what MOVE or a pixel might have taken."""
-    values = some(format_, 3000)
-    payloads, page = drawn(values, format_, 64)
+    values = random_values(format_, 3000)
+    payloads, page = decode(values, format_, 64)
     assert (page == values).all()
     assert min(map(len, payloads[:-1])) >= 64 - 7 - format_.bytes
 
 
 @FORMATS
 def test_it_takes_hardly_more_bytes_than_the_pixels_themselves(format_):
-    values = some(format_, 5000)
+    values = random_values(format_, 5000)
     bits = 1 if format_ is PixelFormat.MONO1 else 8 * format_.bytes
-    payloads, _ = drawn(values, format_, 1024)
+    payloads, _ = decode(values, format_, 1024)
     assert sum(map(len, payloads)) <= 5000 * bits / 8 * 1.02 + 20
 
 
-def device_page(values, format_):
+def page_ops_of_device(values, format_):
     page = Page(len(values), format_.bytes)
     page.put(0, format_.pixels(values).astype("<u2" if format_.bytes == 2 else "u1").tobytes())
     return page
@@ -134,9 +142,9 @@ def device_page(values, format_):
 @pytest.mark.parametrize("room", [12, 50, 1000])
 def test_what_the_device_packs_is_read(format_, density, room):
     rng = np.random.default_rng(7)
-    values = some(format_, 700) * (rng.random(700) < density)
+    values = random_values(format_, 700) * (rng.random(700) < density)
     values = np.repeat(values, rng.integers(1, 60, 700))[:5000].astype(np.uint32)
-    page, device_format = device_page(values, format_), DEVICE_FORMATS[format_.value]
+    page, device_format = page_ops_of_device(values, format_), DEVICE_FORMATS[format_.value]
     at = 0
     while at < len(values):
         count, ops = encode_page(page, device_format, at, len(values) - at, room)

@@ -1,4 +1,4 @@
-"""Sets of voxels (protocol.md, 7.3 and 7.4), drawn by a plain reading of the document."""
+"""Encoder of voxel sets (protocol.md, 7.3 and 7.4), drawn by the plain decoder."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ OCT, DOTS, BOX = (1 << bit for bit in (spec.FEATURE_OCT, spec.FEATURE_DOTS, spec
 GRID = Grid(40, 33, 20)  # no side is a multiple of 16, nor like another
 
 
-def block(low, high):
+def box_of_voxels(low, high):
     """All voxels of a cuboid, both corners included."""
     sides = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -44,9 +44,9 @@ def assert_draws(payloads, voxels, values=None, *, grid=GRID, format_=PixelForma
     [
         ([(5, 7, 11)], "60 05 07 0B"),
         ([(4, 6, 10), (5, 7, 11)], "61 02 03 05 81"),
-        (block((4, 6, 10), (5, 7, 11)), "61 02 03 05 00"),
-        (block((16, 0, 0), (31, 15, 15)), "64 01 00 00 00"),
-        ([*block((0, 0, 0), (1, 1, 1)), (2, 2, 2)], "62 00 00 00 81 00 01"),
+        (box_of_voxels((4, 6, 10), (5, 7, 11)), "61 02 03 05 00"),
+        (box_of_voxels((16, 0, 0), (31, 15, 15)), "64 01 00 00 00"),
+        ([*box_of_voxels((0, 0, 0), (1, 1, 1)), (2, 2, 2)], "62 00 00 00 81 00 01"),
         ([(0, 0, 0), (31, 15, 15)], "60 00 00 00 60 1F 0F 0F"),
     ],
 )
@@ -91,7 +91,7 @@ def test_a_dots_op_has_at_most_256_voxels_and_fits(format_, count, most):
 @FORMATS
 def test_a_brick_that_fits_no_payload_is_made_of_smaller_ones(format_, most):
     """A chequered brick of 16 has 4096 / 8 + 73 masks."""
-    voxels = block((0, 0, 0), (39, 32, 19))
+    voxels = box_of_voxels((0, 0, 0), (39, 32, 19))
     voxels = voxels[voxels.sum(axis=1) % 2 == 0]
     payloads = encode(voxels, OCT, format_=format_, most=most)
     assert max(map(len, payloads)) <= most
@@ -117,8 +117,8 @@ def test_a_page_that_is_full(grid, features):
 def test_full_bricks_that_stand_together_are_a_box():
     """And what is uneven around them is none."""
     grid = Grid(64, 48, 40)
-    solid = block((0, 0, 0), (47, 31, 31))
-    chequered = block((48, 32, 32), (63, 47, 39))
+    solid = box_of_voxels((0, 0, 0), (47, 31, 31))
+    chequered = box_of_voxels((48, 32, 32), (63, 47, 39))
     voxels = np.concatenate((solid, chequered[chequered.sum(axis=1) % 2 == 0]))
     ops = assert_draws(encode(voxels, OCT | BOX, grid=grid), voxels, grid=grid)
     assert ops.count("BOX") == 1
@@ -127,14 +127,16 @@ def test_full_bricks_that_stand_together_are_a_box():
 
 def test_full_bricks_that_stand_apart_are_bricks():
     grid = Grid(64, 48, 40)
-    voxels = np.concatenate((block((0, 0, 0), (15, 15, 15)), block((32, 16, 16), (47, 31, 31))))
+    voxels = np.concatenate(
+        (box_of_voxels((0, 0, 0), (15, 15, 15)), box_of_voxels((32, 16, 16), (47, 31, 31)))
+    )
     (payload,) = encode(voxels, OCT | BOX, grid=grid)
     assert payload == bytes.fromhex("64 00 00 00 00 64 02 01 01 00")
     assert_draws([payload], voxels, grid=grid)
 
 
 def test_a_cuboid_anywhere_is_a_box():
-    voxels = block((3, 5, 2), (30, 9, 17))
+    voxels = box_of_voxels((3, 5, 2), (30, 9, 17))
     (payload,) = encode(voxels, OCT | DOTS | BOX)
     assert payload[-4:] == bytes.fromhex("04 1E 09 11")
     assert assert_draws([payload], voxels)[-1] == "BOX"
@@ -147,7 +149,7 @@ def test_what_is_flat_is_a_box(axis, half):
     """A plate, and beside it enough that is uneven for bricks to be worth it."""
     low, high = [6, 4, 2], [35, 27, 19]
     low[axis] = high[axis] = 8 + half
-    plate = block(low, high)
+    plate = box_of_voxels(low, high)
     above = plate[np.random.default_rng(1).random(len(plate)) < 0.1]
     above[:, axis] += 1
     voxels = np.concatenate((plate, above))
@@ -160,7 +162,7 @@ def test_what_is_flat_is_a_box(axis, half):
 
 
 def test_plates_one_above_the_other_are_boxes_of_their_own():
-    voxels = np.concatenate([block((0, 0, z), (31, 31, z)) for z in (0, 2, 4)])
+    voxels = np.concatenate([box_of_voxels((0, 0, z), (31, 31, z)) for z in (0, 2, 4)])
     values = np.where(voxels[:, 1] < 16, 5, 9)
     ops = assert_draws(
         encode(voxels, OCT | BOX, values, format_=PixelFormat.INDEX8),
@@ -210,7 +212,7 @@ def test_a_chain_of_each_pixel():
 
 
 def test_cuboids_and_a_rest():
-    voxels = np.concatenate((block((3, 5, 2), (30, 9, 17)), [(35, 30, 3), (37, 32, 5)]))
+    voxels = np.concatenate((box_of_voxels((3, 5, 2), (30, 9, 17)), [(35, 30, 3), (37, 32, 5)]))
     values = np.where(voxels[:, 0] < 17, 5, 9)
     format_ = PixelFormat.RGB565
     payloads = encode(voxels, OCT | DOTS | BOX, values, format_=format_)
@@ -219,7 +221,9 @@ def test_cuboids_and_a_rest():
 
 
 def test_cells_are_merged_to_cuboids():
-    cells = np.concatenate((block((2, 3, 4), (5, 7, 9)), block((6, 3, 4), (6, 6, 9)), [(0, 0, 0)]))
+    cells = np.concatenate(
+        (box_of_voxels((2, 3, 4), (5, 7, 9)), box_of_voxels((6, 3, 4), (6, 6, 9)), [(0, 0, 0)])
+    )
     order = np.random.default_rng(1).permutation(len(cells))
     group = (cells[:, 2] > 6).astype(int)
     low, high, count, owner = merge_cuboids(cells[order], group[order])
