@@ -275,5 +275,9 @@ def split_at_jumps(batch: CurveBatch, samples: Samples) -> Samples:
     if stretch.any():
         at = int(np.argmax(np.where(stretch, chord[1:-1], -1.0))) + 1
         raise _divergence_error(batch, int(samples.piece[at]), samples, at)
-    opens = np.concatenate(([True], torn | ~samples.joined))
-    return Samples(np.cumsum(opens) - 1, samples.t, samples.points, samples.piece[opens])
+    # A value between the sides, at a single parameter, is on neither: sign(t) is 0 at 0.
+    kept = np.ones(samples.t.size, dtype=bool)
+    kept[1:-1] = ~(torn[1:] & torn[:-1])
+    opens = np.concatenate(([True], torn | ~samples.joined))[kept]
+    curve = samples.piece[kept][opens]
+    return Samples(np.cumsum(opens) - 1, samples.t[kept], samples.points[:, kept], curve)
