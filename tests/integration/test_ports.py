@@ -134,6 +134,8 @@ def test_a_port_that_this_program_has_open_itself(line):
 AS_NOBODY = """
 import grp, os, pwd, sys
 from voxdisplay.cli import main
+from voxdisplay.cli import device_commands, options
+from voxdisplay.display import connect
 from voxdisplay.transport import diagnosis, serial
 from serial.tools import list_ports
 os.setgroups([]); os.setgid(65534); os.setuid(65534)

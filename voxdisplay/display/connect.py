@@ -17,7 +17,7 @@ from voxdisplay.transport import Transport
 DEFAULT_PORT: Final = "sim:"
 PORT_VARIABLE: Final = "VOXDISPLAY_PORT"
 
-_MAX_BAUD = 2**31 - 1  # what the system's calls take
+_MAX_BAUD = 2**32 - 1  # as of --baud; a system may take less
 
 
 def open(  # noqa: A001 - as the built-in: vd.open(port)
