@@ -1,4 +1,5 @@
-"""Emulator of a volumetric display, written from the protocol document alone.
+"""Emulator of a volumetric display, written from protocol.md alone.
 
-It shares no code with the host driver, so that a round trip through both proves something.
+It shares no code with the host driver: a round trip through both compares two independent
+implementations.
 """

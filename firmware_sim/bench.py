@@ -1,4 +1,4 @@
-"""The bench face: what a person in the laboratory sees of the device, past the wire.
+"""Bench: test controls of the device, past the wire.
 
 For tests and viewers; nothing here is part of the protocol.
 """
@@ -22,12 +22,12 @@ _CODES = {
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What is on display.
+    """The front page at one moment.
 
     Parameters
     ----------
     pixels
-        All pixels in scan order as they stand in memory; MONO1 has a byte for each voxel.
+        All pixels in scan order, as in memory; MONO1 has a byte per voxel.
     grid
         (nx, ny, nz).
     pixel_format
@@ -37,9 +37,9 @@ class Snapshot:
     digest
         Digest of the page, section 8.
     boot, swaps
-        Boot id of the device, and how many swaps there have been since it started.
+        Boot id of the device, and number of swaps since it started.
     palette
-        256 colours of red, green and blue, a byte each; none if the format is not INDEX8.
+        256 colours of red, green and blue, a byte each; empty if the format is not INDEX8.
     """
 
     pixels: bytes
@@ -54,7 +54,7 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Counters:
-    """What has happened since the start of the device.
+    """Numbers of events since the start of the device.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Counters:
     swaps
         Swaps.
     overruns
-        How many times bytes found no room in the receive ring.
+        Overruns of the receive ring.
     """
 
     packets: dict[str, int]
@@ -78,7 +78,7 @@ class Counters:
 
 
 class Bench:
-    """Sees a device from outside, and has its power switch.
+    """Access to a device past the wire: its front page, counters and power switch.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class Bench:
         self._device = device
 
     def snapshot(self) -> Snapshot:
-        """Return what is on display; any thread may ask."""
+        """Return the front page. May be called from any thread."""
         device = self._device
         has_palette = device.config.pixels.code == spec.FORMAT_INDEX8
         with device.page_lock:
@@ -107,7 +107,7 @@ class Bench:
             )
 
     def counters(self) -> Counters:
-        """Return what has happened since the start of the device."""
+        """Return the numbers of events since the start of the device."""
         device = self._device
         return Counters(
             {_TYPES.get(kind, str(kind)): n for kind, n in sorted(device.taken_by_type.items())},
@@ -118,5 +118,5 @@ class Bench:
         )
 
     def power_cycle(self) -> None:
-        """Switch the device off and on: another boot id, no session, dark pages."""
+        """Restart the device: another boot id, no session, dark pages."""
         self._device.power_cycle()

@@ -1,6 +1,6 @@
-"""The check value of packets, section 4: a CRC-32 made from its polynomial, a table step a byte.
+"""CRC-32, the check value of packets (4), by a table computed from the polynomial.
 
-It knows nothing of packets.
+Knows nothing of packets.
 """
 
 from collections.abc import Iterable

@@ -1,6 +1,6 @@
-"""The wire face of the device: bytes in, bytes out, and the refresh tick (3 to 13).
+"""Sans-I/O state machine of the device: bytes in, bytes out, and the refresh tick (3 to 13).
 
-No clock, no input or output and no thread inside: all that happens, happens in a call.
+No clock, no I/O and no thread: everything happens within a call.
 """
 
 import random
@@ -23,7 +23,7 @@ from firmware_sim.session import BackPage, DataAction, Session
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-TX_BUFFER = 65_536  # with so many bytes to be sent, the device takes no more packets
+TX_BUFFER = 65_536  # bytes of unread output with which the device takes no more packets
 _DATA_FLAGS = spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT
 _HELLO = struct.Struct("<BHBB")
 _ACK = struct.Struct("<BHHIIIH")
@@ -38,7 +38,7 @@ class Device:
     Parameters
     ----------
     config
-        What kind of device.
+        Its configuration.
 
     Attributes
     ----------
@@ -48,24 +48,23 @@ class Device:
         The two pages.
     session : Session or None
         The open session.
-    taken : dict of int to int
-        How many packets of each type have been taken.
-    refused : dict of int to int
-        How many ERRORs of each code have been sent.
+    taken_by_type : dict of int to int
+        Number of packets taken of each type.
+    errors_by_code : dict of int to int
+        Number of ERRORs sent of each code.
     damaged, swaps : int
-        How many damaged segments there have been, and how many swaps.
+        Number of damaged segments, and of swaps.
     on_swap : callable
-        Is called with nothing after each swap and each new start, for who looks on.
-    showing : Lock
-        Who holds it knows that the pages are not exchanged meanwhile: for who looks on from
-        another thread.
+        Called without arguments after each swap and each restart.
+    page_lock : Lock
+        While it is held, the pages are not exchanged: for observers in other threads.
     """
 
     def __init__(self, config: Config) -> None:
         self.config = config
         self.boot = random.randrange(0x10000) if config.boot is None else config.boot
         self.on_swap: Callable[[], object] = lambda: None
-        # What it does, which is what it announces unless it lies.
+        # The implemented features: those announced, unless that is one of its lies.
         self._features = 0 if "features" in config.lies else config.feature_bits
         self._unpacker = OpDecoder(config.shape, config.pixels, self._features)
         self.page_lock = threading.Lock()
@@ -81,21 +80,21 @@ class Device:
         self.disconnect()
 
     def power_cycle(self) -> None:
-        """Start again: another boot id, no session, dark pages."""
+        """Restart: another boot id, no session, dark pages."""
         with self.page_lock:
             self.boot = (self.boot + 1) % 0x10000
             self._start()
         self.on_swap()
 
     def disconnect(self) -> None:
-        """End the session and drop what has not been taken or sent: the carrier is gone (16)."""
+        """End the session and drop all unprocessed input and unsent output (16)."""
         self.session: Session | None = None
         self._receiver = Receiver(self.config.max_payload + spec.LIMIT_OVERHEAD)
-        self._ring = bytearray()  # whole segments and a begun one that have not been read
+        self._ring = bytearray()  # unread input: whole segments, then perhaps a part of one
         self._deferred = b""  # the packet that waits for the tick (6, point 6)
-        self._deferred_bytes = 0  # its bytes on the wire, which still stand in the ring
+        self._deferred_bytes = 0  # its size on the wire: it still occupies the ring
         self._overrun = False  # bytes were lost, and the ring has not been read since
-        self._skip_to_delimiter = False  # the stream stands in a segment whose begin was lost
+        self._skip_to_delimiter = False  # the beginning of the current segment was lost
         self._unacknowledged = 0  # DATA packets whose ACK was left out
         self._out = bytearray()
 
@@ -103,19 +102,19 @@ class Device:
 
     @property
     def pending(self) -> bool:
-        """Whether a whole frame waits for its tick."""
+        """True if a whole frame waits for its tick."""
         return self.session is not None and self.session.state is BackPage.PENDING
 
     @property
     def free_bytes(self) -> int:
-        """How many bytes the receive ring has room for: what a carrier may hand over."""
+        """Free space of the receive ring in bytes: what a carrier may hand over."""
         return self.config.rx_buffer - self._deferred_bytes - len(self._ring)
 
     @property
     def _blocked(self) -> bool:
-        """Whether the device takes no packet for now.
+        """True while the device takes no packet.
 
-        Either one waits for the tick, or the host does not read the answers. It stops between
+        Either one waits for the tick, or the host does not read the responses. It stops between
         two segments, so that the ring begins with a whole one.
         """
         return bool(self._deferred) or (len(self._out) >= TX_BUFFER and self._receiver.at_boundary)
@@ -126,7 +125,7 @@ class Device:
         Parameters
         ----------
         data
-            Any bytes. What finds no room in the ring is lost.
+            Any bytes. Those that do not fit the ring are lost, and reported by OVERRUN.
         """
         if not data:
             return
@@ -143,14 +142,14 @@ class Device:
         self._store(data[at:])
 
     def transmit(self) -> bytes:
-        """Return all that waits to be sent."""
+        """Return all pending output."""
         out, self._out = self._out, bytearray()
         if (self._ring or self._overrun) and not self._blocked:
             self._drain()
         return bytes(out)
 
     def tick(self) -> None:
-        """Begin a refresh: a whole frame is put on display."""
+        """Process a refresh tick: a pending frame is put on display."""
         if not self.session or not self.pending:
             return
         self._swap(self.session)
@@ -161,13 +160,13 @@ class Device:
             self._drain()
 
     def _drain(self) -> None:
-        """Go on with what stands in the ring."""
+        """Process the input in the ring."""
         ring, self._ring = self._ring, bytearray()
         self._overrun = False
         self._ring += ring[self._take(ring, 0) :]
 
     def _take(self, data: bytes | bytearray, at: int) -> int:
-        """Take packets until the data ends or the device stops; return where that is."""
+        """Process packets until the data ends or the device is blocked; return that position."""
         receiver = self._receiver
         while at < len(data) and not self._blocked:
             at = receiver.read(data, at)
@@ -180,15 +179,15 @@ class Device:
         return at
 
     def _store(self, data: bytes) -> None:
-        """Keep what cannot be read now in the ring, as far as there is room."""
-        # A 00 behind a 00 says nothing and needs no room: section 9.2 lets the host send it.
+        """Store input in the ring, as far as it has room."""
+        # A 00 behind a 00 is not stored: it needs no credit (9.2).
         ends = self._ring.endswith(b"\0") if self._ring else True
         data = re.sub(rb"\0+", b"\0", data.lstrip(b"\0") if ends else data)
         room = self.free_bytes
         self._ring += data[:room]
         if len(data) <= room:
             return
-        # The segment that was cut is a damaged one: nothing of it stays.
+        # The truncated segment counts as damaged: nothing of it is kept.
         del self._ring[self._ring.rfind(0) + 1 :]
         self._overrun = True
         self._skip_to_delimiter = not data.endswith(b"\0")
@@ -205,7 +204,7 @@ class Device:
     # Packets
 
     def _dispatch(self, packet: bytes) -> None:
-        """Take a packet, or keep it if it must wait."""
+        """Process a packet, or defer it if it must wait for the tick."""
         kind = packet[0] >> 4
         session = self.session
         if session and kind == spec.TYPE_DATA and session.must_wait(packet[1], packet[2]):
@@ -234,7 +233,7 @@ class Device:
         elif kind == spec.TYPE_READ and self._features >> spec.FEATURE_READ & 1:
             self._read(packet, flags, seq, frame)
         else:
-            raise PacketError(spec.CODE_TYPE, 0, f"type {kind} is not one of a host's")
+            raise PacketError(spec.CODE_TYPE, 0, f"type {kind} is none of a host")
 
     def _send_error(self, seq: int, frame: int, refusal: PacketError) -> None:
         self.errors_by_code[refusal.code] = self.errors_by_code.get(refusal.code, 0) + 1
@@ -247,7 +246,7 @@ class Device:
             raise PacketError(spec.CODE_LENGTH, 0, "a HELLO has 5 bytes of payload")
         major, number, _minor, _reserved = _HELLO.unpack_from(packet, 3)
         if not number:
-            raise PacketError(spec.CODE_FIELD, 4, "a session has a number other than 0")
+            raise PacketError(spec.CODE_FIELD, 4, "session 0 is reserved")
         if major == spec.VERSION_MAJOR:
             self.session = Session(number)
             self._unacknowledged = 0
@@ -279,7 +278,7 @@ class Device:
         self.on_swap()
 
     def _acknowledge(self, tag: int | None = None) -> None:
-        """Send an ACK if a session is open; it answers a STATUS if it has a tag (9)."""
+        """Send an ACK if a session is open; with a tag it is the response to a STATUS (9)."""
         session = self.session
         if not session:
             return
@@ -313,7 +312,7 @@ class Device:
         reserved, start, count = _READ.unpack_from(packet, 3)
         _check_zero((flags & ~spec.READ_FLAG_BACK, 0), (frame, 2), (reserved, 3))
         if not count:
-            raise PacketError(spec.CODE_FIELD, 8, "a READ asks for one voxel at least")
+            raise PacketError(spec.CODE_FIELD, 8, "a READ of no voxels")
         if start + count > self.config.shape.volume:
             raise PacketError(spec.CODE_OUTSIDE, 4, f"{count} voxels from {start} on")
         page = self.memory.back if flags & spec.READ_FLAG_BACK else self.memory.front

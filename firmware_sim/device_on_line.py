@@ -1,7 +1,7 @@
-"""A device on a line: its refresh ticks by a real clock, and the faults of the line.
+"""Device on a line: refresh ticks by a clock, and the faults of the line.
 
-All that happens, happens in the order of its time, however seldom somebody looks. It knows nothing
-of what the line is made of.
+Events are processed in the order of their times, however rarely a method is called. Knows nothing
+of the carrier.
 """
 
 import math
@@ -13,12 +13,12 @@ from firmware_sim.device import Device
 from firmware_sim.fault_types import Event
 from firmware_sim.faults import FaultSpec, FaultyLine
 
-_MAX_BACKLOG_BYTES: Final = 65_536  # with so many bytes on its way, a direction takes no more
-_MAX_WAIT_S: Final = 3600.0  # seconds: longer than this nobody should wait without looking
+_MAX_BACKLOG_BYTES: Final = 65_536  # on the line; with more, a direction takes no bytes
+_MAX_WAIT_S: Final = 3600.0  # longest wait to ask callers for
 
 
 class DeviceOnLine:
-    """A device that runs.
+    """A device, its refresh ticks, and a line with faults in front of it.
 
     Parameters
     ----------
@@ -27,9 +27,9 @@ class DeviceOnLine:
     faults
         Faults of the line, as from `parse_faults`.
     seed
-        Where their chance begins.
+        Seed of their random numbers.
     clock
-        Seconds, never going back.
+        Monotonic seconds.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class DeviceOnLine:
     Raises
     ------
     ConnectionError
-        From every method but `disconnect`, once the pipe has ended.
+        From every method but `disconnect`, once the device is unplugged.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class DeviceOnLine:
         self._run_until(now)
 
     def transmit(self) -> bytes:
-        """Carry to the host what the device has sent, or as much of it as comes together."""
+        """Return bytes from the device for the host: as many as arrive together."""
         now = self._clock()
         self._run_until(now)
         while self._up.due <= now:
@@ -77,22 +77,22 @@ class DeviceOnLine:
         return b""
 
     def accepts_data(self) -> bool:
-        """Tell whether the line takes bytes from the host: not if it stands still and is full."""
+        """Return whether the line takes bytes from the host: not while it is full."""
         self.advance()
         return self._down.backlog < _MAX_BACKLOG_BYTES
 
     def advance(self) -> None:
-        """Let all happen that has come due."""
+        """Process the events that are due."""
         self._run_until(self._clock())
 
     def next_event_s(self) -> float | None:
-        """Return in how many seconds to look again; None if nothing is in sight.
+        """Return the seconds until the next event; None if none is scheduled.
 
-        Then comes a tick that swaps, or bytes arrive that the line has held back. What the device
-        says just now, as its tick comes while it is asked, is there at once.
+        An event is a tick that swaps, or the arrival of bytes that the line has delayed. It is 0 if
+        the device has sent something during this call, by a tick that has just come.
         """
         now = self._clock()
-        left = self._up.due <= now  # by who carries it, who need not be told again
+        left = self._up.due <= now  # output that was there before this call
         self._run_until(now)
         if self._up.due <= now and not left:
             return 0.0
@@ -101,7 +101,7 @@ class DeviceOnLine:
         return min(at - now, _MAX_WAIT_S) if at < math.inf else None
 
     def disconnect(self) -> None:
-        """Break the connection: the session ends, and what is on its way is gone."""
+        """End the connection: the session ends, and bytes on the line are lost."""
         self.device.disconnect()
         self._down.connect()
         self._up.connect()
@@ -109,9 +109,9 @@ class DeviceOnLine:
         self._unplugged = False
 
     def _swap_time(self) -> float:
-        """Return when the tick comes that a swap waits for; infinity if none does.
+        """Return the time of the tick that a swap waits for; infinity if none does.
 
-        Only those that swap matter. They are counted from the start, so that none drifts.
+        Ticks are counted from the start, so that they do not drift. Only those that swap matter.
         """
         if self._swap_tick is None:
             return math.inf
@@ -148,7 +148,7 @@ class DeviceOnLine:
             raise ConnectionError("the device is unplugged")
 
     def _collect_output(self, at: float) -> None:
-        """Let the device send, and see whether a swap waits for a tick."""
+        """Put the device's output on the line, and schedule the tick of a pending swap."""
         while self._up.backlog < _MAX_BACKLOG_BYTES and (data := self.device.transmit()):
             self._up.send(at, data)
         if not self.device.pending:

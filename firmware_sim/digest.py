@@ -1,10 +1,10 @@
-"""The digest, section 8: mix, for many voxels at a time.
+"""Digest (8): the function mix, for many voxels at a time.
 
-The voxels of a block stand side by side in one large integer, 64 bits each. No product of 32 by
-32 bits leaves its lane, and a mask takes off what a shift carries over from the next one; so a
-few operations on large integers do for all lanes what section 8 says of one voxel.
+The voxels of a block are lanes of 64 bits in one large integer. No product of 32 by 32 bits
+overflows its lane, and a mask removes what a shift brings in from the next one, so a few operations
+on large integers compute mix for all voxels of a block.
 
-It knows nothing of pages.
+Knows nothing of pages.
 """
 
 from array import array
@@ -21,21 +21,21 @@ _RAMP = int.from_bytes(array("Q", range(_BLOCK)), "little")
 
 
 def mix_sum(indices: Sequence[int], pixels: bytes | bytearray, pixel_size: int) -> int:
-    """Sum mix(index, value) over the voxels that are not dark.
+    """Return the sum of mix(index, value) over the voxels that are not dark.
 
     Parameters
     ----------
     indices
         An index below 2^31 + 256 for each voxel, as an array of type ``"Q"`` or a range.
     pixels
-        Their pixels, one behind the other.
+        Their pixels, concatenated.
     pixel_size
-        Bytes of a pixel, 1 to 4.
+        Number of bytes of a pixel, 1 to 4.
 
     Returns
     -------
     int
-        The sum, from 0 to 2^32 - 1.
+        The sum modulo 2^32.
     """
     total = 0
     for start in range(0, len(indices), _BLOCK):

@@ -1,6 +1,6 @@
-"""The shape of the display: sides, scan order, and where the steps of an octant lead (2, 7.1).
+"""Grid of the display: sides, scan order, and index offsets of the steps of chains (2, 7.1).
 
-It knows nothing of pixels.
+Knows nothing of pixels.
 """
 
 from dataclasses import dataclass, field
@@ -10,23 +10,23 @@ from firmware_sim import spec
 
 @dataclass(frozen=True)
 class Grid:
-    """nx by ny by nz voxels.
+    """A grid of nx by ny by nz voxels.
 
     Parameters
     ----------
     nx, ny, nz
-        Voxels along each axis, 1 to 65535, and 0x7FFFFFFF together at most.
+        Number of voxels along each axis, 1 to 65535, and 0x7FFFFFFF in all at most.
 
     Attributes
     ----------
     sides : tuple of int
         (nx, ny, nz).
     strides : tuple of int
-        What one step on each axis adds to the index.
+        Index offset of a step on each axis.
     volume : int
         Number of voxels, V.
     coordinate_size : int
-        Bytes of a coordinate in an op, 1 or 2.
+        Number of bytes of a coordinate in an op, 1 or 2.
 
     Raises
     ------
@@ -57,13 +57,13 @@ class Grid:
             ("volume", volume),
             ("coordinate_size", 1 if max(sides) <= 256 else 2),
         ):
-            object.__setattr__(self, name, value)  # the way of a frozen dataclass
+            object.__setattr__(self, name, value)  # as a frozen dataclass requires
 
     def __str__(self) -> str:
         return f"{self.nx}x{self.ny}x{self.nz}"
 
     def contains(self, x: int, y: int, z: int) -> bool:
-        """Tell whether a voxel, with coordinates from 0 on, is on the grid."""
+        """Return whether a voxel with non-negative coordinates is on the grid."""
         return x < self.nx and y < self.ny and z < self.nz
 
     def index(self, x: int, y: int, z: int) -> int:
@@ -71,15 +71,15 @@ class Grid:
         return x + self.nx * (y + self.ny * z)
 
     def coordinates(self, index: int) -> tuple[int, int, int]:
-        """Return the coordinates of the voxel with an index, x, y and z."""
+        """Return the coordinates x, y, z of the voxel with an index."""
         row, x = divmod(index, self.nx)
         z, y = divmod(row, self.ny)
         return x, y, z
 
     def chain_leaves(self, index: int, octant: int, moves: tuple[int, int, int]) -> bool:
-        """Tell whether a chain leaves the grid.
+        """Return whether a chain leaves the grid.
 
-        All its steps go in one direction on each axis, so that its last voxel tells for all.
+        All its steps go in one direction on each axis, so it suffices to check the last voxel.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class Grid:
         octant
             0 to 23, section 7.1.
         moves
-            How many steps move on the main axis, on the one after it, and on the third.
+            Number of steps that move on the main axis, on the next one, and on the third.
         """
         main = octant >> 3
         start = self.coordinates(index)
@@ -100,7 +100,7 @@ class Grid:
         return False
 
     def crumb_offsets(self, octant: int) -> tuple[int, int, int, int]:
-        """Return what each crumb adds to the index.
+        """Return the index offset of each of the four crumbs.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
-"""What INFO says of the device, and what a device says that lies (5).
+"""Contents of INFO (5), including deliberate lies.
 
-A lie is for who tests a host: INFO announces what the device does not do. It knows nothing of
-sessions and of bytes on the wire.
+A lie is for tests of a host: INFO announces what the device does not do. Knows nothing of sessions
+or of bytes on the wire.
 """
 
 import struct
@@ -17,7 +17,7 @@ _U32 = 0xFFFFFFFF
 
 @dataclass(frozen=True)
 class Announcement:
-    """What a device says of itself.
+    """Contents of an INFO.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Announcement:
     pixel_format
         One of ``spec.FORMAT_*``.
     grid
-        Voxels along x, y and z.
+        Number of voxels along x, y and z.
     max_payload, credit
         In bytes.
     refresh
@@ -34,7 +34,7 @@ class Announcement:
     features
         A bit for each ``spec.FEATURE_*``.
     strings
-        Name, firmware and serial as INFO ends with them.
+        Name, firmware and serial in the form in which they end INFO.
     """
 
     boot: int
@@ -47,7 +47,7 @@ class Announcement:
     strings: bytes
 
     def payload(self, session: int) -> bytes:
-        """Return the payload of the INFO that answers a HELLO."""
+        """Return the payload of the INFO in response to the HELLO of a session."""
         info = _INFO.pack(
             spec.VERSION_MAJOR,
             session,
@@ -66,7 +66,7 @@ class Announcement:
 
 
 def make_announcement(config: Config, boot: int) -> Announcement:
-    """Return what a device says of itself, lies included.
+    """Return what a device announces, lies included.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def make_announcement(config: Config, boot: int) -> Announcement:
     boot
         Its boot id.
     """
-    said = Announcement(
+    announcement = Announcement(
         boot,
         config.pixels.code,
         config.grid,
@@ -87,13 +87,15 @@ def make_announcement(config: Config, boot: int) -> Announcement:
     )
     if "grid" in config.lies:  # each side one voxel longer, or shorter if it is the longest
         nx, ny, nz = (side + 1 if side < spec.LIMIT_MAX_SIDE else side - 1 for side in config.grid)
-        said = replace(said, grid=(nx, ny, nz))
+        announcement = replace(announcement, grid=(nx, ny, nz))
     if "credit" in config.lies:
-        said = replace(said, credit=min(2 * said.credit, _U32))
-    if "format" in config.lies:  # the one that follows in section 2.1
-        said = replace(said, pixel_format=said.pixel_format % spec.FORMAT_RGB888 + 1)
+        announcement = replace(announcement, credit=min(2 * config.rx_buffer, _U32))
+    if "format" in config.lies:  # the next one of section 2.1
+        code = config.pixels.code % spec.FORMAT_RGB888 + 1
+        announcement = replace(announcement, pixel_format=code)
     if "payload" in config.lies:
-        said = replace(said, max_payload=min(2 * said.max_payload, spec.LIMIT_MAX_PAYLOAD))
+        doubled = min(2 * config.max_payload, spec.LIMIT_MAX_PAYLOAD)
+        announcement = replace(announcement, max_payload=doubled)
     if "boot" in config.lies:
-        said = replace(said, boot=boot ^ 0xFFFF)
-    return said
+        announcement = replace(announcement, boot=boot ^ 0xFFFF)
+    return announcement

@@ -1,7 +1,7 @@
-"""The ops of a DATA packet, drawn straight into a page (7).
+"""Decoder of the ops of a DATA packet, which draws them into a page (7).
 
-It knows nothing of frames and sessions. It writes nowhere but on the page that it is given, and
-on that only what is on the grid.
+Knows nothing of frames and sessions. Writes only to the page that it is given, and only on the
+grid.
 """
 
 from array import array
@@ -17,8 +17,8 @@ from firmware_sim.packet_error import PacketError
 from firmware_sim.range_coded_chains import decode_chains
 from firmware_sim.shapes import Brick, box, brick_offsets, line
 
-# The four crumbs of a byte, the eight pixels of MONO1 and the two differences: a byte each, the
-# lowest bits first. A difference below 0 is one modulo 256.
+# Tables by byte: its four crumbs, its eight MONO1 pixels, its two differences modulo 256. A byte
+# each, those in the lowest bits first.
 _CRUMBS: Final = [bytes(byte >> k & 3 for k in (0, 2, 4, 6)) for byte in range(256)]
 _BITS: Final = [bytes(byte >> k & 1 for k in range(8)) for byte in range(256)]
 _DIFFERENCES: Final = [
@@ -27,14 +27,14 @@ _DIFFERENCES: Final = [
 
 
 class OpDecoder:
-    """Draws packets.
+    """Decoder of packets.
 
     Parameters
     ----------
     grid, pixel_format
         Those of the pages.
     features
-        What is announced: a bit for each ``spec.FEATURE_*``.
+        The implemented features: a bit for each ``spec.FEATURE_*``.
     """
 
     def __init__(self, grid: Grid, pixel_format: PixelFormat, features: int) -> None:
@@ -53,12 +53,12 @@ class OpDecoder:
         packet
             Header and payload of a DATA packet.
         page
-            Where to draw.
+            The page to draw on.
 
         Raises
         ------
         PacketError
-            At the first fault, when the ops before it have been drawn.
+            At the first invalid op; the ops before it have been drawn then.
         """
         operands = Operands(packet, self.grid.coordinate_size)
         decoder = _PacketDecoder(self, operands, page)
@@ -70,7 +70,10 @@ class OpDecoder:
 
 
 class _PacketDecoder:
-    """Decoder of one packet: a cursor and a pen. A method for each op gets its low five bits."""
+    """State of the decoder within one packet: cursor and pen.
+
+    There is a method for each op; it takes the low five bits of the op byte.
+    """
 
     def __init__(self, device: OpDecoder, operands: Operands, page: Page) -> None:
         self._device = device
@@ -81,7 +84,7 @@ class _PacketDecoder:
         self._cursor = 0
         self._pen = device.pixel_format.full
 
-    # Where it leads
+    # Bounds
 
     def _outside_error(self, text: str) -> PacketError:
         return self._operands.error(spec.CODE_OUTSIDE, text)
@@ -95,7 +98,7 @@ class _PacketDecoder:
             raise self._outside_error("({}, {}, {})".format(*place))
 
     def _check_room(self, count: int) -> int:
-        """Return a count, if so many voxels follow from the cursor on."""
+        """Return a count; raise if fewer voxels follow from the cursor on."""
         if count > self._grid.volume - self._cursor:
             raise self._outside_error(f"{count} voxels from {self._cursor} on")
         return count
@@ -241,7 +244,7 @@ _Op = Callable[[_PacketDecoder, int], None]
 
 
 def _op_table(features: int) -> list[_Op | None]:
-    """Return what draws each op byte; None where it is reserved or not announced."""
+    """Return the method for each op byte; None if it is reserved or not implemented."""
     ops: list[_Op | None] = [None] * 256
     last = OPERAND_MASK
     for feature, op, low_bits, draw in (

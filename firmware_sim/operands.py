@@ -1,7 +1,6 @@
-"""What stands behind an op byte: coordinates, counts, crumbs, masks (7).
+"""Reader of operands: coordinates, counts, crumbs, masks (7).
 
-A place in a packet that moves on as operands are read. It refuses what is cut off, and what is
-written in another form than the document's; it knows nothing of what the ops do.
+Refuses operands that are truncated or not in the specified form; knows nothing of what the ops do.
 """
 
 from typing import Final
@@ -15,14 +14,14 @@ _COUNT_LIMIT: Final = 1 << 32  # section 7.2: n MUST be below
 
 
 class Operands:
-    """A place in a packet.
+    """Read position in a packet.
 
     Parameters
     ----------
     packet
         Header and payload of a DATA packet.
     coordinate_size
-        Bytes of a coordinate, 1 or 2.
+        Number of bytes of a coordinate, 1 or 2.
     """
 
     def __init__(self, packet: bytes, coordinate_size: int) -> None:
@@ -31,7 +30,7 @@ class Operands:
         self._at = self._op_at = len(spec.LAYOUT_HEADER)  # its three fields have a byte each
 
     def op(self) -> int | None:
-        """Return the next op byte, or None at the packet's end."""
+        """Return the next op byte; None at the end of the packet."""
         self._op_at = self._at
         if self._at >= len(self._packet):
             return None
@@ -39,11 +38,11 @@ class Operands:
         return self._packet[self._op_at]
 
     def error(self, code: int, text: str) -> PacketError:
-        """Return a refusal that points at the op."""
+        """Return an error at the offset of the current op."""
         return PacketError(code, self._op_at, text)
 
     def take(self, size: int) -> bytes:
-        """Return so many bytes."""
+        """Return the next ``size`` bytes."""
         start = self._at
         self._at += size
         if self._at > len(self._packet):
@@ -51,7 +50,7 @@ class Operands:
         return self._packet[start : self._at]
 
     def remaining(self) -> bytes:
-        """Return all bytes that are left."""
+        """Return the rest of the packet."""
         return self.take(len(self._packet) - self._at)
 
     def byte(self) -> int:
@@ -59,7 +58,7 @@ class Operands:
         return self.take(1)[0]
 
     def coordinates(self) -> tuple[int, int, int]:
-        """Return the coordinates of one voxel, or brick (2)."""
+        """Return the coordinates x, y, z of a voxel or brick (2)."""
         size = self._coordinate_size
         raw = self.take(3 * size)
         if size == 1:
@@ -67,7 +66,7 @@ class Operands:
         return raw[0] | raw[1] << 8, raw[2] | raw[3] << 8, raw[4] | raw[5] << 8
 
     def coordinate_lists(self, count: int) -> tuple[list[int], list[int], list[int]]:
-        """Return the coordinates of many voxels: all x, all y, all z."""
+        """Return the coordinates of ``count`` voxels: all x, all y, all z."""
         size = self._coordinate_size
         raw = self.take(3 * size * count)
         axes = list(raw)
@@ -76,7 +75,7 @@ class Operands:
         return axes[::3], axes[1::3], axes[2::3]
 
     def count(self, operand: int) -> int:
-        """Return a count whose begin is in the op byte (7.2)."""
+        """Return a count whose first part is in the op byte (7.2)."""
         if operand < OPERAND_MASK:
             return operand + 1
         count = 0
@@ -95,7 +94,7 @@ class Operands:
         return count
 
     def packed(self, count: int, bits: int) -> bytes:
-        """Return the bytes of so many numbers of 1, 2 or 4 bits; what is left over is 0."""
+        """Return the bytes of ``count`` numbers of 1, 2 or 4 bits; check that spare bits are 0."""
         raw = self.take((count * bits + 7) // 8)
         used = count * bits % 8
         if used and raw[-1] >> used:

@@ -1,21 +1,24 @@
-"""Why a packet is refused, on its way from where that is seen to the ERROR that says so (11)."""
+"""Refusal of a packet, from its detection to the ERROR that reports it (11)."""
 
 
 class PacketError(Exception):
-    """A packet that the device refuses.
+    """The packet is refused.
 
     Parameters
     ----------
     code
         One of ``spec.CODE_*``.
     offset
-        Where in the packet, counted from its header's first byte.
+        Position in the packet, counted from the first byte of its header.
     text
-        For a person: a few words, 59 bytes at most, so that every ERROR holds them.
+        A few words for a person, at most 59 bytes, so that every ERROR can hold them.
     """
 
     def __init__(self, code: int, offset: int, text: str) -> None:
-        super().__init__(text)
+        super().__init__(code, offset, text)
         self.code = code
         self.offset = offset
         self.text = text
+
+    def __str__(self) -> str:
+        return self.text

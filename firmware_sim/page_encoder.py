@@ -1,6 +1,6 @@
-"""The ops of a PAGE: pixels in scan order as SKIP, RUN, LIT and PEN (7, 10).
+"""Encoder of the ops of a PAGE: pixels in scan order as SKIP, RUN, LIT and PEN (7, 10).
 
-It reads a page and knows nothing of packets.
+Reads a page; knows nothing of packets.
 """
 
 import re
@@ -9,9 +9,9 @@ from typing import Final
 from firmware_sim import spec
 from firmware_sim.memory import Page, PixelFormat
 
-_SHORT: Final = 31  # section 7.2: counts up to this stand in the op byte
-_MARGIN: Final = 11  # more than one stretch can need: a pixel, two op bytes, two counts
-_CHUNK: Final = 24  # MONO1: so many pixels are looked at for a LIT, 3 bytes
+_SHORT: Final = 31  # section 7.2: largest count that fits the op byte
+_MARGIN: Final = 11  # most bytes that one stretch can need: a pixel, two op bytes, two counts
+_CHUNK: Final = 24  # MONO1: number of pixels to consider for a LIT, 3 bytes
 _DIGITS: Final = bytes.maketrans(b"\0\1", b"01")
 _DARK: Final = re.compile(rb"\0*+")
 _SAME: Final = {  # a pixel and its repetitions
@@ -22,23 +22,23 @@ _SAME: Final = {  # a pixel and its repetitions
 def encode_page(
     page: Page, pixel_format: PixelFormat, start: int, count: int, room: int
 ) -> tuple[int, bytes]:
-    """Describe pixels by ops, as many as fit.
+    """Encode a range of pixels, as many as fit.
 
     Parameters
     ----------
     page
-        Where the pixels stand.
+        The page.
     pixel_format
-        Their format.
+        The format of its pixels.
     start, count
-        Index of the first voxel, and how many voxels; all on the grid.
+        Index of the first voxel, and number of voxels; all on the grid.
     room
-        Bytes that the ops may have, at least 12.
+        Most bytes that the ops may have, at least 12.
 
     Returns
     -------
     covered : int
-        How many voxels the ops cover, 1 to `count`.
+        Number of voxels that the ops cover, 1 to `count`.
     ops : bytes
         The ops, at most `room` bytes.
     """
@@ -52,30 +52,30 @@ def encode_page(
 
 
 class _OpWriter:
-    """Writes ops; the last of them may be an open LIT, to which pixels are still added."""
+    """Writer of ops; the last may be an open LIT, to which pixels are still added."""
 
     def __init__(self, pixel_format: PixelFormat) -> None:
         self._size = pixel_format.size
         self._mono = pixel_format.code == spec.FORMAT_MONO1
-        self._cheap = 8 if self._mono else 1 // self._size  # pixels that one byte of a LIT holds
+        self._cheap = 8 if self._mono else 1 // self._size  # pixels per byte of a LIT
         self._pen = pixel_format.full
         self._literal = bytearray()  # pixels of the open LIT
         self.ops = bytearray()
 
     @property
     def size(self) -> int:
-        """Bytes of all ops, the open LIT as it is now included."""
+        """Number of bytes of all ops, including the open LIT."""
         if not self._literal:
             return len(self.ops)
         count = len(self._literal) // self._size
         return len(self.ops) + len(_op(spec.OP_LIT, count)) + self._run_size(count)
 
     def _run_size(self, count: int) -> int:
-        """Return the bytes of a pixel run (2.1)."""
+        """Return the number of bytes of a pixel run (2.1)."""
         return (count + 7) // 8 if self._mono else count * self._size
 
     def add(self, pixels: bytearray, at: int, end: int) -> int:
-        """Describe a stretch of pixels that begins at a place in memory; return its bytes."""
+        """Encode a stretch of equal pixels at an offset in memory; return its length in bytes."""
         size = self._size
         if self._mono and _prefers_literal(chunk := pixels[at : min(at + _CHUNK, end)]):
             self._extend_literal(chunk)
@@ -125,7 +125,7 @@ class _OpWriter:
 
 
 def _prefers_literal(pixels: bytearray) -> bool:
-    """Tell whether pixels of MONO1 need fewer bytes as a LIT than as SKIPs and RUNs."""
+    """Return whether pixels of MONO1 need fewer bytes as a LIT than as SKIPs and RUNs."""
     ops = 1 + pixels.count(b"\0\1") + pixels.count(b"\1\0")
     return ops > 1 + (len(pixels) + 7) // 8
 

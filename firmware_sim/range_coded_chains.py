@@ -1,6 +1,6 @@
-"""Range-coded chains: the op ARC as pieces of one pen each (7.7).
+"""Decoder of range-coded chains, the op ARC, into pieces of one pen each (7.7).
 
-Nothing is drawn here. It refuses what leads off the grid, for what follows then has no meaning.
+Draws nothing. Refuses steps off the grid at once, because what follows them has no meaning.
 """
 
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ from firmware_sim.memory import PixelFormat
 from firmware_sim.operands import Operands
 from firmware_sim.range_decoder import RangeDecoder
 
-_HISTORY: Final = 0x7F  # seven steps
-_OTHERS: Final = 0x3F  # the six before the latest
+_HISTORY: Final = 0x7F  # mask of seven steps
+_OTHERS: Final = 0x3F  # mask of the six before the latest
 
 
 class _Axis:
-    """What the decoder remembers of an axis."""
+    """Step memory of one axis."""
 
     def __init__(self, side: int) -> None:
         self.side = side
@@ -25,7 +25,7 @@ class _Axis:
         self.reset(0)
 
     def reset(self, place: int) -> None:
-        """Begin somewhere, with nothing remembered."""
+        """Start at a coordinate, with an empty memory."""
         self.coordinate = place
         self.last = 0
         self.run = 0
@@ -39,7 +39,7 @@ class _Axis:
         return self.run if self.last else 0
 
     def move(self, bits: RangeDecoder) -> None:
-        """Move by one, in a direction that is decoded."""
+        """Decode the direction and move by one."""
         if not self.direction:
             self.direction = -1 if bits.plain_bits(1) else 1
         elif bits.bit(spec.ARC_TURN + (0 if self.last else min(self.run, 15))):
@@ -47,7 +47,7 @@ class _Axis:
         self.coordinate += self.direction
 
     def decode_moves(self, bits: RangeDecoder) -> int:
-        """Return whether the axis moves in a step in which the main axis does."""
+        """Decode whether the axis moves in a step in which the main axis does."""
         last, run = self.last, self.run
         history = self.past >> 1 ^ (_OTHERS if last else 0)
         longer = min(max(run - self.prev2, -2), 1) + 2
@@ -55,7 +55,7 @@ class _Axis:
         return last ^ bits.mixed_bit(spec.ARC_HISTORY + history, spec.ARC_RUNS + runs)
 
     def record(self, moved: int) -> None:
-        """Remember whether the axis moved."""
+        """Record whether the axis moved."""
         self.past = (self.past << 1 | moved) & _HISTORY
         if moved == self.last:
             self.run = min(self.run + 1, spec.ARC_MAX_RUN)
@@ -74,7 +74,7 @@ def decode_chains(
     Parameters
     ----------
     operands
-        Behind its op byte; all that is left there is taken.
+        Positioned behind the op byte; the rest of the packet is consumed.
     grid, pixel_format
         Those of the page.
     pen
@@ -85,12 +85,12 @@ def decode_chains(
     pen : bytes
         The pen of a piece.
     voxels : list of int
-        Indices of the voxels that it draws, some perhaps more than once.
+        Indices of its voxels, possibly repeated.
 
     Raises
     ------
     PacketError
-        TRUNCATED, PADDING or OUTSIDE, when the pieces before have been yielded.
+        TRUNCATED, PADDING or OUTSIDE, after the pieces before have been yielded.
     """
     bits = RangeDecoder(
         operands.remaining(),

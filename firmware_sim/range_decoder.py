@@ -1,6 +1,6 @@
-"""Bits out of a range-coded sequence, each with the chance of its model (7.7).
+"""Adaptive binary range decoder (7.7).
 
-It knows nothing of what the bits mean.
+Knows nothing of what the bits mean.
 """
 
 from collections.abc import Callable
@@ -8,10 +8,10 @@ from typing import Final
 
 from firmware_sim import spec
 
-_RANGE: Final = 1 << 24  # below this, the range asks for a byte
-_ONE: Final = 4096  # a chance that is sure
-_SHIFT: Final = 13  # by so much the range is smaller before it is shared out
-_BEGIN: Final = 3  # bytes of the code at first
+_RANGE: Final = 1 << 24  # below this, the next byte is read
+_ONE: Final = 4096  # probability 1/2 for bits without models, as the sum of two chances
+_SHIFT: Final = 13  # scale between range and the sum of two chances
+_BEGIN: Final = 3  # bytes of the initial code
 
 
 class RangeDecoder:
@@ -22,7 +22,7 @@ class RangeDecoder:
     data
         The sequence.
     cut_off
-        Makes what is raised where the sequence should go on and does not.
+        Returns the exception to raise if the sequence ends too early.
     """
 
     def __init__(self, data: bytes, cut_off: Callable[[], Exception]) -> None:
@@ -36,11 +36,11 @@ class RangeDecoder:
 
     @property
     def exhausted(self) -> bool:
-        """Whether the whole sequence has been read, and all that is read behind it."""
+        """True if the whole sequence and the bytes behind it have been read."""
         return self._at == len(self._data)
 
     def _decode(self, bound: int) -> int:
-        """Return a bit, which is 0 if the code is below a bound."""
+        """Decode a bit: 0 if the code is below a bound, otherwise 1."""
         bit = 0
         if self._code < bound:
             self._range = bound
@@ -57,14 +57,14 @@ class RangeDecoder:
         return bit
 
     def bit(self, model: int) -> int:
-        """Return a bit by one model."""
+        """Decode a bit with one model."""
         chance = self._chances[model]
         bit = self._decode((self._range >> _SHIFT) * 2 * chance)
         self._update(model, chance, bit)
         return bit
 
     def mixed_bit(self, one: int, other: int) -> int:
-        """Return a bit by two models."""
+        """Decode a bit with two models."""
         chance, second = self._chances[one], self._chances[other]
         bit = self._decode((self._range >> _SHIFT) * (chance + second))
         self._update(one, chance, bit)
@@ -81,14 +81,14 @@ class RangeDecoder:
             self._seen[model] = seen + 1
 
     def plain_bits(self, count: int) -> int:
-        """Return a number of so many bits without models, the highest first."""
+        """Decode a number of ``count`` bits without models, the highest first."""
         value = 0
         for _ in range(count):
             value = value << 1 | self._decode((self._range >> _SHIFT) * _ONE)
         return value
 
     def number(self) -> int:
-        """Return a number from 0 to 65534."""
+        """Decode a number from 0 to 65534."""
         k = 0
         while k < spec.ARC_MAX_K and self.bit(spec.ARC_COUNT + k):
             k += 1

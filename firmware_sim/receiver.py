@@ -1,8 +1,8 @@
-"""From bytes on the wire to packets: segments, COBS and the check value (3, 4).
+"""Packet receiver: segments, COBS and the check value (3, 4).
 
-An automaton as it would run in a microcontroller: COBS is undone on the fly into one buffer of
-fixed size, every 00 makes a new beginning, and it is all the same how the bytes were cut into
-pieces. It knows nothing of what packets mean.
+A state machine as it would run in a microcontroller: COBS is decoded on the fly into one buffer of
+fixed size, every 00 resets it, and it does not matter how the bytes are cut into pieces. Knows
+nothing of what packets mean.
 """
 
 from firmware_sim import spec
@@ -12,7 +12,7 @@ _CHECK = spec.CRC_WIDTH // 8
 
 
 class Receiver:
-    """Reads segments out of a stream of bytes.
+    """Parser of a byte stream into segments.
 
     Parameters
     ----------
@@ -22,13 +22,13 @@ class Receiver:
     Attributes
     ----------
     packet : bytes or None
-        Header and payload of the segment that `read` ended, if that was a packet.
+        Header and payload of the segment that `read` has ended, if it was a packet.
     damaged : bool
-        Whether the segment that `read` ended was damaged.
+        True if the segment that `read` has ended was damaged.
     size : int
-        Bytes of the current segment, or of the one just ended, without its 00.
-    idle : bool
-        Whether the last byte read was a 00, or none has been read.
+        Number of bytes of the current segment, or of the one just ended, without its 00.
+    at_boundary : bool
+        True if the last byte read was a 00, or none has been read.
     """
 
     def __init__(self, longest: int) -> None:
@@ -40,25 +40,26 @@ class Receiver:
 
     def _begin(self) -> None:
         self.size = 0
-        self._length = 0  # bytes decoded
-        self._left = 0  # bytes that the current group still lacks
+        self._length = 0  # number of bytes decoded
+        self._left = 0  # missing bytes of the current group
         self._implied = False  # a 00 follows the current group, if anything does
         self._too_long = False  # the packet is too long
 
     def read(self, data: bytes | bytearray, at: int) -> int:
-        """Read on until a segment ends, or the data.
+        """Read to the end of a segment or of the data.
 
         Parameters
         ----------
         data
-            Bytes as they came.
+            Any bytes of the stream.
         at
-            Where to begin in `data`, before its end.
+            Position in `data` at which to begin, before its end.
 
         Returns
         -------
         int
-            Where to go on: behind the 00 that ended a segment, or the size of `data`.
+            Position at which to continue: behind the 00 that ended a segment, or the size of
+            `data`.
         """
         self.packet = None
         self.damaged = False
@@ -69,7 +70,7 @@ class Receiver:
         if end < 0:
             end = len(data)
         self.size += end - at
-        while at < end:  # a group, or as much of it as is there
+        while at < end:  # once per group, or per part of it
             if not self._left:
                 if self._implied:
                     self._append(b"\0")

@@ -1,16 +1,16 @@
-"""From a packet to bytes on the wire: check value, COBS, and the 00 that ends it (3, 4).
+"""Packet encoding: check value, COBS, and the 00 delimiter (3, 4).
 
-It knows nothing of what packets mean.
+Knows nothing of what packets mean.
 """
 
 from firmware_sim import spec
 from firmware_sim.crc import crc32
 
-_GROUP = 254  # section 3: a group ends after so many bytes without a 00
+_GROUP = 254  # section 3: most bytes of a COBS group
 
 
 def max_wire_bytes(packet: int) -> int:
-    """Return how many bytes a packet has on the wire at most.
+    """Return the most bytes that a packet can have on the wire.
 
     Parameters
     ----------
@@ -20,23 +20,23 @@ def max_wire_bytes(packet: int) -> int:
     Returns
     -------
     int
-        Its bytes, the most code bytes that COBS can need for them, and the 00.
+        Size with the most code bytes that COBS can need, and the 00.
     """
     return packet + -(-packet // _GROUP) + 1
 
 
 def encode_segment(packet: bytes) -> bytes:
-    """Undo every 00 of some bytes by COBS and end them with one.
+    """COBS-encode a packet and append the 00 delimiter.
 
     Parameters
     ----------
     packet
-        Any bytes, but not none at all.
+        Any bytes, at least one.
 
     Returns
     -------
     bytes
-        What is sent; its only 00 is the last byte.
+        The encoded bytes; the only 00 is the last byte.
     """
     wire = bytearray()
     *parts, last = packet.split(b"\0")
@@ -55,14 +55,14 @@ def encode_segment(packet: bytes) -> bytes:
 
 
 def _append_full_groups(wire: bytearray, part: bytes) -> None:
-    """Append all groups of 254 bytes of a part without 00."""
+    """Append the groups of 254 bytes of a part without 00."""
     for start in range(0, len(part) - _GROUP + 1, _GROUP):
         wire.append(_GROUP + 1)
         wire += part[start : start + _GROUP]
 
 
 def encode_packet(kind: int, flags: int, seq: int, frame: int, payload: bytes) -> bytes:
-    """Make a packet and encode it.
+    """Build a packet and encode it for the wire.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def encode_packet(kind: int, flags: int, seq: int, frame: int, payload: bytes) -
     seq, frame
         Bytes 1 and 2 of the header.
     payload
-        What stands between header and check value.
+        Bytes between header and check value.
 
     Returns
     -------
     bytes
-        The packet as it is on the wire.
+        The packet on the wire.
     """
     packet = bytes((kind << 4 | flags, seq, frame)) + payload
     return encode_segment(packet + crc32(packet).to_bytes(spec.CRC_WIDTH // 8, "little"))

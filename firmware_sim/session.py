@@ -1,7 +1,6 @@
-"""What becomes of a DATA packet: sequence numbers, the window, and frames (6, 9.1).
+"""Receive state machine for DATA packets: sequence numbers, window and frame states (6, 9.1).
 
-One object from HELLO to HELLO. It decides and remembers; it knows nothing of bytes, pages or
-answers.
+One object per session. Decides and keeps the state; knows nothing of bytes, pages or responses.
 """
 
 from enum import Enum, auto
@@ -10,7 +9,7 @@ from firmware_sim import spec
 from firmware_sim.packet_error import PacketError
 
 _NO_FRAME = 255  # section 6, point 6: f before the first frame
-_SEQ, _FRAME, _CLEAR = 1, 2, 0  # offsets in the header that a refusal points at
+_SEQ, _FRAME, _CLEAR = 1, 2, 0  # offsets in the header, for errors
 
 
 class BackPage(Enum):
@@ -22,33 +21,33 @@ class BackPage(Enum):
 
 
 class DataAction(Enum):
-    """What the device does with a DATA packet that it takes."""
+    """Treatment of a DATA packet."""
 
     APPLY = auto()  # draw it
     BEGIN = auto()  # begin its frame, then draw it
-    DUPLICATE = auto()  # answer it
-    DROP = auto()  # answer it, and do not mark it as received
+    DUPLICATE = auto()  # acknowledge it
+    DROP = auto()  # acknowledge it, but do not mark it as received
 
 
 class Session:
-    """The time between one HELLO and the next.
+    """State of a session, between one HELLO and the next.
 
     Parameters
     ----------
     number
-        The host's number for it, not 0.
+        Session number chosen by the host, not 0.
 
     Attributes
     ----------
     next : int
-        The lowest sequence number that has not been received.
+        Lowest sequence number that has not been received.
     received : int
-        Bit i is set if the packet `next` + 1 + i has been received.
+        Bitmap: bit i is set if the packet `next` + 1 + i has been received.
     last : int
         Sequence number of the last DATA packet taken, 255 before the first.
     shown : int or None
         Id of the frame on display, if it is one of this session.
-    state : State
+    state : BackPage
         State of the back page.
     """
 
@@ -73,7 +72,7 @@ class Session:
         return bool(self.received << 1 >> ahead & 1)  # the bit of `next` itself is never set
 
     def must_wait(self, seq: int, frame: int) -> bool:
-        """Tell whether a DATA packet must not be taken before the tick (6, points 6 and 7).
+        """Return whether a DATA packet must not be taken before the tick (6, points 6 and 7).
 
         Parameters
         ----------
@@ -85,7 +84,7 @@ class Session:
         )
 
     def classify(self, seq: int, frame: int, flags: int) -> DataAction:
-        """Say what to do with a DATA packet that need not wait.
+        """Return the treatment of a DATA packet that need not wait.
 
         Parameters
         ----------
@@ -112,7 +111,7 @@ class Session:
         if frame == self._newest:
             self._check_same_frame(seq, flags)
             return DataAction.APPLY
-        # What is missing may belong to a frame that is not whole, and to none other.
+        # Missing packets can only belong to a frame that is not whole.
         if frame == (self._newest + 1) % 256 and (self.state is BackPage.EMPTY or not ahead):
             return DataAction.BEGIN
         if ahead:
@@ -120,7 +119,7 @@ class Session:
         raise PacketError(spec.CODE_FRAME, _FRAME, f"frame {frame} does not follow {self._newest}")
 
     def _check_same_frame(self, seq: int, flags: int) -> None:
-        """Check a packet of f (6, points 8 and 1)."""
+        """Check a packet of the newest frame f (6, points 8 and 1)."""
         if self.state is not BackPage.FILLING:
             raise PacketError(spec.CODE_FRAME, _FRAME, "the frame is not open")
         if self._commit is not None and self._ahead(self._commit) < self._ahead(seq):
@@ -129,14 +128,14 @@ class Session:
             raise PacketError(spec.CODE_FRAME, _CLEAR, "the frame began with another CLEAR flag")
 
     def begin_frame(self, frame: int, flags: int) -> None:
-        """Begin a frame, and drop the one before if it is not on display."""
+        """Begin a frame; the one before is dropped if it is not on display."""
         self.state = BackPage.FILLING
         self._newest = frame
         self._clear = bool(flags & spec.DATA_FLAG_CLEAR)
         self._commit = None
 
     def mark_received(self, seq: int, flags: int) -> None:
-        """Remember that a packet of f has been received, and see whether f is whole now."""
+        """Mark a packet of f as received, and update the state if f is whole now."""
         if flags & spec.DATA_FLAG_COMMIT and (
             self._commit is None or self._ahead(seq) < self._ahead(self._commit)
         ):
@@ -156,6 +155,6 @@ class Session:
                 return
 
     def swap(self) -> None:
-        """Remember that f has been put on display."""
+        """Record that f is on display."""
         self.shown = self._newest
         self.state = BackPage.EMPTY

@@ -1,8 +1,8 @@
-"""Which voxels LINE, BOX and OCT draw (7.3, 7.4), as indices in scan order.
+"""Voxels of LINE, BOX and OCT (7.3, 7.4), as indices in scan order.
 
-Nothing is drawn here, and what leads off the grid is left to the caller. The voxels of a brick are
-known by their place in it, x + 16 y + 256 z, until all its masks are read: the largest brick has a
-side of 16, so that places are added without a carry from one axis to the next.
+Draws nothing; checking the grid is left to the caller. Voxels of a brick are identified by their
+position in it, x + 16 y + 256 z, until all its masks are read: the largest brick has a side of 16,
+so positions can be added without a carry from one axis to the next.
 """
 
 from array import array
@@ -29,12 +29,12 @@ def _children(level: int, mask: int) -> tuple[int, ...]:
     return tuple(half * _brick_index(c & 1, c >> 1 & 1, c >> 2) for c in range(8) if mask >> c & 1)
 
 
-# By level and mask, where the children of a node begin. Mask 00 has none, but that of the lowest
-# level writes all voxels as FF does.
+# By level and mask: the positions of a node's children. Mask 00 has none, but at the lowest level
+# it writes all voxels as FF does.
 _CHILDREN: Final = [[_children(level, mask) for mask in range(256)] for level in _LEVELS]
 _CHILDREN[1][0] = _CHILDREN[1][0xFF]
 
-# By level, where the rows of a cube begin.
+# By level: the positions at which the rows of a cube begin.
 _ROWS: Final = [
     [_brick_index(0, y, z) for z in range(1 << level) for y in range(1 << level)]
     for level in _LEVELS
@@ -86,16 +86,16 @@ def box(grid: Grid, start: int, target: tuple[int, int, int]) -> Iterator[tuple[
     Yields
     ------
     starts : range
-        Index of the first voxel of each of many runs.
+        Index of the first voxel of each run.
     count : int
-        How many voxels each of them has.
+        Length of each of these runs.
     """
     corners = zip(grid.coordinates(start), target, strict=True)
     spans = [(min(corner), max(corner)) for corner in corners]
     first = grid.index(*(low for low, _ in spans))
     axes = [(high - low + 1, s) for (low, high), s in zip(spans, grid.strides, strict=True)]
     count = 1
-    while axes and axes[0][1] == count:  # what fills whole rows, or planes, is one run
+    while axes and axes[0][1] == count:  # whole rows or planes are one run
         count *= axes.pop(0)[0]
     (many, near), (few, far) = sorted([*axes, (1, 1), (1, 1)], reverse=True)[:2]
     for begin in range(first, first + few * far, far):
@@ -110,12 +110,12 @@ class Brick:
     level
         0 to 4.
     masks
-        Is called with how many masks are needed next, for each level of nodes, and returns them.
+        Called for each level of nodes with the number of masks; returns them.
 
     Attributes
     ----------
     rows : list of (int, list of int)
-        How many voxels a row along x has, and the places in the brick where such rows begin.
+        Length of rows along x, and the positions in the brick at which such rows begin.
     """
 
     def __init__(self, level: int, masks: Callable[[int], bytes]) -> None:
@@ -136,12 +136,12 @@ class Brick:
         self.rows.append((1, nodes))
 
     def fits(self, room: tuple[int, int, int]) -> bool:
-        """Tell whether all voxels have places before a limit on each axis.
+        """Return whether all voxels are below a limit on each axis.
 
         Parameters
         ----------
         room
-            The first x, y and z in the brick that no voxel may have; it may be below 1.
+            The limits on x, y and z, relative to the brick; they may be below 1.
         """
         if min(room) >= self._side:
             return True
@@ -154,7 +154,7 @@ class Brick:
 
 
 def brick_offsets(grid: Grid) -> list[int]:
-    """Return what each place in a brick adds to the index of the brick's first voxel."""
+    """Return the index offset of each position in a brick from the brick's first voxel."""
     x, y, z = grid.strides
     return [
         place % _SIDE * x + place // _SIDE % _SIDE * y + place // _SIDE**2 * z

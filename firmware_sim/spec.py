@@ -1,8 +1,8 @@
-"""The literals of the protocol document, transcribed by hand in the document's order.
+"""Literals of protocol.md, transcribed by hand in the document's order.
 
 No logic here. A test compares each constant with the table that it comes from: row NAME of the
 table ``literals: GROUP`` is ``GROUP_NAME``, and the table ``layout: NAME`` is ``LAYOUT_NAME``, a
-tuple of (field, offset, size) for the fields whose place and size are fixed.
+tuple of (field, offset, size) for the fields of fixed offset and size.
 """
 
 from typing import Final

@@ -1,15 +1,15 @@
-"""The device on USB: emulated packet by packet, in this process or behind USB/IP.
+"""USB carrier of the emulated device, packet by packet, in this process or behind USB/IP.
 
 ::
 
-    function      what the display is on USB: endpoints, classes, packets
-    descriptors   what it says of itself
+    function      the display as a USB function: endpoints, classes, packets
+    descriptors   USB descriptors, and their parsing
     device        transfers, halts, control requests: USB 2.0
-    host          a bus in this process          usbip         messages of USB/IP
-    backend       pyusb's way to either          usbip_server  a device for other processes' kernels
-                                                 usbip_host    the other end, without a kernel
+    host          a bus in this process             usbip         messages of USB/IP
+    backend       pyusb backend for either host     usbip_server  the device for Linux kernels
+                                                    usbip_host    a client, without a kernel
 
-`open_in_process` and `open_usbip` open ports of the kinds ``sim-usb:`` and ``usbip:``: they give
+`open_in_process` and `open_usbip` open ports of the kinds ``sim-usb:`` and ``usbip:``: they return
 backends of pyusb.
 """
 
@@ -36,8 +36,8 @@ def open_in_process(url: str) -> Backend:
     Parameters
     ----------
     url
-        ``sim-usb:``, or ``sim-usb:?KEY=VALUE&...`` with the keys of ``sim:`` and ``unplug``: after
-        how many packets the device is pulled out.
+        ``sim-usb:``, or ``sim-usb:?KEY=VALUE&...`` with the keys of ``sim:`` and ``unplug``: the
+        number of packets after which the device is unplugged.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def open_in_process(url: str) -> Backend:
     Raises
     ------
     ValueError
-        If a key is not known or a value cannot be; the message names it.
+        If a key is unknown or a value invalid; the message names it.
     """
     fields = parse_url(url, "sim-usb:", _KEYS)
     faults, seed = fields.pop("faults", ()), fields.pop("seed", 0)
@@ -59,7 +59,7 @@ def open_in_process(url: str) -> Backend:
 
 
 def open_usbip(url: str) -> Backend:
-    """Open a ``usbip:`` port: what a USB/IP server exports, such as ``voxdisplay-sim --usbip``.
+    """Open a ``usbip:`` port: the device of a USB/IP server such as ``voxdisplay-sim --usbip``.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def open_usbip(url: str) -> Backend:
     Raises
     ------
     ValueError
-        If it is not written like that.
+        If the URL has another form.
     """
     match = re.fullmatch(
         r"usbip://(?:\[([0-9a-fA-F:]+)\]|([^\[\]:/?#@]+))(?::([0-9]{1,5}))?/?", url

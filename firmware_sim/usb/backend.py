@@ -1,7 +1,7 @@
-"""A backend of pyusb, so that programs written for it talk to an emulated device unchanged.
+"""Backend of pyusb, through which programs written for it use an emulated device unchanged.
 
-It is what a system's kernel and libusb are for a real device: descriptors, claims, time limits and
-the errors of both, as Linux gives them. pyusb is looked at for its exceptions alone.
+It takes the place of the kernel and libusb: descriptors, claims, timeouts, and the errors of both
+as on Linux. pyusb is imported for its exceptions alone.
 """
 
 import errno
@@ -13,7 +13,7 @@ from firmware_sim.usb import descriptors, device
 from firmware_sim.usb.device import Request, Urb
 from firmware_sim.usb.host import HIGH_SPEED, Connection, Host, PluggedDevice
 
-# What libusb calls these errors.
+# libusb's error codes.
 _LIBUSB: Final = {
     errno.EIO: -1,
     errno.EACCES: -3,
@@ -33,7 +33,7 @@ _CONTROL_S: Final = 1.0
 
 
 class _SharedDevice:
-    """A device that is plugged in, as all who use this backend share it."""
+    """A device that is plugged in, shared by all handles to it."""
 
     def __init__(self, plugged: PluggedDevice) -> None:
         self.plugged = plugged
@@ -71,7 +71,7 @@ class _SharedDevice:
     def control(
         self, kind: int, request: int, value: int = 0, index: int = 0, length: int = 0
     ) -> bytes:
-        """Do a control transfer without data to the device."""
+        """Make a control transfer without data to the device; return the data from it."""
         setup = struct.pack("<BBHHH", kind, request, value, index, length)
         urb = Urb(0, length=length, setup=setup)
         self.transfer(urb, _CONTROL_S)
@@ -79,7 +79,7 @@ class _SharedDevice:
 
     @property
     def descriptors(self) -> tuple[Any, Any]:
-        """What the device says of itself: device and configuration."""
+        """Descriptors of the device and of its configuration, read once."""
         if self._descriptors is None:
             self.open()
             try:
@@ -101,24 +101,24 @@ class _SharedDevice:
 
 
 class _Handle:
-    """A device as somebody has opened it."""
+    """An open device."""
 
     def __init__(self, node: _SharedDevice) -> None:
         self.node = node
 
 
 class Backend:
-    """What pyusb wants of a backend: see ``usb.backend.IBackend`` for each method.
+    """Backend of pyusb: see ``usb.backend.IBackend`` for each method.
 
     Parameters
     ----------
     host
-        Where devices are plugged in.
+        The host whose devices are used.
 
     Attributes
     ----------
     host : Host
-        The same.
+        The host.
     """
 
     def __init__(self, host: Host) -> None:
@@ -128,7 +128,7 @@ class Backend:
     # Devices
 
     def enumerate_devices(self) -> list[_SharedDevice]:
-        """List the devices that are plugged in."""
+        """Return the devices that are plugged in."""
         try:
             plugged = self.host.plugged()
         except OSError as error:
@@ -137,25 +137,25 @@ class Backend:
         return list(self._nodes.values())
 
     def get_parent(self, dev: _SharedDevice) -> None:
-        """Give the hub of a device: there is none."""
+        """Return the hub of a device: there is none."""
 
     def get_device_descriptor(self, dev: _SharedDevice) -> Any:
-        """Give the device descriptor."""
+        """Return the device descriptor."""
         return dev.descriptors[0]
 
     def get_configuration_descriptor(self, dev: _SharedDevice, config: int) -> Any:
-        """Give a configuration; there is one."""
+        """Return a configuration; there is one."""
         return [dev.descriptors[1][0]][config]
 
     def get_interface_descriptor(self, dev: _SharedDevice, intf: int, alt: int, config: int) -> Any:
-        """Give an interface; none has alternate settings."""
+        """Return an interface; none has alternate settings."""
         self.get_configuration_descriptor(dev, config)
         return [dev.descriptors[1][1][intf][0]][alt]
 
     def get_endpoint_descriptor(
         self, dev: _SharedDevice, ep: int, intf: int, alt: int, config: int
     ) -> Any:
-        """Give an endpoint of an interface."""
+        """Return an endpoint of an interface."""
         self.get_interface_descriptor(dev, intf, alt, config)
         return dev.descriptors[1][1][intf][1][ep]
 
@@ -167,19 +167,19 @@ class Backend:
         return _Handle(dev)
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close a device, and give back what was claimed."""
+        """Close a device, and release its claims."""
         node = dev_handle.node
         node.claims = {n: owner for n, owner in node.claims.items() if owner is not dev_handle}
         node.close()
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
-        """Give the device a configuration: its endpoints begin anew. Nobody may hold them then."""
+        """Set the configuration, which resets the endpoints; no interface may be claimed."""
         if dev_handle.node.claims or dev_handle.node.plugged.drivers:
             raise _error(errno.EBUSY)
         dev_handle.node.control(0x00, Request.SET_CONFIGURATION, config_value)
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        """Ask for the value of its configuration."""
+        """Return the value of the device's configuration."""
         return dev_handle.node.control(0x80, Request.GET_CONFIGURATION, length=1)[0]
 
     def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:
@@ -191,7 +191,7 @@ class Backend:
         self.set_configuration(dev_handle, 1)
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Claim an interface, unless somebody else has it."""
+        """Claim an interface, unless another handle has claimed it."""
         node = dev_handle.node
         if intf not in {interface.bInterfaceNumber for interface, _ in node.descriptors[1][1]}:
             raise _error(errno.ENOENT)
@@ -200,23 +200,23 @@ class Backend:
         node.claims[intf] = dev_handle
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Give back an interface."""
+        """Release an interface."""
         if dev_handle.node.claims.get(intf) is not dev_handle:
             raise _error(errno.ENOENT)
         del dev_handle.node.claims[intf]
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """Tell whether a driver of the system has an interface."""
+        """Return whether a driver of the system holds an interface."""
         return intf in dev_handle.node.plugged.drivers
 
     def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Take an interface from the system's driver."""
+        """Detach the system's driver from an interface."""
         if intf not in dev_handle.node.plugged.drivers:
             raise _error(errno.ENOENT)
         dev_handle.node.plugged.drivers.remove(intf)
 
     def attach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Let the system's driver have an interface, if nobody claims it."""
+        """Attach the system's driver to an interface, unless it is claimed."""
         if intf in dev_handle.node.claims:
             raise _error(errno.EBUSY)
         dev_handle.node.plugged.drivers.add(intf)
@@ -225,22 +225,22 @@ class Backend:
         """End the stall of an endpoint."""
         dev_handle.node.control(0x02, Request.CLEAR_FEATURE, 0, ep)
 
-    # Transfers: data and buffers are arrays of bytes, timeouts milliseconds, 0 for ever
+    # Transfers: data and buffers are arrays of bytes; timeouts are in milliseconds, 0 means none
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
-        """Write to an endpoint; give how many bytes the device took."""
+        """Write to an endpoint; return the number of bytes that the device took."""
         del intf
         return dev_handle.node.transfer(Urb(ep, data.tobytes()), _seconds(timeout))
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
-        """Read from an endpoint into a buffer; give how many bytes came."""
+        """Read from an endpoint into a buffer; return the number of bytes."""
         del intf
         urb = Urb(ep, length=len(buff) * buff.itemsize)
         count = dev_handle.node.transfer(urb, _seconds(timeout))
         memoryview(buff).cast("B")[:count] = urb.received
         return count
 
-    intr_write = iso_write = bulk_write  # which one, the endpoint's descriptor says
+    intr_write = iso_write = bulk_write  # the endpoint's descriptor decides
     intr_read = iso_read = bulk_read
 
     def ctrl_transfer(
@@ -253,7 +253,7 @@ class Backend:
         data: Any,
         timeout: int,
     ) -> int:
-        """Do a control transfer; give how many bytes it moved."""
+        """Make a control transfer; return the number of bytes that it moved."""
         size = len(data) * data.itemsize
         setup = struct.pack("<BBHHH", bmRequestType, bRequest, wValue, wIndex, size)
         if bmRequestType & descriptors.IN:
@@ -270,8 +270,8 @@ def _seconds(timeout_ms: int) -> float | None:
 
 
 def _error(number: int) -> Exception:
-    """Make pyusb's exception of an error number."""
-    import usb.core  # noqa: PLC0415 - whoever gets here has loaded it
+    """Return pyusb's exception for an error number."""
+    import usb.core  # noqa: PLC0415 - the caller has loaded it
 
     kind = usb.core.USBTimeoutError if number == errno.ETIMEDOUT else usb.core.USBError
     made: Exception = kind(os.strerror(number), _LIBUSB.get(number, -99), number)

@@ -1,6 +1,6 @@
-"""What a USB device says of itself, as bytes: its descriptors, and how a host reads them again.
+"""USB descriptors of a device, as bytes, and their parsing by a host.
 
-Names and layouts are those of the USB 2.0 specification, chapter 9. It knows no transfers.
+Names and layouts are those of the USB 2.0 specification, chapter 9. Knows no transfers.
 """
 
 import struct
@@ -30,7 +30,7 @@ _ENGLISH: Final = 0x0409
 
 @dataclass(frozen=True)
 class Endpoint:
-    """An endpoint: address with the bit of its direction, kind, longest packet in bytes."""
+    """An endpoint: address with the direction bit, transfer type, longest packet in bytes."""
 
     address: int
     attributes: int
@@ -42,7 +42,7 @@ class Endpoint:
 class Interface:
     """An interface: its number, its class, subclass and protocol, and its endpoints.
 
-    ``functional`` holds the descriptors of its class, which stand before the endpoints'.
+    ``functional`` holds the descriptors of its class, which come before those of the endpoints.
     """
 
     number: int
@@ -53,18 +53,18 @@ class Interface:
 
 @dataclass(frozen=True)
 class Descriptors:
-    """All that a device says.
+    """All descriptors of a device.
 
     Parameters
     ----------
     vid, pid
         Vendor and product.
     manufacturer, product, serial
-        Texts; an empty one is not announced.
+        Strings; an empty one is not announced.
     interfaces
         Those of its only configuration, whose value is 1.
     device_class
-        Of the whole device; 0 leaves it to the interfaces.
+        Class of the whole device; 0 leaves it to the interfaces.
     """
 
     vid: int
@@ -82,11 +82,11 @@ class Descriptors:
 
     @property
     def endpoints(self) -> dict[int, Endpoint]:
-        """All endpoints but that for control, by address."""
+        """All endpoints except that for control, by address."""
         return {e.address: e for i in self.interfaces for e in i.endpoints}
 
     def get(self, kind: int, index: int) -> bytes | None:
-        """Give a descriptor by kind and index; None if there is none."""
+        """Return a descriptor by type and index; None if there is none."""
         if kind == DEVICE and not index:
             return self._device()
         if kind == CONFIGURATION and not index:
@@ -126,7 +126,7 @@ Record: TypeAlias = SimpleNamespace
 
 
 def _record(names: str, values: tuple[int, ...]) -> Record:
-    """Make a descriptor as a host's software shows it: its fields by the standard's names."""
+    """Return a descriptor as a host's software shows it, with fields under the standard's names."""
     fields = dict(zip(names.split(), values, strict=True))
     return SimpleNamespace(**fields, extra_descriptors=[])
 
@@ -150,19 +150,19 @@ _ENDPOINT_NAMES: Final = (
 
 
 def read_device(data: bytes) -> Record:
-    """Read a device descriptor."""
+    """Parse a device descriptor."""
     return _record(_DEVICE_NAMES, _DEVICE.unpack(data))
 
 
 def read_configuration(data: bytes) -> tuple[Record, list[tuple[Record, list[Record]]]]:
-    """Read a configuration descriptor and what follows it.
+    """Parse a configuration descriptor and the descriptors behind it.
 
     Returns
     -------
     configuration : Record
     interfaces : list of (Record, list of Record)
-        Interfaces with their endpoints. Descriptors of a class are in ``extra_descriptors``
-        of what stands before them.
+        Interfaces with their endpoints. Descriptors of a class are in the ``extra_descriptors``
+        of the descriptor before them.
     """
     records = _records(data)
     configuration = last = _record(_CONFIGURATION_NAMES, _CONFIGURATION.unpack(next(records)))

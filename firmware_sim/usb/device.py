@@ -1,7 +1,7 @@
-"""A USB device: transfers in, transfers out, packet by packet (USB 2.0, chapters 5, 8 and 9).
+"""State machine of a USB device: transfers, packet by packet (USB 2.0, chapters 5, 8 and 9).
 
-A host submits a transfer (`Urb`) and it is done when its status says so. What a device cannot take
-or has not got it answers with NAK: the transfer waits. No clock, no thread, no input or output.
+A host submits a transfer (`Urb`), which is done when its status is set. The device answers NAK
+while it cannot take a packet or has none: the transfer waits. No clock, no thread and no I/O.
 """
 
 import struct
@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 from firmware_sim.usb.descriptors import IN, Descriptors
 
-# Why a transfer ended: Linux's numbers, as USB/IP carries them on every system.
+# Status of transfers: Linux's error numbers, which USB/IP uses on every system.
 DONE: Final = 0
 EPIPE: Final = 32  # stalled
 EOVERFLOW: Final = 75  # the device sent more than the host asked for
@@ -38,30 +38,30 @@ class Request(IntEnum):
 
 
 class Function(Protocol):
-    """What a device is for: what stands behind its endpoints."""
+    """Function of a device: what is behind its endpoints."""
 
     descriptors: Descriptors
 
     def accepts(self, endpoint: int, size: int) -> bool:
-        """Tell whether a packet of a size to an OUT endpoint has room; else it is NAKed."""
+        """Return whether a packet to an OUT endpoint can be taken; otherwise it gets NAK."""
 
     def receive(self, endpoint: int, packet: bytes) -> None:
         """Take a packet."""
 
     def next_packet(self, endpoint: int) -> bytes | None:
-        """Give the next packet of an IN endpoint, at most as long as the endpoint says.
+        """Return the next packet of an IN endpoint, at most as long as the endpoint allows.
 
-        None is NAK.
+        None means NAK.
         """
 
     def request(self, setup: "Setup", data: bytes) -> bytes | None:
-        """Answer a request of a class or vendor; None stalls it."""
+        """Return the data for a class or vendor request; None stalls it."""
 
     def reset(self) -> None:
-        """Forget what was under way: plugged in anew, or given a configuration."""
+        """Discard all pending data: the device was plugged in or given a configuration."""
 
     def next_event_s(self) -> float | None:
-        """Return the seconds until something happens without the host; None if nothing will."""
+        """Return the seconds until an event without the host's doing; None if none will come."""
 
 
 class Setup:
@@ -72,7 +72,7 @@ class Setup:
 
     @property
     def is_in(self) -> bool:
-        """Whether the device sends the data."""
+        """True if the device sends the data."""
         return bool(self.kind & IN)
 
 
@@ -82,11 +82,11 @@ class Urb:
     Parameters
     ----------
     endpoint
-        Address, with the bit of its direction; 0 is control, whatever its direction.
+        Address with the direction bit; 0 is control, in either direction.
     data
-        What the host sends.
+        Data from the host.
     length
-        How many bytes the host takes.
+        Most bytes that the host takes.
     setup
         The eight bytes of a control transfer.
 
@@ -94,10 +94,10 @@ class Urb:
     ----------
     actual : int
         Bytes moved so far.
-    got : bytearray
-        What the device has sent.
+    received : bytearray
+        Data from the device.
     status : int or None
-        None while it waits.
+        None while it is pending.
     """
 
     def __init__(
@@ -118,22 +118,22 @@ class UsbDevice:
     Parameters
     ----------
     function
-        What it is for.
+        Its function.
 
     Attributes
     ----------
     configuration : int
-        Value of its configuration; 0 as long as the host has chosen none.
+        Value of its configuration; 0 until the host has set one.
     halted : set of int
         Addresses of the endpoints that stall.
     plugged : bool
-        Whether it is there.
+        True while it is plugged in.
     number : int
         Its number on the bus, another one each time it is plugged in.
     packets : int
-        How many packets its endpoints have moved, all but control's.
+        Number of packets that its endpoints have moved, except that for control.
     unplug_at : int or None
-        After how many packets it is unplugged.
+        Number of packets after which it is unplugged.
     """
 
     def __init__(self, function: Function) -> None:
@@ -148,7 +148,7 @@ class UsbDevice:
         self._queues: dict[int, deque[Urb]] = {address: deque() for address in self._endpoints}
 
     def submit(self, urb: Urb) -> None:
-        """Begin a transfer; it may be done at once."""
+        """Submit a transfer; it may be done at once."""
         if not self.plugged:
             urb.status = ESHUTDOWN
         elif urb.endpoint & ~IN == 0:
@@ -160,7 +160,7 @@ class UsbDevice:
         self.advance()
 
     def unlink(self, urb: Urb) -> None:
-        """Give a transfer up, if it is not done: what has been moved has been moved."""
+        """Cancel a transfer that is not done; data already moved stays moved."""
         if urb.status is None:
             self._queues[urb.endpoint].remove(urb)
             urb.status = ECONNRESET
@@ -172,24 +172,24 @@ class UsbDevice:
                 self.unplug()
 
     def next_event_s(self) -> float | None:
-        """Return the seconds until something moves without the host; 0 if it just has."""
+        """Return the seconds until the next event of the device; 0 if one has just occurred."""
         before = self.packets
-        self.advance()  # a tick may have come while the last packets were moved
+        self.advance()  # a tick may have passed while the last packets were moved
         return 0.0 if self.packets != before else self.function.next_event_s()
 
     def unplug(self) -> None:
-        """Go away; what was under way fails."""
+        """Unplug the device; pending transfers fail."""
         self.plugged = False
         self._shut_down()
 
     def plug(self) -> None:
-        """Come back, as after power on."""
+        """Plug the device in, as after power on."""
         self.number += 1
         self.plugged = True
         self.reset()
 
     def reset(self) -> None:
-        """Forget configuration, halts and what was under way."""
+        """Reset configuration and halts; pending transfers fail."""
         self.configuration = 0
         self._shut_down()
 
@@ -203,7 +203,7 @@ class UsbDevice:
     # Packets
 
     def _step(self, address: int) -> bool:
-        """Move a packet of the first transfer of an endpoint, if there is one to move."""
+        """Move a packet of the first transfer of an endpoint; return whether anything changed."""
         queue = self._queues[address]
         if not queue:
             return False

@@ -1,7 +1,7 @@
-"""The display as a USB function: protocol.md's USB carrier (16), or a serial port of class CDC-ACM.
+"""USB function of the display: protocol.md's USB carrier (16), or a CDC-ACM serial port.
 
-It cuts the device's bytes into packets, and lets none come in for which the device has no room. It
-knows nothing of what the bytes mean.
+Cuts the device's output into packets, and takes no packet for which the device has no room. Knows
+nothing of what the bytes mean.
 """
 
 import struct
@@ -36,10 +36,10 @@ _DTR: Final = 1
 
 
 class PacketStream:
-    """Bytes on their way to the host, cut into packets.
+    """Output queue, cut into packets.
 
-    A transfer is over for the host when a packet is not full. So if the last one that there is to
-    send is full, one of zero length follows it.
+    A packet that is not full ends a transfer. So if the last packet of the queue is full, one of
+    zero length follows it.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class PacketStream:
         self._bytes += data
 
     def next_packet(self) -> bytes | None:
-        """Give the next packet; None if there is nothing to send."""
+        """Return the next packet; None if there is nothing to send."""
         if not self._bytes and not self._needs_zero_length:
             return None
         packet = bytes(self._bytes[: self._packet])
@@ -70,7 +70,7 @@ class PacketStream:
 
 
 class DisplayFunction:
-    """A device of the protocol behind a bulk endpoint each way.
+    """Vendor-specific function: the device behind a bulk endpoint each way.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class DisplayFunction:
     Attributes
     ----------
     descriptors : Descriptors
-        What it says of itself. Its serial number is the device's.
+        Its descriptors. The serial number is that of INFO.
     """
 
     def __init__(self, wire: DeviceOnLine | PacedDevice, packet: int = HIGH_SPEED_PACKET) -> None:
@@ -98,7 +98,7 @@ class DisplayFunction:
 
     @staticmethod
     def _interfaces(bulk: tuple[Endpoint, ...]) -> tuple[tuple[Interface, ...], int]:
-        """Give the interfaces, and the class of the whole device."""
+        """Return the interfaces, and the class of the whole device."""
         return (Interface(0, TRIPLE, bulk),), 0
 
     def accepts(self, endpoint: int, size: int) -> bool:
@@ -115,7 +115,7 @@ class DisplayFunction:
     def next_packet(self, endpoint: int) -> bytes | None:
         """See `Function.next_packet`."""
         if endpoint != _IN:
-            return None  # there is nothing to notify of
+            return None  # there are no notifications
         if not self._out:
             self._out.put(self.wire.transmit())
         return self._out.next_packet()
@@ -136,12 +136,12 @@ class DisplayFunction:
 
 
 class SerialFunction(DisplayFunction):
-    """The same device as a serial port, as systems know it without a driver: class CDC-ACM.
+    """CDC-ACM function: the device as a serial port, which systems support without a driver.
 
     Attributes
     ----------
     line_coding : bytes
-        Baud rate and the rest, as the host has set it last; they change nothing.
+        Baud rate and framing as set by the host; they have no effect.
     """
 
     def __init__(self, wire: DeviceOnLine | PacedDevice, packet: int = HIGH_SPEED_PACKET) -> None:

@@ -1,7 +1,7 @@
-"""A host's side of the bus: what is plugged in, and transfers that end in time.
+"""Host side of the bus: devices that are plugged in, and transfers with a timeout.
 
 `Bus` is a host in the same process as the device; the other one is in `usbip_host`. Neither knows
-what is transferred.
+anything of the data.
 """
 
 import errno
@@ -18,10 +18,10 @@ SET_CONFIGURATION: Final = bytes((0x00, 9, 1, 0, 0, 0, 0, 0))
 
 
 class Connection(Protocol):
-    """The way to a device that has been opened."""
+    """Connection to an open device."""
 
     def transfer(self, urb: Urb, timeout_s: float | None) -> None:
-        """Do a transfer; give it up when the time is over. None waits as long as it takes.
+        """Make a transfer; cancel it after the timeout. None waits without a limit.
 
         Raises
         ------
@@ -30,7 +30,7 @@ class Connection(Protocol):
         """
 
     def close(self) -> None:
-        """End it."""
+        """Close it."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class PluggedDevice:
     Parameters
     ----------
     bus, number
-        Its place; the number is another one each time it is plugged in.
+        Bus and device number; the latter is another one each time it is plugged in.
     connect
-        Opens the way to it, or raises OSError.
+        Opens a connection, or raises OSError.
     drivers
         Interfaces that a driver of the host's system holds.
     """
@@ -54,10 +54,10 @@ class PluggedDevice:
 
 
 class Host(Protocol):
-    """What devices are plugged into."""
+    """A host into which devices are plugged."""
 
     def plugged(self) -> list[PluggedDevice]:
-        """List what is plugged in now."""
+        """Return the devices that are plugged in."""
 
 
 class Bus:
@@ -66,16 +66,16 @@ class Bus:
     Parameters
     ----------
     device
-        The device. It is plugged in, and given its configuration, as systems do.
+        The device. It is plugged in and given its configuration, as systems do.
 
     Attributes
     ----------
     device : UsbDevice
-        The device. Threads that transfer move it.
+        The device. It advances in the threads that transfer.
     drivers : set of int
         Interfaces that a driver of the system holds.
     forbidden : bool
-        Whether the device may not be opened.
+        True if the device may not be opened.
     """
 
     def __init__(self, device: UsbDevice) -> None:
@@ -93,7 +93,7 @@ class Bus:
         return [PluggedDevice(1, number, lambda: self._connect(number), self.drivers)]
 
     def unplug(self) -> None:
-        """Pull the device out; transfers under way fail."""
+        """Unplug the device; pending transfers fail."""
         with self._changed:
             self.device.unplug()
             self._changed.notify_all()
@@ -113,14 +113,14 @@ class Bus:
         return _OnBus(self, number)
 
     def transfer(self, number: int, urb: Urb, timeout_s: float | None) -> None:
-        """Do a transfer with the device that had a number; see `Connection.transfer`."""
+        """Make a transfer with the device of a number; see `Connection.transfer`."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         device = self.device
         with self._changed:
             if number != device.number or not device.plugged:
                 raise ConnectionError("it is not plugged in")
             device.submit(urb)
-            self._changed.notify_all()  # it may have finished what another thread waits for
+            self._changed.notify_all()  # it may have completed a transfer of another thread
             while urb.status is None:
                 left = None if deadline is None else deadline - time.monotonic()
                 if left is not None and left <= 0:
@@ -132,7 +132,7 @@ class Bus:
 
 
 class _OnBus:
-    """The way to a device on a `Bus`."""
+    """Connection to a device on a `Bus`."""
 
     def __init__(self, bus: Bus, number: int) -> None:
         self._bus = bus

@@ -1,8 +1,7 @@
-"""The messages of USB/IP 1.1.1, which carries USB transfers over TCP.
+"""Messages of USB/IP 1.1.1, which carries USB transfers over TCP.
 
-As the Linux kernel's documentation describes them (Documentation/usb/usbip_protocol.rst): numbers
-are big-endian. Messages and no more: what answers them is in `usbip_server`, what asks in
-`usbip_host`.
+As described by the Linux kernel's documentation (Documentation/usb/usbip_protocol.rst); numbers are
+big-endian. Encoding only: the server is in `usbip_server`, the client in `usbip_host`.
 """
 
 import struct
@@ -37,7 +36,7 @@ MESSAGE_BYTES: Final = 48
 
 @dataclass(frozen=True)
 class Submit:
-    """A transfer that the host begins; its data follows if it is OUT."""
+    """A transfer submitted by the host; its data follows if it is OUT."""
 
     seqnum: int
     devid: int
@@ -48,52 +47,52 @@ class Submit:
     packets: int = NOT_ISOCHRONOUS
 
     def pack(self) -> bytes:
-        """Give its bytes."""
+        """Return the bytes of the message."""
         head = _HEADER.pack(CMD_SUBMIT, self.seqnum, self.devid, self.is_in, self.endpoint)
         return head + _SUBMIT.pack(0, self.length, 0, self.packets, 0, self.setup)
 
 
 @dataclass(frozen=True)
 class Unlink:
-    """The host gives a transfer up."""
+    """Cancellation of a transfer by the host."""
 
     seqnum: int
     devid: int
     target: int
 
     def pack(self) -> bytes:
-        """Give its bytes."""
+        """Return the bytes of the message."""
         return _HEADER.pack(CMD_UNLINK, self.seqnum, self.devid, 0, 0) + _UNLINK.pack(self.target)
 
 
 @dataclass(frozen=True)
 class SubmitReply:
-    """A transfer is done; what came follows if it was IN. The status is 0 or a negative errno."""
+    """Completion of a transfer; its data follows if it was IN. Status: 0 or a negative errno."""
 
     seqnum: int
     status: int
     actual: int
 
     def pack(self) -> bytes:
-        """Give its bytes."""
+        """Return the bytes of the message."""
         head = _HEADER.pack(RET_SUBMIT, self.seqnum, 0, 0, 0)
         return head + _RETURN.pack(self.status, self.actual, 0, NOT_ISOCHRONOUS, 0)
 
 
 @dataclass(frozen=True)
 class UnlinkReply:
-    """What became of an `Unlink`: 0 if the transfer was done before, else a negative errno."""
+    """Reply to an `Unlink`: 0 if the transfer was done before, otherwise a negative errno."""
 
     seqnum: int
     status: int
 
     def pack(self) -> bytes:
-        """Give its bytes."""
+        """Return the bytes of the message."""
         return _HEADER.pack(RET_UNLINK, self.seqnum, 0, 0, 0) + _UNLINKED.pack(self.status)
 
 
 def parse_message(raw: bytes) -> Submit | Unlink | SubmitReply | UnlinkReply:
-    """Read the 48 bytes of a message.
+    """Parse the 48 bytes of a message.
 
     Raises
     ------
@@ -115,7 +114,7 @@ def parse_message(raw: bytes) -> Submit | Unlink | SubmitReply | UnlinkReply:
 
 
 def pack_device(about: Descriptors, number: int, configuration: int) -> bytes:
-    """Give a device as lists and imports do, without its interfaces."""
+    """Return the record of a device for lists and imports, without its interfaces."""
     return DEVICE.pack(
         f"/sys/devices/voxdisplay/{BUS_ID}".encode(),
         BUS_ID.encode(),

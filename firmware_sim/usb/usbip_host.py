@@ -1,7 +1,7 @@
-"""The host's side of USB/IP: what a server exports is plugged in here, without a kernel.
+"""USB/IP client: a host for the devices of a server, without a kernel.
 
-For tests, and for machines on which nothing may be attached. It moves transfers; it knows nothing
-of what is transferred.
+For tests, and for machines on which no device may be attached. Moves transfers; knows nothing of
+their data.
 """
 
 import contextlib
@@ -18,13 +18,13 @@ from firmware_sim.usb.device import ECONNRESET, ESHUTDOWN, Urb
 from firmware_sim.usb.host import SET_CONFIGURATION, PluggedDevice
 
 DEFAULT_PORT: Final = 3240
-_REPLY_TIMEOUT_S: Final = 5.0  # for a server to connect, and to answer what it answers at once
+_REPLY_TIMEOUT_S: Final = 5.0  # to connect, and for replies that come at once
 _CHUNK: Final = 1 << 18
-_MOST_DEVICES: Final = 256
+_MAX_DEVICES: Final = 256
 
 
 class UsbIpHost:
-    """What a USB/IP server exports.
+    """Host for the devices that a USB/IP server exports.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class UsbIpHost:
             sock.sendall(usbip.OPERATION.pack(usbip.VERSION, usbip.REQUEST_LIST, 0))
             _check_reply(sock, usbip.REPLY_LIST)
             (count,) = usbip.COUNT.unpack(_read(sock, usbip.COUNT.size))
-            for _ in range(min(count, _MOST_DEVICES)):
+            for _ in range(min(count, _MAX_DEVICES)):
                 about = usbip.DEVICE.unpack(_read(sock, usbip.DEVICE.size))
                 _read(sock, about[-1] * usbip.INTERFACE.size)
                 found.append(self._plugged(*about[1:4]))
@@ -91,9 +91,9 @@ def _read(sock: socket.socket, size: int) -> bytes:
 
 
 class _ImportedDevice:
-    """A device that this host has.
+    """Connection to an imported device.
 
-    Threads may transfer at the same time: whoever waits reads for all.
+    Threads may transfer at the same time: one of those that wait reads for all.
     """
 
     def __init__(self, sock: socket.socket, devid: int) -> None:
@@ -140,7 +140,7 @@ class _ImportedDevice:
             self._fail_all()
 
     def _fail_all(self) -> None:
-        """Fail all that is under way: the device is gone."""
+        """Fail all pending transfers: the device is gone."""
         self._lost = True
         for urb in self._urbs.values():
             urb.status = ESHUTDOWN
@@ -149,7 +149,7 @@ class _ImportedDevice:
         self._changed.notify_all()
 
     def _wait(self, urb: Urb, deadline: float | None, unlink: int = 0) -> bool:
-        """Wait until a transfer is done, and its unlinking is answered."""
+        """Wait until a transfer is done and the reply to its cancellation has come."""
         while urb.status is None or unlink in self._unlinks:
             left = None if deadline is None else deadline - time.monotonic()
             if left is not None and left <= 0:
@@ -161,7 +161,7 @@ class _ImportedDevice:
         return True
 
     def _read_some(self, timeout_s: float | None) -> None:
-        """Read for all threads that wait, without keeping them from sending."""
+        """Read for all threads that wait, with the lock released so that they can send."""
         self._reading = True
         self._changed.release()
         try:
@@ -181,7 +181,7 @@ class _ImportedDevice:
             self._fail_all()
 
     def _parse_message(self) -> bool:
-        """Take a message, if a whole one is there."""
+        """Process a message if a whole one has been read; return whether one was."""
         if len(self._in) < usbip.MESSAGE_BYTES:
             return False
         try:
