@@ -16,22 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
-from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
+from voxdisplay.argument_checks import flag, instance, whole_number, wrong_kind
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
+from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
 from voxdisplay.raster.color import Color, as_colors, colors_at, interpolate_colors
+from voxdisplay.raster.display_list import DisplayList, OrderedVoxels
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
 from voxdisplay.wire import spec
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
-from voxdisplay.wire.encoding_selection import (
-    OrderedVoxels,
-    PageUpdate,
-    concatenate_ordered,
-    encode_raw_if_faster,
-    encode_update,
-)
+from voxdisplay.wire.encoding_selection import PageUpdate, encode_raw_if_faster, encode_update
+from voxdisplay.wire.features import feature_bits
 from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import OpBlocks
@@ -104,12 +101,11 @@ class Frame:
         own_palette: bool = False,
     ) -> None:
         self.grid = Grid.of(grid)
-        self.format = format if isinstance(format, PixelFormat) else PixelFormat(_text(format))
+        self.format = PixelFormat.of(format)
         self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
         self._shared = False  # raster is shared with a copy
-        self._items: list[OrderedVoxels] = []
-        self._all_visible = False  # no drawn voxel is covered by a later item
-        self._has_base = False
+        self._drawn = DisplayList()
+        self._has_base = False  # set from an array, over which the list was drawn
         self._lit: tuple[NDArray[np.int64], Values] | None = None
         if palette is not None and self.format is not PixelFormat.INDEX8:
             raise ValueError(f"a {self.format.value} display has no palette: leave it out")
@@ -146,10 +142,10 @@ class Frame:
         self._visible(dark=True)  # so that it is found once for both
         twin = Frame.__new__(Frame)
         twin.__dict__.update(self.__dict__)
-        twin._items = list(self._items)  # noqa: SLF001 - of its own kind
-        if self._items and sum(map(len, self._items)) > _OVERDRAW_LIMIT * len(self.lit()[0]):
+        twin._drawn = self._drawn.copy()  # noqa: SLF001 - of its own kind
+        if len(self._drawn) > _OVERDRAW_LIMIT * len(self.lit()[0]):
             # Most drawn voxels are covered: the raster alone is smaller.
-            twin._items, twin._has_base = [], True  # noqa: SLF001
+            twin._drawn, twin._has_base = DisplayList(), True  # noqa: SLF001
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
         self._shared = twin._shared = True  # noqa: SLF001
         return twin
@@ -215,7 +211,10 @@ class Frame:
                 colors = colors_at(colors, voxelization.point_indices(drawable))
             drawing = self._add(drawable.voxels, colors, _corner_rows(drawable))
             return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
-        return self._add(_as_voxels(drawable), colors, _NO_INDICES)
+        if not is_array_like(drawable) or isinstance(drawable, Frame):
+            wanted = "a curve, a sequence, an (N, 3) array of voxels or a scene"
+            raise wrong_kind("drawable", wanted, drawable)
+        return self._add(as_voxels("drawable", drawable), colors, _NO_INDICES)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
@@ -250,8 +249,7 @@ class Frame:
             inside
         )
         self._raster[item.index] = self.format.pixels(item.values)
-        self._items.append(item)
-        self._all_visible = False
+        self._drawn.append(item)
         return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
 
     def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
@@ -272,11 +270,11 @@ class Frame:
             If shape, type or a mono1 value is another; the message says what is wanted.
 
         """
-        array = _as_array("array", array)
+        array = as_array("array", array)
         self.format.validate(array, self.grid.array_shape)
         self._prepare_change()
         self._raster[...] = array.reshape(self._raster.shape)
-        self._items.clear()
+        self._drawn = DisplayList()
         self._has_base = True
         if self._palette:
             self._palette.mark_used(
@@ -287,7 +285,7 @@ class Frame:
         """Make all voxels dark."""
         self._prepare_change()
         self._raster[...] = 0
-        self._items.clear()
+        self._drawn = DisplayList()
         self._has_base = False
 
     @property
@@ -369,10 +367,7 @@ class Frame:
         if self._has_base:
             index = np.flatnonzero(is_lit(self._raster))
             return index, self._values_at(index)
-        if not self._items:
-            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
-        index = np.sort(np.concatenate([item.index for item in self._items]))
-        index = index[np.concatenate((index[:1] >= 0, index[1:] != index[:-1]))]
+        index = self._drawn.indices()
         values = self._values_at(index)
         return index[values != 0], values[values != 0]
 
@@ -471,7 +466,7 @@ class Frame:
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
     ) -> EncoderConfig:
         whole_number("max_payload", max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
-        bits = _feature_bits(features)
+        bits = feature_bits(features)
         config = EncoderConfig(self.grid, self.format, max_payload, bits, bytes_per_s)
         if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
             raise ValueError(
@@ -481,15 +476,8 @@ class Frame:
 
     def _visible(self, *, dark: bool) -> OrderedVoxels | None:
         """Return the drawn voxels that no later item covers, without dark ones unless asked for."""
-        if not self._items:
-            return None
-        if len(self._items) > 1 or not self._all_visible:
-            items = concatenate_ordered(self._items)
-            # A covered voxel never shows again: a newer item would have drawn it.
-            self._items = [items.select(self._values_at(items.index) == items.values)]
-            self._all_visible = True
-        (items,) = self._items
-        return items if dark else items.select(items.values != 0)
+        drawn = self._drawn.visible(self._values_at)
+        return drawn if dark or drawn is None else drawn.select(drawn.values != 0)
 
     def _palette_blocks(self, old: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks | None:
         """Return op blocks that set the entries that differ from another palette, or None."""
@@ -516,44 +504,3 @@ def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
 def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[np.int64]:
     """Return indices, ascending, without those of drawn voxels."""
     return np.setdiff1d(index, items.index) if items else index
-
-
-def _text(format_: Any) -> str:
-    names = ", ".join(repr(each.value) for each in PixelFormat)
-    instance("format", format_, str, f"one of {names}")
-    return str(format_)
-
-
-def _feature_bits(features: Collection[str]) -> int:
-    """Return the names of features as bits of INFO."""
-    known = {
-        name.removeprefix("FEATURE_").lower(): bit
-        for name, bit in vars(spec).items()
-        if name.startswith("FEATURE_")
-    }
-    if not isinstance(features, tuple | list | set | frozenset | dict):
-        raise wrong_kind("features", "a collection of names", features)
-    for name in features:
-        choice("features", name, tuple(known))
-    return sum(1 << known[name] for name in set(features))
-
-
-def _as_array(name: str, value: object) -> NDArray[Any]:
-    try:
-        return np.asarray(value)
-    except ValueError:  # rows of different lengths
-        raise ValueError(f"{name}: its rows have different lengths") from None
-
-
-def _as_voxels(drawable: object) -> NDArray[np.integer]:
-    is_array = isinstance(drawable, list | tuple) or hasattr(drawable, "__array__")
-    if not is_array or isinstance(drawable, Frame | type):
-        wanted = "a curve, a sequence, an (N, 3) array of voxels or a scene"
-        raise wrong_kind("drawable", wanted, drawable)
-    voxels = _as_array("drawable", drawable)
-    if voxels.ndim != 2 or voxels.shape[1] != 3 or voxels.dtype.kind not in "iu":
-        raise ValueError(
-            f"drawable: voxels are an (N, 3) array of whole numbers, columns x, y, z; "
-            f"this is {voxels.shape} of {voxels.dtype}"
-        )
-    return voxels.astype(np.int64)

@@ -11,6 +11,7 @@ import reprlib
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.wire import spec
 
 Values = NDArray[np.uint32]
@@ -24,6 +25,15 @@ class PixelFormat(enum.Enum):
     INDEX8 = "index8"
     RGB565 = "rgb565"
     RGB888 = "rgb888"
+
+    @classmethod
+    def of(cls, value: object) -> PixelFormat:
+        """Return a format, or that of a name; raise `TypeError` or `ValueError` otherwise."""
+        if isinstance(value, cls):
+            return value
+        if not isinstance(value, str):
+            raise wrong_kind("format", f"one of {', '.join(each.value for each in cls)}", value)
+        return cls(value)
 
     @classmethod
     def _missing_(cls, value: object) -> None:

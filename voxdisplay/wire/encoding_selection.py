@@ -9,13 +9,14 @@ encoded in independent slabs, so that the first can be sent at once. Must not kn
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.raster.display_list import OrderedVoxels
 from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.wire import spans, spec, voxel_sets
 from voxdisplay.wire.chains import Chains, build_chains
@@ -40,56 +41,6 @@ _CHAINS_FROM = 800_000
 _LONE_FRACTION = 16  # unless one voxel in so many is isolated
 # Line rate, bytes/s, from which incompressible pages are sent raw rather than parsed.
 _RAW_FROM = 2_400_000
-
-
-@dataclass(frozen=True)
-class OrderedVoxels:
-    """Voxels on the grid in drawing order, of one item or of several, one after another.
-
-    Attributes
-    ----------
-    voxels : (n, 3) integer array
-        Columns x, y, z.
-    index : (n,) int64 array
-        Their scan-order indices.
-    values : (n,) integer array
-        Their pixel values.
-    item : (n,) int64 array
-        Number of the item of each, ascending.
-    corners : (n,) bool array
-        True where a straight line may end and another begin.
-
-    """
-
-    voxels: NDArray[np.integer]
-    index: Ints
-    values: NDArray[np.integer]
-    item: Ints
-    corners: Bools
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def select(self, kept: Bools) -> OrderedVoxels:
-        """Return the voxels where a mask, (n,), is set."""
-        if kept.all():
-            return self
-        return OrderedVoxels(*(getattr(self, field.name)[kept] for field in fields(self)))
-
-
-def concatenate_ordered(parts: Sequence[OrderedVoxels]) -> OrderedVoxels:
-    """Return the voxels of all parts, at least one, with their items renumbered."""
-    if len(parts) == 1:
-        return parts[0]
-    voxels, index, values, _, corners = (
-        np.concatenate([getattr(part, field.name) for part in parts])
-        for field in fields(OrderedVoxels)
-    )
-    # Parts that were concatenated before have several items, numbered from 0.
-    ordered = [int(part.item[-1]) + 1 if len(part) else 0 for part in parts]
-    first = np.cumsum(ordered) - ordered
-    owner = np.concatenate([part.item + n for part, n in zip(parts, first, strict=True)])
-    return OrderedVoxels(voxels, index, values, owner, corners)
 
 
 @dataclass(frozen=True)
