@@ -106,7 +106,10 @@ class Config:
             for name in FEATURES
             if name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8
         ]
-        features = frozenset(allowed if self.features is None else _names(self.features))
+        features = frozenset(allowed)
+        if self.features is not None:
+            features = _names(self.features)
+            object.__setattr__(self, "features", features)
         _check_names("feature", features, allowed, f" with the format {self.pixel_format}")
         bits = sum(1 << FEATURES[name] for name in features)
         object.__setattr__(self, "feature_bits", bits)

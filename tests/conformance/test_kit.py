@@ -1,9 +1,12 @@
 """The conformance kit: our emulator passes it, devices that break the document do not."""
 
+import copy
 import json
+import pickle
 import random
 import struct
 import time
+from dataclasses import replace
 
 import broken_devices
 import document
@@ -11,12 +14,16 @@ import pytest
 from virtual_time_device import VirtualTimeDevice
 
 from firmware_sim import crc
+from firmware_sim.packet_error import PacketError
 from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.announced_device import FEATURES, AnnouncedDevice
+from voxdisplay.conformance.catalogue import HANDSHAKE
 from voxdisplay.conformance.device_bugs import DEVICE_BUGS
+from voxdisplay.conformance.dialogue import NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.conformance.run import Verdict, run_checks, select_checks
+from voxdisplay.conformance.saved_page import SavedPage
 from voxdisplay.errors import TransportClosed
 from voxdisplay.wire import spec
 
@@ -385,3 +392,27 @@ def test_the_command_reports_a_failure(run):
     assert failed.returncode == 1, failed.stderr
     assert "BROKEN 3/longest-packet" in failed.stdout
     assert "must be:" in failed.stdout
+
+
+@pytest.mark.parametrize("protocol", [2, pickle.HIGHEST_PROTOCOL])
+def test_results_and_exceptions_can_be_pickled_and_copied(protocol):
+    report = examined(emulated_port(refresh=0), ["5/hello-short", "10/read-refused"])
+    report.results.append(replace(report.results[0], check=HANDSHAKE))
+    values = [
+        *(report, *CHECKS, packets.Response(packets.body(spec.TYPE_ACK, payload=bytes(21)))),
+        *(report.device, Page({3: 4}), SavedPage((b"\0",), 7)),
+    ]
+    for value in values:
+        pickled = pickle.dumps(value, protocol)
+        for copied in (pickle.loads(pickled), copy.deepcopy(value)):  # noqa: S301 - our own
+            assert copied == value
+    errors = [
+        *(Violation("this", "that", "why"), NoResponse("this", "that"), NotApplicable("so")),
+        *(Refused(7, 3), PacketError(7, 3, "why")),
+    ]
+    for error in errors:
+        pickled = pickle.dumps(error, protocol)
+        for copied in (pickle.loads(pickled), copy.copy(error)):  # noqa: S301 - our own
+            assert type(copied) is type(error)
+            assert vars(copied) == vars(error)
+            assert str(copied) == str(error)

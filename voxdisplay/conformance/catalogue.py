@@ -57,6 +57,10 @@ class Check:
         inner = f"{self.section}/".startswith((f"{pattern}/", f"{pattern}."))
         return inner or fnmatchcase(self.id, pattern) or fnmatchcase(self.name, pattern)
 
+    def __reduce__(self) -> tuple[Callable[[str], Check], tuple[str]]:
+        """Pickle by id: the functions of a check need not, and cannot all, be pickled."""
+        return find_check, (self.id,)
+
     def not_applicable_reason(self, device: AnnouncedDevice) -> str:
         """Return why the check does not apply to a device; ``""`` if it does."""
         return next((reason for need in self.preconditions if (reason := need(device))), "")
@@ -99,6 +103,28 @@ def check(
         return run
 
     return register
+
+
+def _run_by_handshake(probe: Probe) -> None:
+    del probe
+
+
+# Run as the handshake before all others, not by itself.
+HANDSHAKE = Check("5", "answers", "the response to HELLO is INFO", (), _run_by_handshake)
+
+
+def find_check(name: str) -> Check:
+    """Return the check with an id.
+
+    Raises
+    ------
+    KeyError
+        If there is none.
+    """
+    for each in (HANDSHAKE, *CHECKS):
+        if each.id == name:
+            return each
+    raise KeyError(name)
 
 
 # -- preconditions: functions of a device that return why a check does not apply to it, or ""

@@ -42,8 +42,11 @@ class Violation(Exception):  # noqa: N818 - a verdict
     """
 
     def __init__(self, expected: str, actual: str, likely_cause: str = "") -> None:
-        super().__init__(f"must be: {expected}; was: {actual}")
+        super().__init__(expected, actual, likely_cause)  # pickled by these arguments
         self.expected, self.actual, self.likely_cause = expected, actual, likely_cause
+
+    def __str__(self) -> str:
+        return f"must be: {self.expected}; was: {self.actual}"
 
 
 class NoResponse(Violation):

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from voxdisplay.conformance import packets
-from voxdisplay.conformance.catalogue import Check
 
 if TYPE_CHECKING:
     from voxdisplay.conformance.probe import Probe
@@ -74,10 +73,3 @@ def _gets_response(probe: Probe, stream: bytes) -> bool:
     while probe.clock() < until_s and probe.reader.segment_count == before:
         probe.receive(until_s)
     return probe.reader.segment_count > before
-
-
-def _never(probe: Probe) -> None:
-    del probe
-
-
-CHECK = Check("5", "answers", "the response to HELLO is INFO", (), _never)

@@ -181,6 +181,8 @@ class Response:
     def __getattr__(self, name: str) -> int:
         if name == "next":
             return self.seq
+        if name == "body" or name.startswith("__"):  # looked up by pickle and copy before it is set
+            raise AttributeError(name)
         layout = LAYOUTS.get(self.kind, ())
         for (field, _, _), value in zip(layout, self._values(), strict=True):
             if field == name:

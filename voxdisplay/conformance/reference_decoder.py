@@ -18,9 +18,12 @@ class Refused(Exception):  # noqa: N818 - a verdict on ops, not a fault of the k
     """Ops that a device must refuse; ``at`` counts from the first byte of the payload."""
 
     def __init__(self, code: int, at: int) -> None:
-        super().__init__(f"code {code} at {at}")
+        super().__init__(code, at)  # pickled by these arguments
         self.code = code
         self.at = at
+
+    def __str__(self) -> str:
+        return f"code {self.code} at {self.at}"
 
 
 class ReferenceDecoder:

@@ -11,7 +11,7 @@ from typing import TypeVar
 from voxdisplay.conformance import checks as _checks  # noqa: F401 - they register themselves
 from voxdisplay.conformance import handshake_diagnosis
 from voxdisplay.conformance.announced_device import FORMATS, AnnouncedDevice
-from voxdisplay.conformance.catalogue import CHECKS, Check
+from voxdisplay.conformance.catalogue import CHECKS, HANDSHAKE, Check
 from voxdisplay.conformance.dialogue import LogEntry, NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.packets import NoSuchFieldError
 from voxdisplay.conformance.probe import Probe
@@ -194,9 +194,7 @@ def _handshake(probe: Probe) -> Result | None:
         return None
     came = str(probe.info) if met else "no response that could be parsed"
     must = "an INFO that describes the device"
-    return Result(
-        handshake_diagnosis.CHECK, Verdict.BROKEN, must, came, likely, log=tuple(probe.log)
-    )
+    return Result(HANDSHAKE, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
 
 
 def _all_not_run(stranger: Result, selected: list[Check]) -> Iterator[Result]:

@@ -1,6 +1,9 @@
-"""What is a device of the protocol and what is not; and the picture file."""
+"""Configuration of the emulated device, and the .npy export."""
 
+import copy
 import io
+import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +20,7 @@ from firmware_sim.config import (
     parse_refresh,
     parse_size,
 )
+from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import npy_header, write_npy
 
@@ -160,3 +164,33 @@ def test_on_swap_is_called_at_each_swap() -> None:
     rig.request(data(1, 1, b""))
     rig.show_frame(2, 1, b"")
     assert seen == [b"\xff", b"\0"]
+
+
+def test_values_of_other_types_are_taken_or_refused_by_name() -> None:
+    expected = Config((3, 5, 7), features=frozenset({"line", "read"}))
+    assert Config(np.array([3, 5, 7]), features=["line", "read"]) == expected
+    assert Config("3x5x7", features="line,read") == expected
+    assert Config("3,5,7", lies="boot").lies == frozenset({"boot"})
+    for settings, message in (
+        ({"grid": 7}, "grid is 7: take three numbers"),
+        ({"grid": (1, 2)}, "take three numbers"),
+        ({"grid": (1.5, 2, 3)}, "take three numbers"),
+        ({"grid": None}, "take three numbers"),
+        ({"refresh": "30"}, "refresh is '30': take a whole number"),
+        ({"rx_buffer": 1e6}, "rx_buffer is 1000000.0: take a whole number"),
+        ({"boot": "7"}, "boot is '7': take a whole number"),
+    ):
+        with pytest.raises(TypeError, match=re.escape(message)):
+            Config(**settings)
+
+
+@pytest.mark.parametrize("protocol", [2, pickle.HIGHEST_PROTOCOL])
+def test_values_can_be_pickled_and_copied(protocol: int) -> None:
+    device = DeviceUnderTest(3, 5, 7)
+    bench = Bench(device.device)
+    for value in (
+        *(Config((3, 5, 7), "mono1", lies="boot"), bench.snapshot(), bench.counters()),
+        *(*parse_faults("flip=1e-3,reboot@9"), FORMATS["rgb565"], Config().shape),
+    ):
+        assert pickle.loads(pickle.dumps(value, protocol)) == value  # noqa: S301 - our own
+        assert copy.deepcopy(value) == value
