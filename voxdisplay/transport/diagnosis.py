@@ -11,6 +11,7 @@ import errno
 import os
 import socket
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -138,11 +139,10 @@ def busy_error(port: str, path: str) -> OpenError:
     """Return the error for a port that a process has open, at a path of the system."""
     names = [f"{_process_name(pid)} (process {pid})" for pid in _holding_processes(path)]
     if not names:
-        return OpenError(
-            f"{port} is busy",
-            port=port,
-            hint=f"another program has it open; this shows which: sudo fuser -v {path}",
-        )
+        hint = "another program has it open"
+        if sys.platform != "win32" and Path(path).exists():
+            hint += f"; this shows which: sudo fuser -v {path}"
+        return OpenError(f"{port} is busy", port=port, hint=hint)
     return OpenError(
         f"{port} is busy: {', '.join(names)} has it open",
         port=port,

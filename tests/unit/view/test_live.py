@@ -464,7 +464,17 @@ def test_the_end_of_a_source_is_the_end_of_the_view():
 
 
 @pytest.mark.parametrize(
-    "text", ["", "8000", "127.0.0.1", "127.0.0.1:x", "127.0.0.1:65536", "::1:5]"]
+    "text",
+    [
+        "",
+        "8000",
+        "127.0.0.1",
+        "127.0.0.1:x",
+        "127.0.0.1:65536",
+        "::1:5]",
+        "a..b:0",
+        "x" * 70 + ":0",
+    ],
 )
 def test_a_bad_address(text):
     with pytest.raises(ValueError, match="write HOST:PORT"):

@@ -1,8 +1,17 @@
 """Origins of pages that may watch: their notation, and the requests that are refused."""
 
+import http.client
+import json
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import urlsplit
+
 import pytest
 
 from voxdisplay.view.live.origins import OriginCheck, parse_origin
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize(
@@ -78,3 +87,48 @@ def test_a_refusal_is_printable():
     refusal = check().origin_refusal("http://\x1b[2Jevil", "127.0.0.1")
     assert refusal.isprintable()
     assert check().host_refusal("evil\x9b2J").isprintable()
+
+
+def emulator(*options):
+    command = [sys.executable, "-m", "firmware_sim", "--tcp", "127.0.0.1:0", "--size", "8x8x8"]
+    return subprocess.Popen(
+        [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    )
+
+
+@pytest.mark.parametrize("allowed", [[], ["https://cube.example.com"], ["https://a.example", "*"]])
+def test_the_emulators_view_behind_a_proxy(allowed):
+    """As nginx passes a visitor's request on: Host is the server's, Origin the visitor's."""
+    options = [word for origin in allowed for word in ("--allow-origin", origin)]
+    with emulator("--view", *options) as process:
+        try:
+            number = urlsplit(json.loads(process.stdout.readline())["view"]).port
+            line = http.client.HTTPConnection("127.0.0.1", number, timeout=60)
+            headers = {
+                "Origin": "https://cube.example.com", "Upgrade": "websocket",
+                "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+                "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+            }  # fmt: skip
+            line.request("GET", "/live", headers=headers)
+            answer = line.getresponse()
+            assert answer.status == (101 if allowed else 403)
+            if not allowed:
+                assert b"--allow-origin https://cube.example.com" in answer.read()
+            line.close()
+        finally:
+            process.terminate()
+            process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--view", "--allow-origin", "https://x/page"], "'https://x/page' is no origin"),
+        (["--allow-origin", "https://cube.example.com"], "--allow-origin is for --view"),
+    ],
+)
+def test_options_that_the_emulator_refuses(options, words):
+    process = emulator(*options)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert words in errors

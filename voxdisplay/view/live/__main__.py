@@ -8,10 +8,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable
+from typing import TypeVar
 
 from voxdisplay.errors import MissingExtra, OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
 from voxdisplay.view.live.origins import parse_origin
+
+T = TypeVar("T")
 
 
 def main() -> int:
@@ -24,9 +28,11 @@ def main() -> int:
         return 2
     parser = argparse.ArgumentParser(description="Show an emulator's tap in browsers.")
     for option in ("--tap", "--listen"):
-        parser.add_argument(option, type=parse_address, metavar="HOST:PORT", required=True)
+        parser.add_argument(
+            option, type=_argument(parse_address), metavar="HOST:PORT", required=True
+        )
     parser.add_argument("--title", default="voxdisplay-sim")
-    parser.add_argument("--allow-origin", type=parse_origin, action="append", default=[])
+    parser.add_argument("--allow-origin", type=_argument(parse_origin), action="append", default=[])
     options = parser.parse_args()
     try:
         (host, port), (at_host, at_port) = options.tap, options.listen
@@ -38,6 +44,18 @@ def main() -> int:
         sys.stderr.write(f"the live view cannot start: {error}\n")
         return 2
     return 0
+
+
+def _argument(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """Make the message of a parser's ValueError that of argparse."""
+
+    def parse_argument(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parse_argument
 
 
 def _announce(url: str) -> None:
