@@ -31,8 +31,12 @@ frame.draw(vd.load_scene("curve.json"))
 frame.draw([(1, 2, 3)], ["red", (0, 255, 0)])
 frame.draw(np.zeros((4, 3), dtype=int), np.zeros((4, 3), dtype=np.uint8))
 frame.save(Path("x.png"))
-with vd.open("sim:") as display:
+assert np.array_equal(frame, np.asarray(frame))
+with vd.open() as display:
     assert_type(display, vd.Display)
+    assert_type(display.present(frame), vd.Receipt)
+    print(display.present(frame).elapsed_s)
+    display.present(frame, wait=False)
     assert_type(display.present(frame), vd.Receipt)
     assert_type(display.present(frame, wait=True).elapsed_s, float)
     display.present(frame, wait=False)
