@@ -118,14 +118,16 @@ def large_scene(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("portions", [1, 4])
+@pytest.mark.parametrize(
+    ("name", "portions", "rate"),
+    [("SIGINT", 1, 9600), ("SIGTERM", 4, 9600), ("SIGTERM", 2, 2400)],
+)
 def test_dark_after_a_signal_in_mid_push_on_a_slow_line(
-    emulator, tmp_path, large_scene, name, portions
+    emulator, tmp_path, large_scene, name, portions, rate
 ):
     """HELLO waits behind all that is on the line: that takes longer than a device may be silent."""
     dump, capture = tmp_path / "front.npy", tmp_path / "capture"
-    port = emulator("--pty", "--baud", 9600, "--size", "64x64x64", "--dump", dump).port
+    port = emulator("--pty", "--baud", rate, "--size", "64x64x64", "--dump", dump).port
     with vd.open(port) as display:  # something is lit before
         frame = display.frame()
         frame.draw([(1, 2, 3)], "red")

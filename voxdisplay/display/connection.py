@@ -17,12 +17,14 @@ from voxdisplay.display.handshake import closed_before_info, closed_meanwhile, r
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import IncompatibleDevice, TransportClosed, TransportError, TransportTimeout
 from voxdisplay.link import Event, FrameShown, Link, PageReceived, SessionOpened
+from voxdisplay.link.session_opening import HELLO_INTERVAL_S
 from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 
 _MAX_WAIT_S = 0.5
-# Of a line that has no known rate and was not measured either: that of 9600 Bd.
+# Assumed of a line without a known rate before the first ACK: that of 9600 Bd.
 _SLOW_BYTES_PER_S = 960.0
+_MAX_DRAIN_S = 45.0
 
 Clock: TypeAlias = Callable[[], float]
 
@@ -88,8 +90,13 @@ class Connection:
     def _with_capture(self, transport: Transport) -> Transport:
         return Capture(transport, self._capture) if self._capture else transport
 
-    def _new_link(self, timeout_s: float) -> Link:
-        return Link(random_session(), self._clock(), timeout_s=timeout_s)
+    def _new_link(self, timeout_s: float, hello_interval_s: float = HELLO_INTERVAL_S) -> Link:
+        return Link(
+            random_session(),
+            self._clock(),
+            timeout_s=timeout_s,
+            hello_interval_s=hello_interval_s,
+        )
 
     def _open_session(self) -> DeviceInfo:
         try:
@@ -194,8 +201,8 @@ class Connection:
     def restart(self, within_s: float) -> None:
         """Open a new session, and drop all queued frames.
 
-        What the system has not put on the line yet is dropped, too. The device gets the time for
-        what is on the line already, as HELLO waits behind it.
+        What the system has not put on the line yet is dropped, too. HELLO waits behind what is on
+        the line already: the device is given the time for that, and longer while it answers that.
 
         Parameters
         ----------
@@ -207,13 +214,26 @@ class Connection:
         self._reconnector = None
         self._cancelled = False
         self._timeout_s = min(self._timeout_s, within_s)
-        bytes_per_s = self.bytes_per_s or _SLOW_BYTES_PER_S
-        drain_s = self.link.in_flight_bytes / bytes_per_s
+        bytes_per_s = self.bytes_per_s or self.link.min_bytes_per_s or _SLOW_BYTES_PER_S
+        drain_s = min(self.link.in_flight_bytes / bytes_per_s, _MAX_DRAIN_S)
         if discard := getattr(self._pipe, "discard_output", None):
             discard()
         self._events.clear()
-        self.link = self._new_link(self._timeout_s + drain_s)
-        self.info = self._open_session()
+        # On a slow line each HELLO is queued, and answered: the answers must not fill the line.
+        self.link = self._new_link(self._timeout_s + drain_s, max(HELLO_INTERVAL_S, drain_s / 2))
+        deadline_s = self._clock() + _MAX_DRAIN_S
+        received = 0
+        while True:
+            try:
+                self.info = self._open_session()
+            except TransportTimeout:
+                # Answers of the old session show that the line is only slower than it seemed.
+                before, received = received, self.link.received_bytes
+                if received == before or self._clock() >= deadline_s:
+                    raise
+                self.link.extend_timeout(self._timeout_s + drain_s)
+            else:
+                return
 
     def close(self) -> None:
         """Close the pipe. Twice is fine."""

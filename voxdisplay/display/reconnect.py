@@ -6,6 +6,7 @@ Must not know what is displayed, nor what is sent again.
 from __future__ import annotations
 
 import errno
+import socket
 import time
 from collections.abc import Callable, Iterator
 from typing import Final, TypeVar
@@ -17,8 +18,8 @@ from voxdisplay.transport.discovery import find_port, serial_ports
 
 _T = TypeVar("_T")
 _RETRY_INTERVAL_S = 0.25
-# Of a port that is not there, or of one that has just appeared: other programs look at it, and its
-# permissions are set a moment later.
+# Of a port that is not there, or has just appeared, when other programs probe it and its
+# permissions are not set yet. (A host that is not on the network yet has no name: `gaierror`.)
 _TRANSIENT: Final = {
     errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO, errno.EACCES, errno.EPERM, errno.EBUSY,
     errno.EAGAIN, errno.ECONNREFUSED, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH,
@@ -71,7 +72,9 @@ def _may_pass(error: TransportError) -> bool:
 
 
 def _is_transient(cause: BaseException) -> bool:
-    if isinstance(cause, FileNotFoundError | TimeoutError) or "FileNotFoundError" in str(cause):
+    if isinstance(
+        cause, FileNotFoundError | TimeoutError | socket.gaierror
+    ) or "FileNotFoundError" in str(cause):
         return True  # the text is pyserial's, on Windows
     return getattr(cause, "errno", None) in _TRANSIENT
 

@@ -61,6 +61,11 @@ class DeliveryRate:
         """Delivery rate of the busy line; None as long as it had too little to carry."""
         return self._bytes_per_s if self._was_busy else None
 
+    @property
+    def min_bytes_per_s(self) -> float | None:
+        """Lower bound of the rate, from packets that need not have kept the line busy."""
+        return self._bytes_per_s or None
+
     def allows(self, packets: int, size: int) -> bool:
         """Return whether ``packets`` packets of ``size`` bytes in all may be in flight."""
         if packets <= MIN_PACKETS:

@@ -26,7 +26,7 @@ from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
 from voxdisplay.link.payload_size import clamp_payload
 from voxdisplay.link.readback import ReadRequests
 from voxdisplay.link.sender import Sender
-from voxdisplay.link.session_opening import SessionOpening
+from voxdisplay.link.session_opening import HELLO_INTERVAL_S, SessionOpening
 from voxdisplay.link.silence_timer import SilenceTimer
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
@@ -50,6 +50,9 @@ class Link:
         How long silence may last before `TransportTimeout`; answers without progress, twice as
         long.
 
+    hello_interval_s : float
+        Time between the HELLOs of the first session.
+
     Attributes
     ----------
     info : Info or None
@@ -60,7 +63,14 @@ class Link:
 
     """
 
-    def __init__(self, session: int, now: float, *, timeout_s: float = 5.0) -> None:
+    def __init__(
+        self,
+        session: int,
+        now: float,
+        *,
+        timeout_s: float = 5.0,
+        hello_interval_s: float = HELLO_INTERVAL_S,
+    ) -> None:
         self.info: packets.Info | None = None
         self.counters = LinkCounters()
         self.stream = PacketStream()
@@ -68,9 +78,10 @@ class Link:
         self._frames = OutgoingFrames()
         self._reads = ReadRequests()
         self._sender = Sender(self._frames, self._reads, self.counters)
+        self._received_bytes = 0
         self._shown_ticket = 0  # of this session
         self._restarts = 0
-        self._opening = SessionOpening(session, now)
+        self._opening = SessionOpening(session, now, hello_interval_s)
         self._timer = SilenceTimer(now, timeout_s)
         self._call_due_s = math.inf  # when `transmit` is expected to be called at the latest
         self._poll_now = False
@@ -112,6 +123,16 @@ class Link:
     def in_flight_bytes(self) -> int:
         """Bytes of frames that were sent and are neither acknowledged nor lost."""
         return self._sender.in_flight_bytes
+
+    @property
+    def min_bytes_per_s(self) -> float | None:
+        """Lower bound of the delivery rate, also of a line that had little to carry so far."""
+        return self._sender.delivery_rate.min_bytes_per_s
+
+    @property
+    def received_bytes(self) -> int:
+        """Bytes received so far, whatever they meant."""
+        return self._received_bytes
 
     @property
     def partial_info(self) -> str | None:
@@ -175,6 +196,10 @@ class Link:
     def request_status(self) -> None:
         """Request the digest of the front page; `StatusReceived` brings it."""
         self._status_requested = self._poll_now = True
+
+    def extend_timeout(self, seconds: float) -> None:
+        """Let the device be silent for so much longer this time."""
+        self._timer.extend(seconds)
 
     def _reopen(self, now: float) -> None:
         """Open a new session; frames of the backlog are sent again, in full."""
@@ -287,6 +312,7 @@ class Link:
             ``receive(b"", now)``.
 
         """
+        self._received_bytes += len(data)
         if not self.counters.sessions:
             self._opening.note_received(data)
         events: list[Event] = []

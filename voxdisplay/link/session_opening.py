@@ -28,6 +28,8 @@ class SessionOpening:
     session : int
         Its number, 1..65535.
     now : float
+    interval_s : float
+        Time between two HELLOs.
 
     Attributes
     ----------
@@ -37,9 +39,10 @@ class SessionOpening:
 
     """
 
-    def __init__(self, session: int, now: float) -> None:
+    def __init__(self, session: int, now: float, interval_s: float = HELLO_INTERVAL_S) -> None:
         self.session = session
         self.due_s = now
+        self._interval_s = interval_s
         self._count = 0
         self._wire = packets.encode(packets.Hello(session=session))
         self._zeros = 0
@@ -53,7 +56,7 @@ class SessionOpening:
         """Return a HELLO if one is due, else nothing."""
         if now < self.due_s:
             return b""
-        self.due_s = now + HELLO_INTERVAL_S
+        self.due_s = now + self._interval_s
         self._count += 1
         return b"\0" + self._wire
 
