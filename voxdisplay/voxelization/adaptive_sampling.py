@@ -187,11 +187,16 @@ def _check_estimates(batch: CurveBatch, samples: Samples, parts: Ints, estimated
     for index in np.flatnonzero(count > MANY_SAMPLES).tolist():
         if index not in estimated:
             estimated.add(index)
-            length, step = estimated_min_length(batch.curves[index])
-            if length > MAX_VOXELS and step < MIN_JUMP / 2:
-                raise _roughness_error(batch, index)
-            if length > MAX_VOXELS:
-                raise _length_error(batch, index, length)
+            check_estimate(batch, index)
+
+
+def check_estimate(batch: CurveBatch, index: int) -> None:
+    """Raise CurveError if a curve is too long by an estimate of its length from below."""
+    length, step = estimated_min_length(batch.curves[index])
+    if length > MAX_VOXELS and step < MIN_JUMP / 2:
+        raise _roughness_error(batch, index)
+    if length > MAX_VOXELS:
+        raise _length_error(batch, index, length)
 
 
 def check_lengths(batch: CurveBatch) -> None:

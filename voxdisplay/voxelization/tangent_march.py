@@ -24,7 +24,7 @@ from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import complete
 from voxdisplay.errors import CurveError
-from voxdisplay.voxelization.adaptive_sampling import check_lengths
+from voxdisplay.voxelization.adaptive_sampling import check_estimate, check_lengths
 from voxdisplay.voxelization.curve_batch import CurveBatch
 from voxdisplay.voxelization.sequence import Sequence
 
@@ -198,6 +198,7 @@ class _MarchingCurve:
     ) -> None:
         self._batch = CurveBatch([curve])
         check_lengths(self._batch)
+        check_estimate(self._batch, 0)
         self._curve = curve
         self._parabola = variant == 3
         has_derivative = curve.derivative(np.array(curve.t_range[:1])) is not None
