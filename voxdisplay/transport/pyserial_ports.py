@@ -12,10 +12,12 @@ import contextlib
 import os
 import sys
 from typing import Any
+from urllib.parse import urlsplit
 
 import serial
 from serial.urlhandler import protocol_socket
 
+from voxdisplay.errors import OpenError
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS
 
 if sys.platform != "win32":
@@ -86,8 +88,10 @@ def open_port(port: str, *, baud: int, timeout_s: float, reset: bool) -> Any:
 
     Raises
     ------
+    OpenError
+        If a URL lacks host or port.
     LIBRARY_ERRORS
-        If it cannot be opened.
+        If it cannot be opened otherwise.
 
     """
     line = _unopened(port, baud, timeout_s)
@@ -109,6 +113,7 @@ def _unopened(port: str, baud: int, timeout_s: float) -> Any:
     if scheme == "rfc2217":
         from voxdisplay.transport import rfc2217  # noqa: PLC0415 - only what is needed
 
+        _check_host(port)
         line = rfc2217.Rfc2217Port(None, **settings)
         line.port = port
     elif scheme == "socket":
@@ -123,6 +128,21 @@ def _unopened(port: str, baud: int, timeout_s: float) -> Any:
             bases = (NativePort,) if kind is serial.Serial else (kind, NativePort)
             line.__class__ = type(kind.__name__, bases, {})
     return line
+
+
+def _check_host(port: str) -> None:
+    """Raise `OpenError` if a URL has no host or no port: pyserial's message would not say so."""
+    try:
+        url = urlsplit(port)
+        if url.hostname and url.port:
+            return
+    except ValueError:
+        pass
+    raise OpenError(
+        f"{port} does not name a host and a port",
+        port=port,
+        hint="write it like rfc2217://127.0.0.1:4000",
+    )
 
 
 def _keep_modem_lines(line: Any) -> None:

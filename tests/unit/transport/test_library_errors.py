@@ -181,6 +181,13 @@ def test_names_that_the_libraries_stumble_over(port):
     assert refused.value.port == port
 
 
+@pytest.mark.parametrize("port", ["rfc2217://", "rfc2217://h", "rfc2217://h:x", "rfc2217://:4000"])
+def test_a_url_without_host_or_port(port):
+    with pytest.raises(OpenError, match="does not name a host and a port") as refused:
+        open_transport(port)
+    assert "rfc2217://127.0.0.1:4000" in refused.value.hint
+
+
 @each_error
 @pytest.mark.parametrize("call", ["open", "read", "write"])
 def test_a_serial_port_that_fails(monkeypatch, tmp_path, error, call):
