@@ -214,7 +214,9 @@ class Connection:
         self._reconnector = None
         self._cancelled = False
         self._timeout_s = min(self._timeout_s, within_s)
-        bytes_per_s = self.bytes_per_s or self.link.min_bytes_per_s or _SLOW_BYTES_PER_S
+        bytes_per_s = (
+            self.bytes_per_s or self.link.delivery_rate.min_bytes_per_s or _SLOW_BYTES_PER_S
+        )
         drain_s = min(self.link.in_flight_bytes / bytes_per_s, _MAX_DRAIN_S)
         if discard := getattr(self._pipe, "discard_output", None):
             discard()
@@ -228,7 +230,7 @@ class Connection:
                 self.info = self._open_session()
             except TransportTimeout:
                 # Answers of the old session show that the line is only slower than it seemed.
-                before, received = received, self.link.received_bytes
+                before, received = received, self.link.counters.received_bytes
                 if received == before or self._clock() >= deadline_s:
                     raise
                 self.link.extend_timeout(self._timeout_s + drain_s)

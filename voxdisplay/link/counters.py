@@ -15,6 +15,8 @@ class LinkCounters:
         DATA packets, each counted once however often it was sent.
     wire_bytes : int
         Bytes sent, of all packets.
+    received_bytes : int
+        Bytes received, whatever they meant.
     retransmitted : int
         Retransmissions of DATA packets.
     statuses : int
@@ -28,6 +30,7 @@ class LinkCounters:
 
     packets: int = 0
     wire_bytes: int = 0
+    received_bytes: int = 0
     retransmitted: int = 0
     statuses: int = 0
     sessions: int = 0

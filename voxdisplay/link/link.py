@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from voxdisplay.errors import RemoteProtocolError, TransportTimeout
+from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.link.counters import LinkCounters
+from voxdisplay.link.delivery_rate import DeliveryRate
 from voxdisplay.link.events import (
     Event,
     FrameShown,
@@ -26,7 +27,7 @@ from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
 from voxdisplay.link.payload_size import clamp_payload
 from voxdisplay.link.readback import ReadRequests
 from voxdisplay.link.sender import Sender
-from voxdisplay.link.session_opening import HELLO_INTERVAL_S, SessionOpening
+from voxdisplay.link.session_opening import HELLO_INTERVAL_S, SessionOpening, too_many_restarts
 from voxdisplay.link.silence_timer import SilenceTimer
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
@@ -49,7 +50,6 @@ class Link:
     timeout_s : float
         How long silence may last before `TransportTimeout`; answers without progress, twice as
         long.
-
     hello_interval_s : float
         Time between the HELLOs of the first session.
 
@@ -78,7 +78,6 @@ class Link:
         self._frames = OutgoingFrames()
         self._reads = ReadRequests()
         self._sender = Sender(self._frames, self._reads, self.counters)
-        self._received_bytes = 0
         self._shown_ticket = 0  # of this session
         self._restarts = 0
         self._opening = SessionOpening(session, now, hello_interval_s)
@@ -107,7 +106,7 @@ class Link:
     @property
     def needs_frame(self) -> bool:
         """True if the line will run idle unless another frame is queued now."""
-        return self._sender.delivery_rate.drains_early(self._frames.unsent_bytes)
+        return self.delivery_rate.drains_early(self._frames.unsent_bytes)
 
     @property
     def payload_count(self) -> int:
@@ -125,16 +124,6 @@ class Link:
         return self._sender.in_flight_bytes
 
     @property
-    def min_bytes_per_s(self) -> float | None:
-        """Lower bound of the delivery rate, also of a line that had little to carry so far."""
-        return self._sender.delivery_rate.min_bytes_per_s
-
-    @property
-    def received_bytes(self) -> int:
-        """Bytes received so far, whatever they meant."""
-        return self._received_bytes
-
-    @property
     def partial_info(self) -> str | None:
         """Description of an answer to HELLO that did not come whole; None if none began."""
         return self._opening.partial_info
@@ -142,7 +131,12 @@ class Link:
     @property
     def bytes_per_s(self) -> float | None:
         """Measured delivery rate of the busy line; None as long as it had too little to carry."""
-        return self._sender.delivery_rate.bytes_per_s
+        return self.delivery_rate.bytes_per_s
+
+    @property
+    def delivery_rate(self) -> DeliveryRate:
+        """Estimator of the delivery rate of the line."""
+        return self._sender.delivery_rate
 
     @property
     def payload_bytes(self) -> int:
@@ -312,7 +306,7 @@ class Link:
             ``receive(b"", now)``.
 
         """
-        self._received_bytes += len(data)
+        self.counters.received_bytes += len(data)
         if not self.counters.sessions:
             self._opening.note_received(data)
         events: list[Event] = []
@@ -403,10 +397,7 @@ class Link:
     def _restart(self, now: float) -> SessionLost:
         self._restarts += 1
         if self._restarts > MAX_RESTARTS:
-            raise TransportTimeout(
-                f"the device has lost the session {self._restarts} times without showing a frame",
-                hint="does it restart by itself? Check its power supply",
-            )
+            raise too_many_restarts(self._restarts)
         self._reopen(now)
         return SessionLost()
 

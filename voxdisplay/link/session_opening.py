@@ -132,6 +132,14 @@ class SessionOpening:
         )
 
 
+def too_many_restarts(count: int) -> TransportTimeout:
+    """Return the error for a device that has lost its session ``count`` times in a row."""
+    return TransportTimeout(
+        f"the device has lost the session {count} times without showing a frame",
+        hint="does it restart by itself? Check its power supply",
+    )
+
+
 def _decode_beginning(segment: bytes, size: int) -> bytes:
     """Return the first ``size`` bytes of a packet of which only the beginning may have come.
 
