@@ -1,6 +1,6 @@
 """Millions of hostile bytes into both receivers: no exception but the documented, and no end.
 
-protocol.md, 12: "A receiver MUST get through any bytes whatever". The bytes come from seeds: noise,
+protocol.md, 12: "A receiver MUST survive any input". The bytes come from seeds: noise,
 packets with bits changed on the wire, and packets whose check value holds though their fields are
 nonsense, which go deepest.
 """

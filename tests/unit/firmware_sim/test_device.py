@@ -392,7 +392,7 @@ def test_any_cutting_of_the_stream_gives_the_same_answers(
 
 
 def test_random_bytes_do_no_harm() -> None:
-    """A receiver MUST get through any bytes whatever."""
+    """A receiver MUST survive any input."""
     rig = DeviceUnderTest(17, 64, 40)
     rng = random.Random(3)
     for _ in range(1000):

@@ -205,7 +205,7 @@ def test_a_full_brick_and_all_its_masks_are_the_same() -> None:
 @given(st.binary(max_size=80), st.sampled_from(sorted(FORMATS)), st.sampled_from(GRIDS))
 @settings(deadline=None, max_examples=300)
 def test_no_ops_write_outside_the_page(ops: bytes, name: str, sides: tuple[int, int, int]) -> None:
-    """MUST NOT write outside its pages whatever comes."""
+    """MUST NOT write outside its pages for any input."""
     grid, pixel_format = Grid(*sides), FORMATS[name]
     page = Page(grid.volume, pixel_format.size)
     refusal = None
