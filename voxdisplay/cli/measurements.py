@@ -185,6 +185,7 @@ def measure_raw_pipe(transport: Transport, info: Info, timeout_s: float) -> RawP
     Segments of fewer than 8 bytes are dropped by a device (protocol.md, section 3). As many as the
     credit allows are sent, with a HELLO behind them, until they have taken long enough.
     """
+    _drain(transport, timeout_s)
     round_trips: list[float] = []
     while len(round_trips) < _ROUND_TRIPS and sum(round_trips) < _RAW_BUDGET_S:
         round_trips.append(_exchange(transport, b"", timeout_s))
@@ -210,11 +211,15 @@ def _exchange(transport: Transport, data: bytes, timeout_s: float) -> float:
     request_info(transport, timeout_s)
     took_s = time.perf_counter() - began_s
     if took_s > _MAX_QUICK_S:
-        # On a slow line HELLO is repeated before its answer is there: the other answers follow.
-        end_s = time.monotonic() + timeout_s
-        while transport.read(_QUIET_S) and time.monotonic() < end_s:
-            continue
+        _drain(transport, timeout_s)
     return took_s
+
+
+def _drain(transport: Transport, timeout_s: float) -> None:
+    """Drop what still comes: on a slow line HELLO is repeated, and so are its answers."""
+    end_s = time.monotonic() + timeout_s
+    while transport.read(_QUIET_S) and time.monotonic() < end_s:
+        continue
 
 
 def measure_link(display: vd.Display, frame: vd.Frame, raw: RawPipe) -> LinkSpeed:
