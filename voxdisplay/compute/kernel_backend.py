@@ -1,10 +1,10 @@
-"""The choice between array code in numpy and the same code compiled, which takes the extra `fast`.
+"""Kernel backend: dispatch of array functions to numpy or to compiled kernels (extra `fast`).
 
-A function marked as a `twin` has another of its name, with the same parameters and results to the
-last bit, in ``kernels`` beside its module. Those need numba, which takes longer to import than
-most scenes to draw, and some seconds to compile them the first time after an installation: they
-are taken only if numba is installed, and from when the work is worth it on. What the functions do
-is not known here.
+A function decorated by `with_kernel` has a compiled kernel of its name, with the same parameters
+and results to the last bit, in the module ``kernels`` of its package. Kernels need numba, which
+takes longer to import than most scenes to draw, and some seconds to compile on first use after an
+installation: they are used only if numba is installed, and once the work outweighs loading them.
+Must not know what the functions do.
 """
 
 from __future__ import annotations
@@ -21,23 +21,29 @@ Given = ParamSpec("Given")
 Result = TypeVar("Result")
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-# How many samples of curves make it worth to load the kernels: they save 0.25 to 0.45 microseconds
-# for each, and loading them takes about a second.
+# Number of curve samples from which on kernels are loaded: each saves 0.25 to 0.45 microseconds,
+# and loading takes about a second.
 BREAK_EVEN_SAMPLES = 3_000_000
 
 
 class _State:
-    """Whether kernels are in use, and how much was done without."""
+    """State of the process: whether kernels are used, and the samples computed without them."""
 
-    use: bool | None = None  # not asked yet
+    use: bool | None = None  # None: not decided yet
     done = 0.0
 
 
 def enable_if_worthwhile(samples: int, ahead: float = 1) -> None:
-    """Load the kernels if they are worth it, before work on so many samples of curves.
+    """Enable the kernels if the work outweighs loading them.
 
-    They are if this, times ``ahead``, what is to come, together with what was done without them
-    would have paid for loading them.
+    Parameters
+    ----------
+    samples : int
+        Samples of curves in the work to come. They are added to those already computed without
+        kernels.
+    ahead : float
+        Factor from these samples to all that are expected.
+
     """
     if _State.use is None:
         if _State.done + samples * ahead > BREAK_EVEN_SAMPLES:
@@ -46,13 +52,13 @@ def enable_if_worthwhile(samples: int, ahead: float = 1) -> None:
 
 
 def set_enabled(choice: bool | None) -> bool | None:
-    """Say whether to use the kernels, None to wait for work; give what was said before."""
+    """Set whether kernels are used, None to decide by the work; return the previous setting."""
     before, _State.use = _State.use, choice
     return before
 
 
 def enabled() -> bool:
-    """Tell whether kernels are in use."""
+    """Return whether kernels are in use."""
     return bool(_State.use)
 
 
@@ -65,29 +71,29 @@ def _numba_works() -> bool:
 
 
 def with_kernel(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Mark a function that has a compiled twin."""
+    """Decorate a function that has a compiled kernel of its name."""
     package = function.__module__.rpartition(".")[0]
-    other: Callable[Given, Result] | None = None
+    compiled: Callable[Given, Result] | None = None
 
     @wraps(function)
-    def either(*args: Given.args, **named: Given.kwargs) -> Result:
-        nonlocal other
+    def dispatch(*args: Given.args, **named: Given.kwargs) -> Result:
+        nonlocal compiled
         if not _State.use:
             return function(*args, **named)
-        if other is None:  # it is compiled now, or what is kept of it loaded
+        if compiled is None:  # compiled now, or loaded from the cache
             with deferred_interrupts():
-                other = getattr(import_module(f"{package}.kernels"), function.__name__)
-                return other(*args, **named)
-        return other(*args, **named)
+                compiled = getattr(import_module(f"{package}.kernels"), function.__name__)
+                return compiled(*args, **named)
+        return compiled(*args, **named)
 
-    return either
+    return dispatch
 
 
 @contextmanager
 def deferred_interrupts() -> Iterator[None]:
-    """Keep an interrupt until the end of what is done: the compiler loses it half-way.
+    """Defer SIGINT to the end of the block: the compiler loses one that comes half-way.
 
-    Where none can come there is nothing to do: Python gives them to its main thread only.
+    Other threads than the main one are never interrupted by Python and need nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -105,15 +111,15 @@ def deferred_interrupts() -> Iterator[None]:
 def jit(function: Kernel) -> Kernel:
     """Compile a kernel, once for an installation.
 
-    What is compiled is kept until its own file changes: constants of other modules, which would
-    be compiled into it, have to be arguments.
+    The cache is invalidated by changes of the kernel's own file alone: constants of other modules
+    would be compiled in, and have to be arguments.
     """
     from numba import njit  # noqa: PLC0415 - an extra, and slow
 
-    # No fastmath, and a division by 0 is infinite: all as in numpy. And without Python's lock, for
+    # As numpy: no fastmath, and division by 0 is infinite. Without the global interpreter lock, for
     # `voxdisplay.compute.parallel`.
     try:
         kernel: Kernel = njit(cache=True, nogil=True, error_model="numpy")(function)
-    except RuntimeError:  # there is no place to keep it
+    except RuntimeError:  # no writable cache directory
         kernel = njit(nogil=True, error_model="numpy")(function)
     return kernel

@@ -1,7 +1,7 @@
-"""Independent parts of large work, done on all processors at once.
+"""Parallel map over threads, in order, on all processors.
 
-numpy, and what is compiled, let go of Python's lock while they work on large arrays: that is what
-threads gain. What the parts are is not known here.
+numpy and compiled kernels release the global interpreter lock while they work on large arrays,
+which is what threads gain by. Must not know what the parts are.
 """
 
 from __future__ import annotations
@@ -21,17 +21,23 @@ _thread = threading.local()
 
 
 def cpu_count() -> int:
-    """Tell how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):  # not on all systems
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def ordered_map(function: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[Result]:
-    """Give what a function gives for parts, in their order; the first error in it is raised.
+    """Yield the results of a function for parts, in their order; raise the first error in it.
 
-    Within a part nothing is divided any further. A part must be worth some hundred microseconds,
-    and the function must bear being called from several threads at once; and twice for a part.
+    Parameters
+    ----------
+    function : callable
+        Called from several threads at once, and possibly twice for a part. Calls of this function
+        within a part run in its own thread.
+    parts : sequence
+        Each worth some hundred microseconds.
+
     """
     workers = min(cpu_count(), len(parts))
     if workers < 2 or getattr(_thread, "works", False):
@@ -43,11 +49,11 @@ def ordered_map(function: Callable[[Part], Result], parts: Sequence[Part]) -> It
 
             pool = stack.enter_context(ThreadPoolExecutor(workers, initializer=_init_worker))
             results = pool.map(function, parts)
-        except RuntimeError:  # no thread may begin: there are too many, or the program is ending
+        except RuntimeError:  # no thread can start: too many, or the interpreter is ending
             results = map(function, parts)
         yield from results
 
 
 def _init_worker() -> None:
     _thread.works = True
-    np.seterr(all="ignore")  # what a caller has set does not reach its threads
+    np.seterr(all="ignore")  # a caller's np.errstate does not reach worker threads

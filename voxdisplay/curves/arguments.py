@@ -1,4 +1,4 @@
-"""Checks of what curves are made from. Each error names the argument to blame."""
+"""Validation of curve arguments: each error names the argument. Must not know the curves."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 
 
 MAX_MAGNITUDE = 1e100
-"""No display is larger, and products of a few such numbers do not overflow."""
+"""Largest accepted magnitude: products of a few such numbers do not overflow."""
 
 
 class ArgumentError(CurveError):
-    """An argument of a curve is wrong.
+    """A wrong argument of a curve.
 
     Parameters
     ----------
     argument : str
         Its name.
     problem : str
-        What is wrong, to be read after the name.
+        The rest of the message, after the name.
 
     """
 
@@ -38,7 +38,7 @@ class ArgumentError(CurveError):
 
 
 def finite(name: str, value: SupportsFloat) -> float:
-    """Give a finite float, or raise ArgumentError."""
+    """Return a finite float, or raise ArgumentError."""
     try:
         number = argument_checks.number(name, value)
     except TypeError:
@@ -53,7 +53,7 @@ def finite(name: str, value: SupportsFloat) -> float:
 
 
 def positive(name: str, value: SupportsFloat) -> float:
-    """Give a positive finite float, or raise ArgumentError."""
+    """Return a positive finite float, or raise ArgumentError."""
     number = finite(name, value)
     if number <= 0:
         raise ArgumentError(name, f"must be positive, not {number:g}")
@@ -61,7 +61,7 @@ def positive(name: str, value: SupportsFloat) -> float:
 
 
 def whole(name: str, value: SupportsFloat) -> int:
-    """Give an int, or raise ArgumentError when the number is not whole."""
+    """Return an int, or raise ArgumentError if the number is not whole."""
     number = finite(name, value)
     if not number.is_integer():
         raise ArgumentError(name, f"must be a whole number, not {number:g}")
@@ -69,7 +69,7 @@ def whole(name: str, value: SupportsFloat) -> int:
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
-    """Give a finite float64 array of a shape, where None is any length, or raise ArgumentError."""
+    """Return a finite float64 array of a shape, None for any length, or raise ArgumentError."""
     try:
         if isinstance(value, np.ndarray) and value.dtype.kind == "c":
             raise TypeError  # noqa: TRY301 - as of a list of complex numbers
@@ -91,12 +91,12 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
 
 
 def vector(name: str, value: ArrayLike) -> Floats:
-    """Give a finite (3,) float64 array, or raise ArgumentError."""
+    """Return a finite (3,) float64 array, or raise ArgumentError."""
     return array(name, value, (3,))
 
 
 def points(name: str, value: ArrayLike, *, least: int) -> Floats:
-    """Give a finite (n, 3) float64 array of at least so many points, or raise ArgumentError."""
+    """Return a finite (n, 3) float64 array of ``least`` points or more, or raise ArgumentError."""
     empty = isinstance(value, list | tuple) and not value
     numbers = array(name, np.empty((0, 3)) if empty else value, (None, 3))
     if len(numbers) < least:
@@ -105,7 +105,7 @@ def points(name: str, value: ArrayLike, *, least: int) -> Floats:
 
 
 def parameter_range(name: str, low: float, high: float) -> tuple[float, float]:
-    """Give (low, high), finite and ascending, or raise ArgumentError."""
+    """Return (low, high), finite and ascending, or raise ArgumentError."""
     a, b = finite(f"{name}[0]", low), finite(f"{name}[1]", high)
     if a >= b:
         raise ArgumentError(name, f"{'is empty' if a == b else 'runs backwards'}: {a:g} to {b:g}")

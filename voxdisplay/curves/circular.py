@@ -14,7 +14,8 @@ from voxdisplay.compute.array_types import Evaluate, Floats, Ints
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.orthonormal_basis import orthonormal_basis
-from voxdisplay.expressions.interval import Interval, cos, sin
+from voxdisplay.expressions.interval import Interval
+from voxdisplay.expressions.trigonometric_intervals import cos, sin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,8 +1,8 @@
-"""Bounds of curves that are made span by span: polylines and splines.
+"""Bounds of piecewise polynomial curves (polylines and splines), span by span.
 
 A polynomial between two parameters lies in the convex hull of the control points it has there
 (Farin, *Curves and Surfaces for CAGD*, sections 4.3 and 5.2). Those are found here, with interval
-arithmetic, so that rounding is accounted for. Knows no particular curve.
+arithmetic, so that rounding is accounted for. Must not know a particular curve.
 """
 
 from __future__ import annotations
@@ -20,21 +20,22 @@ Box = tuple[Floats, Floats]
 def enclose_spans(
     nodes: Floats, t_lo: Floats, t_hi: Floats, enclose: Callable[[Ints, Floats, Floats], Box]
 ) -> Box:
-    """Bound a curve of spans from t_lo to t_hi.
+    """Return bounds of a curve of spans from t_lo to t_hi.
 
     Parameters
     ----------
     nodes : (k,) float64 array
-        Where spans end: span i goes from nodes[i] to nodes[i + 1]. Ascending.
+        Ends of spans, ascending: span i goes from nodes[i] to nodes[i + 1].
     t_lo, t_hi : (n,) float64 arrays
         Parameters from nodes[0] to nodes[-1].
     enclose : callable
-        Of (m,) arrays i, t_lo, t_hi, both inside span i, gives bounds of that, (3, m) each.
+        ``(i, t_lo, t_hi)``, (m,) arrays with both parameters inside span i, to bounds, (3, m)
+        each.
 
     Returns
     -------
     (3, n), (3, n) float64 arrays
-        Nan for those that reach over more than two spans: they are to be cut.
+        Nan for intervals that reach over more than two spans: the caller cuts them.
 
     """
     last = len(nodes) - 2
@@ -52,7 +53,7 @@ def enclose_spans(
 
 
 def control_box(control: Interval, knots: Floats, t_lo: Floats, t_hi: Floats) -> Box:
-    """Bound one span of a B-spline, from t_lo to t_hi inside it, by its Bezier points there.
+    """Return bounds of a span of a B-spline from t_lo to t_hi, by its Bezier points there.
 
     With f the blossom (polar form) of the polynomial, de Boor's algorithm at t_lo leads from the
     span's points to f(t_lo, ... t_lo, u, u', ...) with fewer and fewer of the knots after it; these
@@ -76,12 +77,12 @@ def control_box(control: Interval, knots: Floats, t_lo: Floats, t_hi: Floats) ->
     layer = Interval(*np.broadcast_arrays(control.lo, control.hi, t_lo)[:2])
     last = [layer]
     for r in range(1, p + 1):
-        layer = _round(layer, knots[r - 1 : p], knots[p : 2 * p + 1 - r], t_lo)
+        layer = _de_boor_round(layer, knots[r - 1 : p], knots[p : 2 * p + 1 - r], t_lo)
         last.append(layer)
     layer = Interval(*(np.stack([getattr(each, end)[-1] for each in last[::-1]]) for end in ENDS))
     low, high = layer.lo[0], layer.hi[0]
     for r in range(1, p + 1):
-        layer = _round(layer, t_lo, knots[p : 2 * p + 1 - r], t_hi)
+        layer = _de_boor_round(layer, t_lo, knots[p : 2 * p + 1 - r], t_hi)
         low, high = np.minimum(low, layer.lo[0]), np.maximum(high, layer.hi[0])
     return low, high
 
@@ -89,9 +90,9 @@ def control_box(control: Interval, knots: Floats, t_lo: Floats, t_hi: Floats) ->
 ENDS = ("lo", "hi")
 
 
-def _round(layer: Interval, low: Floats, high: Floats, t: Floats) -> Interval:
-    """Do one round of de Boor's algorithm: points between neighbours, one less."""
-    # Where there is nothing between low and high, t is there as well, and any f is as good.
+def _de_boor_round(layer: Interval, low: Floats, high: Floats, t: Floats) -> Interval:
+    """Return one round of de Boor's algorithm: points between neighbours, one less."""
+    # Where low and high are equal, t is there too, and any share will do.
     share = (interval(t) - low) / (interval(np.where(high > low, high, low + 1.0)) - low)
     f = Interval(share.lo[:, None], share.hi[:, None])
     begin, end = (Interval(layer.lo[part], layer.hi[part]) for part in (np.s_[:-1], np.s_[1:]))

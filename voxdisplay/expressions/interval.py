@@ -30,10 +30,10 @@ from numpy.typing import ArrayLike
 
 from voxdisplay.compute.array_types import Floats
 
-_ULP = 2.0**-52  # |x| * _ULP is from one to two ulp of x
+ULP = 2.0**-52  # |x| * ULP is from one to two ulp of x
 _TINY = 5e-324  # the ulp of numbers so small that the product above is 0
 _LARGEST = np.finfo(np.float64).max
-_EXACT, _ASSUMED = 1, 16  # ulp to move bounds by: see above
+EXACT_ULPS, ASSUMED_ULPS = 1, 16  # ulp to move bounds by: see above
 _PI = 3.1415926535897936  # the float64 above pi
 
 
@@ -93,12 +93,12 @@ def interval(value: Interval | ArrayLike) -> Interval:
     return Interval(number, number)
 
 
-def _widen(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
+def widen(lo: Floats, hi: Floats, partial: Any, ulps: int) -> Interval:
     """Move bounds outward by some ulp. An overflowed lower bound is the largest finite number."""
     lo, hi = np.minimum(lo, _LARGEST), np.maximum(hi, -_LARGEST)
     return Interval(
-        lo - (np.abs(lo) * (ulps * _ULP) + ulps * _TINY),
-        hi + (np.abs(hi) * (ulps * _ULP) + ulps * _TINY),
+        lo - (np.abs(lo) * (ulps * ULP) + ulps * _TINY),
+        hi + (np.abs(hi) * (ulps * ULP) + ulps * _TINY),
         partial,
     )
 
@@ -114,7 +114,7 @@ def negate(a: Interval) -> Interval:
 def _sum(lo: Floats, hi: Floats, partial: Any) -> Interval:
     # Sums too small for a normal exponent are exact (Hauser 1996), 0 above all.
     lo, hi = np.minimum(lo, _LARGEST), np.maximum(hi, -_LARGEST)
-    return Interval(lo - np.abs(lo) * _ULP, hi + np.abs(hi) * _ULP, partial)
+    return Interval(lo - np.abs(lo) * ULP, hi + np.abs(hi) * ULP, partial)
 
 
 def add(a: Interval, b: Interval) -> Interval:
@@ -133,24 +133,25 @@ def multiply(a: Interval, b: Interval) -> Interval:
         return _whole_power(a, 2.0)
     if a.is_point:
         a, b = b, a
-    lo, hi = _ordered(a.lo * b.lo, a.hi * b.lo)
+    lo, hi = ordered(a.lo * b.lo, a.hi * b.lo)
     if not b.is_point:
-        others = _ordered(a.lo * b.hi, a.hi * b.hi)
+        others = ordered(a.lo * b.hi, a.hi * b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
-    return _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _EXACT)
+    return widen(lo, hi, a.may_be_undefined | b.may_be_undefined, EXACT_ULPS)
 
 
 def divide(a: Interval, b: Interval) -> Interval:
     """Return a / b; nothing is known where b has 0 inside."""
     bottom = np.where((b.lo > 0) | (b.hi < 0), b.lo, np.nan)
-    lo, hi = _ordered(a.lo / bottom, a.hi / bottom)
+    lo, hi = ordered(a.lo / bottom, a.hi / bottom)
     if not b.is_point:
-        others = _ordered(a.lo / b.hi, a.hi / b.hi)
+        others = ordered(a.lo / b.hi, a.hi / b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
-    return _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _EXACT)
+    return widen(lo, hi, a.may_be_undefined | b.may_be_undefined, EXACT_ULPS)
 
 
-def _ordered(one: Floats, other: Floats) -> tuple[Floats, Floats]:
+def ordered(one: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """Return the lesser and the greater of two arrays, elementwise."""
     return np.minimum(one, other), np.maximum(one, other)
 
 
@@ -196,12 +197,12 @@ def power(a: Interval, b: Interval) -> Interval:
     # The power is monotone in base and exponent, each if the other is held: so it is least and
     # greatest at corners. To numpy nan**0 and 1**nan are 1: what is unknown must be kept out.
     known = ((a.lo > 0) | ((a.lo == 0) & (b.lo > 0))) & ~np.isnan(b.lo + a.hi + b.hi)
-    lo, hi = _ordered(a.lo**b.lo, a.hi**b.lo)
+    lo, hi = ordered(a.lo**b.lo, a.hi**b.lo)
     if not b.is_point:
-        others = _ordered(a.lo**b.hi, a.hi**b.hi)
+        others = ordered(a.lo**b.hi, a.hi**b.hi)
         lo, hi = np.minimum(lo, others[0]), np.maximum(hi, others[1])
     lo, hi = np.where(known, lo, np.nan), np.where(known, hi, np.nan)
-    out = _widen(lo, hi, a.may_be_undefined | b.may_be_undefined, _ASSUMED)
+    out = widen(lo, hi, a.may_be_undefined | b.may_be_undefined, ASSUMED_ULPS)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
@@ -212,19 +213,19 @@ def _whole_power(a: Interval, exponent: float) -> Interval:
     if exponent < 0:
         return divide(interval(1.0), _whole_power(a, -exponent))
     if exponent % 2 == 1:
-        return _widen(a.lo**exponent, a.hi**exponent, a.may_be_undefined, _ASSUMED)
+        return widen(a.lo**exponent, a.hi**exponent, a.may_be_undefined, ASSUMED_ULPS)
     size = absolute(a)
     if exponent == 2:  # a product
-        out = _widen(size.lo * size.lo, size.hi * size.hi, a.may_be_undefined, _EXACT)
+        out = widen(size.lo * size.lo, size.hi * size.hi, a.may_be_undefined, EXACT_ULPS)
     else:
-        out = _widen(size.lo**exponent, size.hi**exponent, a.may_be_undefined, _ASSUMED)
+        out = widen(size.lo**exponent, size.hi**exponent, a.may_be_undefined, ASSUMED_ULPS)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
 def sqrt(a: Interval) -> Interval:
     """Return the square root of what is not negative in a."""
     a = _clip_to_domain(a, 0.0, np.inf)
-    out = _widen(np.sqrt(a.lo), np.sqrt(a.hi), a.may_be_undefined, _EXACT)
+    out = widen(np.sqrt(a.lo), np.sqrt(a.hi), a.may_be_undefined, EXACT_ULPS)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
@@ -246,7 +247,7 @@ def _increasing(
     function: Callable[[Floats], Floats], a: Interval, low: float = -np.inf, high: float = np.inf
 ) -> Interval:
     """Bound an increasing function whose values are from low to high."""
-    out = _widen(function(a.lo), function(a.hi), a.may_be_undefined, _ASSUMED)
+    out = widen(function(a.lo), function(a.hi), a.may_be_undefined, ASSUMED_ULPS)
     return Interval(np.maximum(out.lo, low), np.minimum(out.hi, high), out.may_be_undefined)
 
 
@@ -313,7 +314,7 @@ def asin(a: Interval) -> Interval:
 def acos(a: Interval) -> Interval:
     """Return the arc cosine of what is from -1 to 1 in a."""
     a = _clip_to_domain(a, -1.0, 1.0)
-    out = _widen(np.arccos(a.hi), np.arccos(a.lo), a.may_be_undefined, _ASSUMED)
+    out = widen(np.arccos(a.hi), np.arccos(a.lo), a.may_be_undefined, ASSUMED_ULPS)
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
 
@@ -325,11 +326,11 @@ def atan(a: Interval) -> Interval:
 def hypot(a: Interval, b: Interval) -> Interval:
     """Return sqrt(a**2 + b**2)."""
     a, b = absolute(a), absolute(b)
-    out = _widen(
+    out = widen(
         np.hypot(a.lo, b.lo),
         np.hypot(a.hi, b.hi),
         a.may_be_undefined | b.may_be_undefined,
-        _ASSUMED,
+        ASSUMED_ULPS,
     )
     return Interval(np.maximum(out.lo, 0.0), out.hi, out.may_be_undefined)
 
@@ -345,11 +346,11 @@ def atan2(y: Interval, x: Interval) -> Interval:
     for corner in corners[1:]:
         lo, hi = np.minimum(lo, corner), np.maximum(hi, corner)
     jumps = (y.lo <= 0) & (y.hi >= 0) & (x.lo <= 0)
-    out = _widen(
+    out = widen(
         np.where(jumps, -_PI, lo),
         np.where(jumps, _PI, hi),
         y.may_be_undefined | x.may_be_undefined,
-        _ASSUMED,
+        ASSUMED_ULPS,
     )
     # The comparisons above are False for nan; corners are nan then.
     unknown = np.isnan(lo)
@@ -358,74 +359,3 @@ def atan2(y: Interval, x: Interval) -> Interval:
     return Interval(
         np.where(unknown, np.nan, out.lo), np.where(unknown, np.nan, out.hi), out.may_be_undefined
     )
-
-
-# ------------------------------------------------------------------- periodic functions
-
-# Sines and cosines are moved by 16 ulp of 1: nothing rests on how exact they are near 0.
-_WAVE = _ASSUMED * _ULP
-
-
-def sin(a: Interval) -> Interval:
-    """Return the sine."""
-    return _sinusoid(np.sin, a, 0.25)
-
-
-def cos(a: Interval) -> Interval:
-    """Return the cosine."""
-    return _sinusoid(np.cos, a, 0.0)
-
-
-def _sinusoid(function: Callable[[Floats], Floats], a: Interval, crest: float) -> Interval:
-    """Bound sine or cosine: 1 at the angle ``crest``, in turns, and -1 half a turn later.
-
-    Between crests and troughs it is monotone, and so is least and greatest at the ends.
-    """
-    if a.is_point:
-        there = function(a.lo)
-        lo, hi = there - _WAVE, there + _WAVE
-    else:
-        lo, hi = _ordered(function(a.lo), function(a.hi))
-        lo = np.where(_may_contain_integer(a, 2 * np.pi, crest + 0.5), -1.0, lo - _WAVE)
-        hi = np.where(_may_contain_integer(a, 2 * np.pi, crest), 1.0, hi + _WAVE)
-    return Interval(np.maximum(lo, -1.0), np.minimum(hi, 1.0), a.may_be_undefined)
-
-
-def tan(a: Interval) -> Interval:
-    """Return the tangent; nothing is known where a may have a pole inside."""
-    lo, hi = np.tan(a.lo), np.tan(a.hi)
-    pole = _may_contain_integer(a, np.pi, 0.5)
-    return _widen(
-        np.where(pole, np.nan, lo), np.where(pole, np.nan, hi), a.may_be_undefined, _ASSUMED
-    )
-
-
-def sec(a: Interval) -> Interval:
-    """Return 1 / cos(a); nothing is known where a may have a pole inside."""
-    return divide(interval(1.0), cos(a))
-
-
-def csc(a: Interval) -> Interval:
-    """Return 1 / sin(a); nothing is known where a may have a pole inside."""
-    return divide(interval(1.0), sin(a))
-
-
-def cot(a: Interval) -> Interval:
-    """Return the cotangent; nothing is known where a may have a pole inside."""
-    lo, hi = 1.0 / np.tan(a.hi), 1.0 / np.tan(a.lo)
-    pole = _may_contain_integer(a, np.pi, 0.0)
-    lo, hi = np.where(pole, np.nan, lo), np.where(pole, np.nan, hi)
-    return _widen(lo, hi, a.may_be_undefined, _ASSUMED)
-
-
-def _may_contain_integer(a: Interval, period: float, shift: float) -> Any:
-    """Return where a / period - shift may hold a whole number; period is 2 pi or pi.
-
-    The quotient's error is under (|q| + 1) 2^-52 for a quotient q: half an ulp each for the
-    period and the division, and for taking off a shift of at most 3/4. Where that comes near 1
-    the answer is yes.
-    """
-    begin, end = a.lo / period - shift, a.hi / period - shift
-    begin -= (np.abs(begin) + 1.0) * (4 * _ULP)
-    end += (np.abs(end) + 1.0) * (4 * _ULP)
-    return np.floor(end) >= np.ceil(begin)  # not for nan, which is to stay what it is

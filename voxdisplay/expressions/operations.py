@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from voxdisplay.expressions import interval, step_intervals
+from voxdisplay.expressions import trigonometric_intervals as trigonometric
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -135,25 +136,29 @@ COMPARISONS = {
 FUNCTIONS = {
     operation.name: operation
     for operation in (
-        Operation("sin", np.sin, interval.sin, (lambda _, a: np.cos(a),)),
-        Operation("cos", np.cos, interval.cos, (lambda _, a: -np.sin(a),)),
-        Operation("tan", np.tan, interval.tan, (lambda r, _: 1 + r * r,), singular=True),
+        Operation("sin", np.sin, trigonometric.sin, (lambda _, a: np.cos(a),)),
+        Operation("cos", np.cos, trigonometric.cos, (lambda _, a: -np.sin(a),)),
+        Operation("tan", np.tan, trigonometric.tan, (lambda r, _: 1 + r * r,), singular=True),
         Operation(
             "sec",
             lambda a: 1 / np.cos(a),
-            interval.sec,
+            trigonometric.sec,
             (lambda r, a: r * np.tan(a),),
             singular=True,
         ),
         Operation(
             "csc",
             lambda a: 1 / np.sin(a),
-            interval.csc,
+            trigonometric.csc,
             (lambda r, a: -r / np.tan(a),),
             singular=True,
         ),
         Operation(
-            "cot", lambda a: 1 / np.tan(a), interval.cot, (lambda r, _: -1 - r * r,), singular=True
+            "cot",
+            lambda a: 1 / np.tan(a),
+            trigonometric.cot,
+            (lambda r, _: -1 - r * r,),
+            singular=True,
         ),
         Operation("asin", np.arcsin, interval.asin, (lambda _, a: 1 / np.sqrt(1 - a * a),)),
         Operation("acos", np.arccos, interval.acos, (lambda _, a: -1 / np.sqrt(1 - a * a),)),

@@ -54,8 +54,9 @@ def test_full_inner_multiplicity_joins_where_the_points_do() -> None:
 
 @pytest.mark.parametrize("certified", [False, True])
 def test_full_inner_multiplicity_jumps_where_the_points_do_not_join(certified: bool) -> None:
-    away = np.array(RIGHT) + np.array((0, 10, 0))
-    sequence = vd.voxelize(vd.BSpline([*LEFT, *away], 3, FULL), certified=certified)
+    points = np.array(LEFT + RIGHT) + 0.5
+    points[4:] += (0, 10, 0)
+    sequence = vd.voxelize(vd.BSpline(points, 3, FULL), certified=certified)
     report = sequence.report
     assert report.pieces == 2
     assert report.jumps == (pytest.approx(1),)

@@ -126,8 +126,8 @@ def test_every_axis(axis: str) -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: expression("10*t/abs(t)", (-1, 1)),
-        lambda: callable_of(lambda t: 10 * t / abs(t), (-1, 1)),
+        lambda: expression("10*t/abs(t) + 0.5", (-1, 1)),
+        lambda: callable_of(lambda t: 10 * t / abs(t) + 0.5, (-1, 1)),
     ],
 )
 def test_sides_that_do_not_meet_are_a_jump(make: Callable[[], Curve], certified: bool) -> None:
