@@ -10,7 +10,7 @@ import sys
 import threading
 
 import pytest
-from carriers import eventually
+from carriers import CARRIERS, eventually
 from conftest import DEADLINE_S, ROOT
 from pluggable_pty import noise_frame
 
@@ -266,6 +266,30 @@ def test_a_forked_process_does_not_shut_the_connection_down(scheme):
         finally:
             end(pid)
             peer.close()
+
+
+# pyserial's reader of rfc2217:// is a thread of the old style.
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name)")
+@pytest.mark.parametrize("scheme", ["pty", "rfc2217"])
+def test_a_forked_process_has_no_port_whose_end_could_disturb(scheme):
+    """Objects of pyserial shut their connection down when they are collected, or Python ends."""
+    with CARRIERS[scheme]() as (transport, peer):
+        line = transport._serial
+        descriptor = line.fileno() if scheme != "rfc2217" else line._socket.fileno()
+
+        def collect():
+            assert not line.is_open
+            line.__del__()
+            with pytest.raises(OSError, match="Bad file descriptor"):
+                os.fstat(descriptor)
+
+        pid, text = in_child(collect)
+        try:
+            assert text == "done"
+            transport.write(b"still here", 5)
+            assert peer.read(10) == b"still here"
+        finally:
+            end(pid)
 
 
 def test_a_second_process_is_told_that_the_port_is_busy(plug):

@@ -11,7 +11,8 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from typing import Any
+import weakref
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 import serial
@@ -100,6 +101,7 @@ def open_port(port: str, *, baud: int, timeout_s: float, reset: bool) -> Any:
     if not reset:
         _keep_modem_lines(line)
     line.open()
+    _OPEN_PORTS.add(line)
     if not reset and isinstance(line, serial.Serial) and sys.platform != "win32":
         with contextlib.suppress(*LIBRARY_ERRORS):
             _clear_hupcl(line.fileno())
@@ -186,5 +188,17 @@ def abandon_port(line: Any) -> None:
         if isinstance(line, serial.Serial):
             line.close()
         elif inherited := getattr(line, "_socket", None):
-            inherited.close()
+            getattr(inherited, "_inner", inherited).close()  # without the lock of a reader's thread
             line._socket, line.is_open = None, False  # noqa: SLF001 - else its end would speak
+
+
+def _abandon_open_ports() -> None:
+    for line in list(_OPEN_PORTS):
+        abandon_port(line)
+
+
+# A forked process closes what it has inherited at once: the end of pyserial's objects, whenever it
+# comes there, would end the connection of the process that opened them.
+_OPEN_PORTS: Final[weakref.WeakSet[Any]] = weakref.WeakSet()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_abandon_open_ports)
