@@ -84,19 +84,33 @@ def test_reversing_a_curve_reverses_the_voxels(curve: Curve) -> None:
 def test_a_mirror_image_has_the_mirrored_voxels() -> None:
     """Polylines with every kind of tie, in one of the 48 positions of the cube each.
 
-    Their ends are in the middles of voxels, where nobody asks which of two voxels holds them. A
-    few cannot be mirrored: what lies across a boundary evenly cannot choose between its sides.
+    Their vertices are in the middles of voxels, where nobody asks which of two voxels holds them.
+    A few cannot be mirrored: what lies across a boundary evenly cannot choose between its sides.
     """
     missed = 0
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        ends = rng.integers(-20, 21, (2, 3)) + 0.5
-        vertices = np.concatenate((ends[:1], rng.integers(-40, 41, (3, 3)) / 2, ends[1:]))
+        vertices = rng.integers(-20, 21, (5, 3)) + 0.5
         axes, signs = rng.permutation(3), rng.choice([-1, 1], 3)
         here = voxelize(Polyline(vertices)).voxels[:, axes]
         there = voxelize(Polyline(vertices[:, axes] * signs)).voxels
         missed += not np.array_equal(np.where(signs > 0, here, -1 - here), there)
     assert missed <= 8
+
+
+def test_a_polygon_is_the_same_from_every_corner() -> None:
+    missed = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        corners = rng.integers(-40, 41, (5, 3)) / 2 if seed % 2 else rng.uniform(-40, 40, (5, 3))
+        loops = [
+            voxelize(Polyline(np.concatenate((rolled, rolled[:1]))))
+            for rolled in (np.roll(corners, -k, axis=0) for k in (0, 1, 3))
+        ]
+        assert all(loop.closed for loop in loops)
+        sets = [{tuple(voxel) for voxel in loop.voxels.tolist()} for loop in loops]
+        missed += not sets[0] == sets[1] == sets[2]
+    assert missed <= 4
 
 
 @given(st.lists(curves, min_size=1, max_size=8))

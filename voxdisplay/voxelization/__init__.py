@@ -66,11 +66,16 @@ def voxelize(
     Returns
     -------
     Sequence
-        26-connected; the first voxel holds the curve's first point, the last its last; others
-        are within 0.7072 of the curve, if a step from one float t to the next moves it by less
-        than 0.002. Each has exactly two neighbours but for the contacts that
+        26-connected; the first voxel of an open curve holds its first point, the last its last;
+        others are within 0.7072 of the curve, if a step from one float t to the next moves it by
+        less than 0.002. Each has exactly two neighbours but for the contacts that
         ``.contact_pairs`` lists. A closed curve is one whose ends are within 0.001 voxels of each
         other, unless it says otherwise itself; its last voxel is a neighbour of the first.
+
+        A curve and its reverse have the same voxels, in reverse. A closed curve with a straight
+        run of nine voxels has the same voxels from every beginning (as far as its samples are the
+        same ones: for polygons to the bit); the first is the one that holds its first point or,
+        where a corner is cut there, the nearest to it.
 
     Raises
     ------

@@ -17,7 +17,7 @@ import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.batch_evaluation import BatchEvaluator
-from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.curve import NO_BREAKS, Curve
 from voxdisplay.curves.singular_points import complete, singular_points
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns
@@ -29,6 +29,8 @@ AXES = "xyz"
 # ties are settled in a way that knows neither axis nor sign nor direction.
 TIE_SHIFT = 1e-7
 CORE = 0.25
+# A coordinate is on a face of voxels if it is this near to a whole number.
+ON_FACE = 1e-9
 
 # Voxel indices are int32, and sums and differences of a few of them must be as well.
 MAX_COORDINATE = 2.0**30
@@ -108,7 +110,9 @@ class CurveBatch:
         # The last position that was not finite: index of the curve, t.
         self._undefined: tuple[int, float] | None = None
         self._evaluator = BatchEvaluator(self.curves)
+        self._extended: Bools | None = None  # whose parameters go on past the end of the range
         self._centres: Floats | None = None  # of the curves' boxes, (3, curves)
+        self._tie_shift = np.empty(0)
         # Parameters nearer to each other than this cannot be told apart everywhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
@@ -170,6 +174,9 @@ class CurveBatch:
             If a position is not finite, or too far out to have a voxel.
 
         """
+        if self._extended is not None:
+            past = self._extended[curve] & (t > self.last[curve])
+            t = np.where(past, t - (self.last - self.first)[curve], t)
         points = self._evaluator.positions(curve, t)
         # And so not where P is not a number: it would be least and greatest.
         near = points.min(initial=0) > -MAX_COORDINATE and points.max(initial=0) < MAX_COORDINATE
@@ -178,11 +185,32 @@ class CurveBatch:
             raise self._position_error(int(curve[at]), float(t[at]), points[:, at])
         return self._moved(curve, points)
 
+    def corners(self, samples: Samples) -> Ints:
+        """Return the indices of the samples at which a curve may turn sharply: at its breaks."""
+        breaks = [curve.breaks for curve in self.curves]
+        if not any(each.size for each in breaks if each is not NO_BREAKS):
+            return np.empty(0, dtype=np.int64)
+        of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
+        turn = of + 1j * np.concatenate(breaks)  # ordered by the curve, then by t
+        here = samples.curve[samples.piece] + 1j * samples.t
+        at = np.minimum(np.searchsorted(here, turn), here.size - 1)
+        return np.asarray(at[here[at] == turn])
+
+    def extend(self, curves: Bools) -> None:
+        """Let parameters of some curves, closed ones, go on past the ends of their ranges.
+
+        Those are one round further: ``last`` and more is ``first`` and more.
+        """
+        self._extended = curves
+
+    @np.errstate(under="ignore")
     def settle_ties(self, samples: Samples) -> Samples:
         """Move all points of the curves by ``TIE_SHIFT`` from now on, but for their ends.
 
-        A straight diagonal that passes halfway between voxels stays straight: to both of its axes
-        the same happens.
+        A curve of which an end or a corner lies on a face of voxels stays where it is: which of
+        two voxels holds a point of their face is a matter of definition. A straight
+        diagonal that passes halfway between voxels stays straight: to both of its axes the same
+        happens.
 
         Parameters
         ----------
@@ -199,9 +227,16 @@ class CurveBatch:
         first = samples.bounds[:-1]
         low = np.minimum.reduceat(samples.points, first, axis=1)
         high = np.maximum.reduceat(samples.points, first, axis=1)
+        ends = np.concatenate((first, samples.bounds[1:] - 1))
+        fixed = np.concatenate((ends, self.corners(samples)))
+        points = samples.points.take(fixed, axis=1)
+        on_face = (np.abs(points - np.rint(points)) < ON_FACE).any(axis=0)
+        self._tie_shift = np.full(first.size, TIE_SHIFT / CORE)
+        self._tie_shift[samples.piece[fixed[on_face]]] = 0.0
+        if not self._tie_shift.any():
+            return samples
         self._centres = (low + high) / 2
         points = self._moved(samples.piece, samples.points)
-        ends = np.concatenate((first, samples.bounds[1:] - 1))
         points[:, ends] = samples.points.take(ends, axis=1)
         return replace(samples, points=points)
 
@@ -212,7 +247,7 @@ class CurveBatch:
         shift = (self._centres if alone else self._centres.take(curve, axis=1)) - points
         np.minimum(shift, CORE, out=shift)
         np.maximum(shift, -CORE, out=shift)
-        shift *= TIE_SHIFT / CORE
+        shift *= self._tie_shift if alone else self._tie_shift[curve]
         shift += points
         return shift
 

@@ -29,7 +29,9 @@ from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
 from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose_curves, sample_overlooked
 from voxdisplay.voxelization.grid_plane import trace_all_planes, trace_curves
 from voxdisplay.voxelization.loop_closing import close_loop
+from voxdisplay.voxelization.plane_crossings import dominant_crossings
 from voxdisplay.voxelization.restoring import restore_coverage
+from voxdisplay.voxelization.seams import begin_at_start, move_seams, within_range
 from voxdisplay.voxelization.sequence import Sequence
 from voxdisplay.voxelization.thinning import thin_events
 from voxdisplay.voxelization.voxel_events import VoxelEvents
@@ -87,9 +89,12 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
     if boxes:
         samples = refine_samples(batch, sample_overlooked(batch, samples, boxes))
     samples = split_at_jumps(batch, samples)
-    traced = trace_curves(batch, samples)
-    events = thin_events(traced, samples, keep_tips=certified)
     closed = _closed(batch, samples)
+    crossings, moved = dominant_crossings(batch, samples), [False] * len(closed)
+    if any(closed):
+        crossings, samples, moved = move_seams(batch, crossings, samples, closed)
+    traced = trace_curves(batch, crossings, samples)
+    events = thin_events(traced, samples, keep_tips=certified)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
     voxels.flags.writeable = t.flags.writeable = False
@@ -112,14 +117,18 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
         closes = closed[index] and single[index]
         if closes:
             thin = events.take(np.arange(low, high))
-            loop = close_loop(thin, curve.position, batch.last[index])
+            if moved[index]:
+                loop = thin = begin_at_start(thin, batch.curves[index])
+            else:
+                loop = close_loop(thin, curve.position, batch.last[index])
             own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
             own_voxels.flags.writeable = own_t.flags.writeable = False
         spent = seconds * len(own_voxels) + perf_counter() - begin
         own_starts = starts[of[index] : of[index + 1]] - low
         sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
         if boxes:
-            thin = events.take(np.arange(low, high))
+            if not (closes and moved[index]):
+                thin = events.take(np.arange(low, high))
             sequence = _with_proof(batch, sequence, boxes, index, thin, traced)
             spent = seconds * len(sequence) + perf_counter() - begin
             sequence = replace(sequence, seconds=spent)
@@ -172,7 +181,7 @@ def _with_proof(
             full = trace_all_planes(batch, samples)
             thin = thin_events(full, samples, keep_tips=True)
         else:
-            full = traced.take(traced.piece == thin.piece[0])
+            full = within_range(traced.take(traced.piece == thin.piece[0]), curve)
         mended = restore_coverage(thin, full, ends, box, closed=closed)
         voxels = np.ascontiguousarray(mended.voxels.T)
         voxels.flags.writeable = mended.t.flags.writeable = False

@@ -25,7 +25,7 @@ from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.adaptive_sampling import limit_chords
 from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
 from voxdisplay.voxelization.index_ranges import insert_columns
-from voxdisplay.voxelization.plane_crossings import TIE_TOLERANCE, Crossings, dominant_crossings
+from voxdisplay.voxelization.plane_crossings import TIE_TOLERANCE, Crossings
 from voxdisplay.voxelization.root_finding import find_roots
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, Voxels, adjacent
 
@@ -40,15 +40,18 @@ SAME_GAIN = 1e-9
 EIGHTHS = np.linspace(0.0, 1.0, 9)
 
 
-def trace_curves(batch: CurveBatch, samples: Samples) -> VoxelEvents:
+@np.errstate(under="ignore")
+def trace_curves(batch: CurveBatch, crossings: Crossings, samples: Samples) -> VoxelEvents:
     """Follow curves through the mid-planes.
 
     Parameters
     ----------
     batch : Batch
         The curves.
+    crossings : Crossings
+        Those of dominant planes.
     samples : Samples
-        Points along them, in connected pieces.
+        Points along the curves, in connected pieces.
 
     Returns
     -------
@@ -58,11 +61,11 @@ def trace_curves(batch: CurveBatch, samples: Samples) -> VoxelEvents:
         0.7072 of the curve, those within 0.8661.
 
     """
-    crossings = dominant_crossings(batch, samples)
     events = choose_corners(crossings, samples)
     return _bridge_gaps(batch, events, samples.curve)
 
 
+@np.errstate(under="ignore")
 def trace_all_planes(batch: CurveBatch, samples: Samples) -> VoxelEvents:
     """Follow curves through all mid-planes they pass between samples: as `trace`, but slowly.
 

@@ -165,6 +165,7 @@ def _later(cells: SpatialHash, voxels: Voxels, offset: tuple[int, int]) -> tuple
 
 
 @np.errstate(all="ignore")
+@np.errstate(under="ignore")
 def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> Floats:
     """Measure how far voxel centres are from a curve.
 
@@ -268,6 +269,7 @@ class _Boxes:
             start = stop
 
 
+@np.errstate(under="ignore")
 def coverage(voxels: Voxels, curve: Curve) -> float:
     """Measure how far a curve gets away from the voxels that should show it.
 

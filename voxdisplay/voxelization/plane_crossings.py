@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
-from voxdisplay.curves.curve import NO_BREAKS
 from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
 from voxdisplay.voxelization.index_ranges import expand_ranges, split_blocks
 from voxdisplay.voxelization.root_finding import TOLERANCE, find_roots
@@ -116,18 +115,14 @@ def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
 
 def _slopes_between_corners(batch: CurveBatch, samples: Samples) -> Slopes:
     """Estimate dP/dt after and before each sample: the same but where a curve turns sharply."""
-    breaks = [curve.breaks for curve in batch.curves]
-    if not any(each.size for each in breaks if each is not NO_BREAKS):
+    corners = batch.corners(samples)
+    if not corners.size:
         slopes = slopes_at(samples)
         return Slopes(slopes, slopes)
-    of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
-    turn = of + 1j * np.concatenate(breaks)
-    here = samples.curve[samples.piece] + 1j * samples.t
-    at = np.minimum(np.searchsorted(here, turn), here.size - 1)
-    corner = np.zeros(here.size, dtype=bool)
-    corner[at[here[at] == turn]] = True
     # Each corner ends one piece and begins another.
-    twice = np.arange(here.size).repeat(1 + corner)
+    count = np.ones(samples.t.size, dtype=np.int64)
+    count[corners] = 2
+    twice = np.arange(count.size).repeat(count)
     second = np.append(False, twice[1:] == twice[:-1])
     opens = second | np.append(True, samples.piece[twice[1:]] != samples.piece[twice[:-1]])
     piece = np.cumsum(opens) - 1

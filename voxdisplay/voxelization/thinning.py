@@ -216,6 +216,7 @@ def _costs(
     return np.floor(scaled + 0.5).astype(np.int64)
 
 
+@np.errstate(under="ignore")
 def _squared_distances(events: VoxelEvents, samples: Samples, index: NDArray[np.integer]) -> Floats:
     """Return squared distances of voxel centres, (n,), from the polyline around their t."""
     order = samples.piece + 1j * samples.t
@@ -258,6 +259,7 @@ def _skips_tip(
     return np.asarray(touches & out)
 
 
+@np.errstate(under="ignore")
 def _uncovers_curve(
     events: VoxelEvents, samples: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
