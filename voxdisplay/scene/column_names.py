@@ -9,6 +9,8 @@ import re
 
 AXES = "xyz"
 
+_LONGEST = 64  # as much of a name is looked at
+
 _UNIT = re.compile(r"\s*(?:[\[(].*|/.*|\bin\b.*)")
 _WORDS = re.compile(r"[a-z]+|\d+")
 _AFFIXES = re.compile(r"(?:pos|coord|point|p)?([xyz])(?:pos|coord)?")
@@ -32,7 +34,7 @@ def axis_columns(names: list[str]) -> list[list[int]]:
     """
     found: list[list[int]] = [[], [], []]
     for axis_of in (_exact_axis, _axis_with_unit, _axis_with_words):
-        axes = [axis_of(name.strip().lower()) for name in names]
+        axes = [axis_of(name[:_LONGEST].strip().lower()) for name in names]
         for i, axis in enumerate(AXES):
             found[i] = found[i] or [k for k, each in enumerate(axes) if each == axis]
     return found

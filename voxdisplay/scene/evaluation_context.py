@@ -28,9 +28,13 @@ def as_scene_error(path: str) -> Iterator[None]:
     try:
         yield
     except CurveError as error:
-        if isinstance(error, arguments.ArgumentError):
-            path = f"{path}.{error.argument}"
-        raise SceneError(str(error), path=path, hint=error.hint) from error
+        raise _scene_error(error, path) from error
+
+
+def _scene_error(error: CurveError, path: str) -> SceneError:
+    if isinstance(error, arguments.ArgumentError):
+        path = f"{path}.{error.argument}"
+    return SceneError(str(error), path=path, hint=error.hint)
 
 
 class EvaluationContext:
@@ -72,8 +76,10 @@ class EvaluationContext:
             source if isinstance(source, float) else self.number(f"{key}[{i}]", source)
             for i, source in enumerate(sources)
         ]
-        with as_scene_error(self.path):
+        try:
             return arguments.array(key, row, (None,))
+        except CurveError as error:
+            raise _scene_error(error, self.path) from error
 
     def points(self, key: str, rows: Sequence[Sequence[str | float]]) -> Floats:
         """Return n rows of three numbers: (n, 3) float64."""
@@ -84,8 +90,10 @@ class EvaluationContext:
             ]
             for i, row in enumerate(rows)
         ]
-        with as_scene_error(self.path):
+        try:
             return arguments.points(key, table, least=0)
+        except CurveError as error:
+            raise _scene_error(error, self.path) from error
 
     def points_from_file(self, key: str, name: str, *, split: bool) -> FilePoints:
         """Read a file of points beside the scene.

@@ -17,7 +17,7 @@ from voxdisplay.scene.json_syntax import explain_syntax_error
 # An unfinished string ends with the text, so that no match is tried twice.
 _STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*+"?|//[^\n\r]*', re.DOTALL)
 _STRING = r'"(?:[^"\\]|\\.)*+"'
-_KEYS_AND_BRACES = re.compile(rf"(?P<key>{_STRING})\s*:|{_STRING}|[{{}}]", re.DOTALL)
+_KEYS_AND_BRACES = re.compile(rf"(?P<key>{_STRING})\s*+:|{_STRING}|[{{}}]", re.DOTALL)
 _CONSTANTS = re.compile(rf"{_STRING}|(?P<name>-?Infinity|NaN)", re.DOTALL)
 _PATH_STEP = re.compile(r"\[([0-9]+)\]")
 _SPACE = re.compile(r"[ \t\n\r]*")
@@ -161,7 +161,9 @@ class JsonText:
         seen: list[set[str]] = []
         for match in _KEYS_AND_BRACES.finditer(self._text):
             if match["key"]:
-                key = json.loads(match["key"], strict=False)
+                key = match["key"][1:-1]
+                if "\\" in key:
+                    key = json.loads(match["key"])
                 if key in seen[-1]:
                     return match.start(), key
                 seen[-1].add(key)

@@ -8,6 +8,7 @@ objects.
 from __future__ import annotations
 
 from functools import cache
+from itertools import islice
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
@@ -15,6 +16,9 @@ import msgspec
 
 from voxdisplay.errors import did_you_mean
 from voxdisplay.expressions.parse import excerpt
+
+MOST_COMPARED = 100
+"""Most keys that are compared with a known one in search of a slip of the pen."""
 
 
 class Mismatch(NamedTuple):
@@ -156,7 +160,7 @@ def _object_mismatch(value: Any, structs: list[type[msgspec.Struct]], path: str)
     struct, tag_field = structs[0], structs[0].__struct_config__.tag_field
     if tag_field:
         if tag_field not in value:
-            for key in value:
+            for key in islice(value, MOST_COMPARED):
                 if hint := did_you_mean(key, [tag_field]):
                     return Mismatch(path, f"unknown key {excerpt(key)}", hint, key)
             return Mismatch(path, f"the key {tag_field!r} is missing", _known(tagged))

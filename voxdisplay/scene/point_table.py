@@ -63,6 +63,8 @@ def split_strands(points: Floats, gaps: list[int]) -> tuple[Floats, NDArray[np.i
         Rows before which another strand begins, too.
 
     """
+    if not gaps and np.isfinite(points).all():
+        return points, np.zeros(min(1, len(points)), dtype=np.int64)
     begins = np.zeros(len(points) + 1, dtype=np.bool_)
     begins[gaps] = True
     kept = np.flatnonzero(np.isfinite(points).all(axis=1))
@@ -122,13 +124,11 @@ class _Rows:
     def _read(self, columns: int) -> None:
         a, b, c = self.layout.axes
         lines, separator = self.table.lines, self.layout.separator
-        commas = self.decimal_comma is not None and separator != ","
-        plain, extend = self.table.plain, self.numbers.extend
-        for line in range(self.layout.first, len(lines)):
-            text = lines[line]
-            if commas:
-                text = "" if "." in text else text.replace(",", ".")
-            fields = text.split(separator) if plain else []
+        extend = self.numbers.extend
+        plain = self.table.plain and self.decimal_comma is None
+        plain = plain and '"' not in lines[self.layout.first]
+        for line, text in enumerate(lines[self.layout.first :], self.layout.first):
+            fields = text.split(separator) if plain else self._quick_fields(text)
             if len(fields) == columns:
                 try:
                     extend((float(fields[a]), float(fields[b]), float(fields[c])))
@@ -136,7 +136,26 @@ class _Rows:
                     pass
                 else:
                     continue
-            self._read_line(line)
+            if text:
+                self._read_line(line)
+            else:
+                self.empty[len(self.numbers) // 3] = line
+                self.skipped.append(len(self.numbers) // 3)
+
+    def _quick_fields(self, text: str) -> list[str]:
+        """Return the fields of a simple row as `float` takes them, or nothing."""
+        separator = self.layout.separator
+        if not self.table.plain:
+            return []
+        if '"' in text:
+            if any(field.count('"') == 1 for field in text.split(separator)):
+                return []  # a separator inside quotes
+            text = text.replace('"', "")
+        if "," in text and separator != ",":
+            if "." in text:
+                return []
+            text = text.replace(",", ".")
+        return text.split(separator)
 
     def _read_line(self, line: int) -> None:
         """Read a line that is not a plain row of numbers."""
@@ -165,9 +184,8 @@ class _Rows:
 
     def refuse_gaps(self, points: Floats, gaps: list[int]) -> None:
         """Raise CurveError if a row is empty or not finite."""
-        wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if wrong.size:
-            row = int(wrong[0])
+        if not np.isfinite(points).all():
+            row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
             x, y, z = points[row]
             problem = f"the point {x:g}, {y:g}, {z:g} is not finite"
             raise self.table.error(self._line_of(row), problem, GAPS_HINT)

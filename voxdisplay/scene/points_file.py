@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 MAX_BYTES = 16 << 20
 """Largest file: a million points or so, which is more than a display has along any curve."""
 
+MAX_STRANDS = 10_000
+"""Most strands of one file: each is a curve."""
+
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".xyz", ".asc", ".pts")
 
 
@@ -66,6 +69,9 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
     found = read(name, data, split=split)
     if not len(found.points):
         raise CurveError(f"{excerpt(name)} holds no points")
+    if len(found.starts) > MAX_STRANDS:
+        strands = f"{len(found.starts)} strands, more than {MAX_STRANDS}"
+        raise CurveError(f"{excerpt(name)} holds {strands}")
     return found
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
-from voxdisplay.scene.mismatch import describe_value, find_mismatch
+from voxdisplay.scene.mismatch import MOST_COMPARED, describe_value, find_mismatch
 from voxdisplay.scene.model import Scene, SceneItem
 from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
 from voxdisplay.scene.values import MAX_SIDE
@@ -167,7 +168,7 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
 
 def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
     """Return whether a scene has a key that resembles one."""
-    return any(did_you_mean(key, [written]) for written in raw)
+    return any(did_you_mean(key, [written]) for written in islice(raw, MOST_COMPARED))
 
 
 def _params(params: dict[str, str | float]) -> dict[str, float]:

@@ -22,7 +22,7 @@ NAMES_HINT = "name the columns that are x, y and z in a first line"
 _MAX_HEADER = 2  # names and units
 # Either two numbers with a point each, or one with a comma: 1,5, 2,5, 3,5
 _COMMA_PAIRS = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?:,\s+[+-]?[0-9]+,[0-9]+)+,?\s*")
-_IN_BRACKETS = re.compile(r"\s*(?:\[[^\]]*\]|\([^)]*\))")
+_IN_BRACKETS = re.compile(r"\[[^\[\]]{0,40}\]|\([^()]{0,40}\)")
 
 
 class Layout(NamedTuple):

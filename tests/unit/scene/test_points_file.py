@@ -112,6 +112,16 @@ def test_rows_that_are_not_finite(folder: Path) -> None:
     assert [item.path for item in strands] == ["$", "$", "$"]
 
 
+def test_strands_without_number(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(points_file, "MAX_STRANDS", 2)
+    scene = json.dumps({"type": "points", "file": "data.csv", "gaps": "split"})
+    (folder / "data.csv").write_text("1,2,3\n\n4,5,6\n")
+    assert len(read_scene(scene, folder=folder).items) == 2
+    (folder / "data.csv").write_text("1,2,3\n\n4,5,6\n\n7,8,9\n")
+    with pytest.raises(SceneError, match="'data.csv' holds 3 strands, more than 2"):
+        read_scene(scene, folder=folder)
+
+
 def test_pickles_are_not_loaded(folder: Path) -> None:
     np.save(folder / "data.npy", np.array([[print, 1, 2]], dtype=object), allow_pickle=True)
     assert "real numbers" in refused(folder, "data.npy")
