@@ -118,7 +118,7 @@ def test_strands_without_number(folder: Path, monkeypatch: pytest.MonkeyPatch) -
     (folder / "data.csv").write_text("1,2,3\n\n4,5,6\n")
     assert len(read_scene(scene, folder=folder).items) == 2
     (folder / "data.csv").write_text("1,2,3\n\n4,5,6\n\n7,8,9\n")
-    with pytest.raises(SceneError, match="'data.csv' holds 3 strands, more than 2"):
+    with pytest.raises(SceneError, match="holds 3 strands, more than 2"):
         read_scene(scene, folder=folder)
 
 
