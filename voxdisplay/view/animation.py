@@ -164,14 +164,14 @@ def _encode_by_pyav(
 ) -> None:
     import av  # noqa: PLC0415
 
-    picture_of_av: Any = av.VideoFrame  # PyAV has no types for it
+    video_frame: Any = av.VideoFrame  # PyAV has no types for it
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": "18", "preset": "veryfast"}
         stream.width, stream.height = size
         for picture in frames:
-            film.mux(stream.encode(picture_of_av.from_image(picture)))
+            film.mux(stream.encode(video_frame.from_image(picture)))
         film.mux(stream.encode(None))
 
 

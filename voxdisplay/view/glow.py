@@ -71,7 +71,7 @@ def accumulate_light(
 
     Returns
     -------
-    Glare
+    LightRegion
 
     """
     middle_px = float(camera.project([np.array(grid) / 2], grid, size)[2][0])

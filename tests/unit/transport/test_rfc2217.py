@@ -26,8 +26,8 @@ COMMANDS = st.one_of(
 def test_data_and_commands_are_parted_wherever_they_are_cut(pieces, cuts):
     sent = b"".join(data.replace(IAC, IAC + IAC) + command for data, command in pieces)
     places = sorted({0, len(sent), *(cut for cut in cuts if cut < len(sent))})
-    sieve = TelnetDecoder()
-    parted = [sieve.feed(sent[a:b]) for a, b in itertools.pairwise(places)]
+    decoder = TelnetDecoder()
+    parted = [decoder.feed(sent[a:b]) for a, b in itertools.pairwise(places)]
     assert b"".join(data for data, _ in parted) == b"".join(data for data, _ in pieces)
     assert b"".join(command for _, command in parted) == b"".join(c for _, c in pieces)
 
