@@ -153,9 +153,6 @@ class Frame:
     def __copy__(self) -> Frame:
         return self.copy()
 
-    def __deepcopy__(self, _memo: dict[int, Any]) -> Frame:
-        return self.copy()
-
     def _prepare_change(self) -> None:
         """Take the raster out of sharing before a change, so that copies keep their picture."""
         if self._shared:

@@ -53,7 +53,22 @@ def test_a_display_that_cannot_be_made_dark(plug):
     assert "could not be made dark" in text
 
 
-def test_interrupted_while_it_is_being_imported():
+def test_interrupted_while_the_command_line_is_imported(tmp_path):
+    """No handler but the entry point's is there yet, which ends the process at once."""
+    waiting = "import sys, time; print('importing', file=sys.stderr, flush=True); time.sleep(60)"
+    tmp_path.joinpath("click.py").write_text(waiting, encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, "-m", "voxdisplay", "push", SCENE]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=environment
+    ) as push:
+        assert push.stderr.readline() == "importing\n"
+        push.send_signal(signal.SIGINT)
+        _, text = push.communicate(timeout=DEADLINE_S)
+    assert (push.returncode, text) == (130, "interrupted\n")
+
+
+def test_interrupted_while_a_command_is_imported():
     """Nothing is open yet; there is a word and the exit code, and no traceback."""
     command = [sys.executable, "-X", "importtime", "-m", "voxdisplay", "push", SCENE]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as push:

@@ -203,6 +203,16 @@ def test_a_scene_is_drawn_like_anything_else():
     assert not Frame((10, 10, 10), "mono1").draw(scene).exact_color
 
 
+def test_repr_of_a_scene_names_size_and_objects():
+    assert repr(read_scene(TWO)) == "<Scene 10x10x10: 2 objects (segment, segment)>"
+    one = '{"type": "segment", "from": [1, 1, 1], "to": [9, 9, 9]}'
+    assert repr(read_scene(one)) == "<Scene: 1 object (segment)>"
+    many = f'{{"objects": [{", ".join([one] * 9)}]}}'
+    assert repr(read_scene(many)) == (
+        "<Scene: 9 objects (segment, segment, segment, segment, segment, ...)>"
+    )
+
+
 def test_a_scene_of_another_size_is_fitted_or_kept():
     scene, fitted, kept = read_scene(TWO), Frame((20, 20, 5)), Frame((20, 20, 5))
     assert fitted.draw(scene).clipped == 0

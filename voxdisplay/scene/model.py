@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 DEFAULT_SIZE = Grid(128, 128, 128)
 """Size of the picture of a scene that names none."""
 
+_MAX_TYPES = 5  # of objects that a repr names
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneItem:
@@ -76,6 +78,15 @@ class Scene:
     size: Grid | None
     items: tuple[SceneItem, ...]
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        size = f" {self.size}" if self.size else ""
+        types = [item.type for item in self.items[:_MAX_TYPES]]
+        if len(self.items) > _MAX_TYPES:
+            types.append("...")
+        named = f" ({', '.join(types)})" if types else ""
+        count = len(self.items)
+        return f"<Scene{size}: {count} object{'s' * (count != 1)}{named}>"
 
     def voxelize(self, **options: Any) -> list[Sequence]:
         """Return the sequences of all items, which are voxelised together.
