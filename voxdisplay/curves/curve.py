@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.compute.array_types import Bools, Evaluate, Floats, Ints
 from voxdisplay.curves.representation import short_repr
 
 NO_BREAKS: Floats = np.empty(0)
@@ -160,6 +160,17 @@ class Curve(ABC):
         """
         return None
 
+    @np.errstate(all="ignore")
+    def unbounded(self, t_lo: Floats, t_hi: Floats) -> Bools | None:
+        """Return where the curve has no finite bounds between pairs of parameters, (n,).
+
+        There it may have no value at a single parameter. None if it has no bounds at all.
+        """
+        box = self.enclosure(t_lo, t_hi)
+        if box is None:
+            return None
+        return np.asarray(~(np.isfinite(box[0]) & np.isfinite(box[1])).all(axis=0))
+
 
 _OF_THE_FORMULA = (
     "min_length",
@@ -168,4 +179,5 @@ _OF_THE_FORMULA = (
     "thread_safe",
     "batch_evaluator",
     "enclosure",
+    "unbounded",
 )

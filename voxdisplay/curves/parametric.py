@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from voxdisplay.compute.array_types import Evaluate, Floats
+from voxdisplay.compute.array_types import Bools, Evaluate, Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
@@ -196,6 +196,18 @@ class Parametric(Curve):
             if values.may_be_undefined is not False:
                 low[row, values.may_be_undefined & wide] = np.nan
         return low, high
+
+    @np.errstate(all="ignore")
+    def unbounded(self, t_lo: Floats, t_hi: Floats) -> Bools | None:
+        """Return where a formula has no finite bounds: see `Curve.unbounded`. None: a callable."""
+        if not self._formulas:
+            return None
+        found = np.zeros(t_lo.size, dtype=bool)
+        for formula in self._formulas:
+            if not formula.always_defined:
+                values = formula.enclosure(Interval(t_lo, t_hi))
+                found |= ~(np.isfinite(values.lo) & np.isfinite(values.hi))
+        return found
 
 
 def _range(t: Bounds, values: Mapping[str, float]) -> tuple[float, float]:

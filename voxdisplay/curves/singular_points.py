@@ -13,6 +13,7 @@ Must not know voxels or how curves are sampled.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ from voxdisplay.errors import CurveError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from voxdisplay.compute.array_types import Bools, Floats
+    from voxdisplay.compute.array_types import Floats
 
 AXES = "xyz"
 SAME_POINT = 1e-3
@@ -33,9 +34,11 @@ MAX_COORDINATE = 2.0**30
 """Coordinates beyond this have no voxel."""
 REPEATABLE = 1e-6
 """Values of one parameter that differ by more, in voxels and relative, are not of one function."""
-# Intervals of the first look for candidates, parts of an interval in each further one, and most
+# Intervals that are bounded first, parts of an unbounded one in each further round, and most
 # intervals that are followed: more are a stretch without values.
-_LOOK, _PARTS, _MOST_INTERVALS = 64, 16, 512
+_FIRST_INTERVALS, _PARTS, _MOST_INTERVALS = 16, 16, 512
+# Parts of the range whose ends are among the customary parameters.
+_EVEN_PARTS = 64
 # Most singular parameters of one curve.
 _MOST = 256
 # More finite candidates beyond `MAX_COORDINATE` are no poles, but a curve that is far out.
@@ -241,13 +244,11 @@ def _check_repeatable(curve: Curve, t: Floats, points: Floats) -> None:
 
 def _candidates(curve: Curve) -> Floats:
     """Return parameters at which a curve may have no value, ascending."""
-    first, last = curve.t_range
-    ends = np.array([first])
-    with np.errstate(all="ignore"):
-        bounded = curve.enclosure(ends, ends) is not None
-    return _unbounded(curve) if bounded else customary_parameters(first, last)
+    unbounded = _unbounded(curve)
+    return customary_parameters(*curve.t_range) if unbounded is None else unbounded
 
 
+@cache
 @np.errstate(all="ignore")
 def customary_parameters(first: float, last: float) -> Floats:
     """Return parameters in a range at which formulas of people tend to be singular, ascending.
@@ -257,7 +258,7 @@ def customary_parameters(first: float, last: float) -> Floats:
     length = last - first
     if not np.isfinite(length):
         return np.array([first, last])
-    found = [np.linspace(first, last, _LOOK + 1)]
+    found = [np.linspace(first, last, _EVEN_PARTS + 1)]
     for unit in (10.0 ** np.floor(np.log10(length) - 1), 1.0, np.pi / 2):
         low, high = np.ceil(first / unit), np.floor(last / unit)
         if 0 <= high - low <= 128:
@@ -265,19 +266,26 @@ def customary_parameters(first: float, last: float) -> Floats:
     decimals = int(np.clip(1 - np.floor(np.log10(length)), 0, 300))
     found[1:] = [np.append(each, np.round(each, decimals)) for each in found[1:]]
     t = np.unique(np.concatenate(found) + 0.0)
-    return np.asarray(t[(t >= first) & (t <= last)])
+    t = t[(t >= first) & (t <= last)]
+    t.flags.writeable = False
+    return np.asarray(t)
 
 
 @np.errstate(all="ignore")
-def _unbounded(curve: Curve) -> Floats:
-    """Return parameters at which nothing bounds a curve, however narrow the interval."""
+def _unbounded(curve: Curve) -> Floats | None:
+    """Return parameters at which nothing bounds a curve, however narrow the interval.
+
+    None for a curve without bounds.
+    """
     first, last = curve.t_range
-    edges = first + (last - first) * np.linspace(0.0, 1.0, _LOOK + 1)
+    edges = first + (last - first) * np.linspace(0.0, 1.0, _FIRST_INTERVALS + 1)
     edges[-1] = last
     resolution = 4 * float(np.spacing(max(abs(first), abs(last))))
     low, high = edges[:-1], edges[1:]
     while True:
-        unknown = _unknown(curve, low, high)
+        unknown = curve.unbounded(low, high)
+        if unknown is None:
+            return None
         low, high = low[unknown], high[unknown]
         if not low.size or (high - low).max() <= resolution or low.size > _MOST_INTERVALS:
             break
@@ -309,13 +317,6 @@ def _unbounded(curve: Curve) -> Floats:
         keep[here] = False
         keep[simplest] = True
     return np.asarray(t[keep])
-
-
-def _unknown(curve: Curve, low: Floats, high: Floats) -> Bools:
-    box = curve.enclosure(low, high)
-    if box is None:
-        return np.ones(low.size, dtype=bool)
-    return np.asarray(~(np.isfinite(box[0]) & np.isfinite(box[1])).all(axis=0))
 
 
 # ----------------------------------------------------------------------------------- limits

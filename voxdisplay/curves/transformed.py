@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.compute.array_types import Evaluate, Floats
+from voxdisplay.compute.array_types import Bools, Evaluate, Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 from voxdisplay.expressions.interval import Interval
@@ -82,6 +82,10 @@ class Transformed(Curve):
             return None
         outer = self.scale * Interval(*inner) + self.offset[:, None]
         return outer.lo, outer.hi
+
+    def unbounded(self, t_lo: Floats, t_hi: Floats) -> Bools | None:
+        """`Curve.unbounded` of the curve inside."""
+        return self.curve.unbounded(t_lo, t_hi)
 
     @staticmethod
     def batch_evaluator(curves: Sequence[Transformed]) -> Evaluate:
