@@ -1,4 +1,4 @@
-"""Scene files: what they mean, and how wrong and hostile ones are refused."""
+"""Meaning of scene files, errors of wrong and hostile ones, and the published schema."""
 
 from __future__ import annotations
 
