@@ -96,7 +96,7 @@ class Bench:
         with device.page_lock:
             front, session = device.memory.front, device.session
             return Snapshot(
-                bytes(front.pixels),
+                front.pixels,
                 device.config.grid,
                 device.config.pixel_format,
                 session.shown if session else None,

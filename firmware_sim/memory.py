@@ -1,9 +1,11 @@
 """Video memory: two pages of pixels in scan order, palette and digest of each (2.1, 6, 7.6, 8).
 
-Pixels have the same bytes in memory as on the wire, except that MONO1 has a byte per voxel. Knows
+Pixels have the same bytes in memory as on the wire, except that MONO1 has a byte per voxel. A page
+costs what has been written on it: the rest takes no memory, and no time to clear or copy. Knows
 nothing of packets and ops: callers pass voxels that are on the grid.
 """
 
+import mmap
 import os
 from array import array
 from collections.abc import Sequence
@@ -18,6 +20,9 @@ _COLOR: Final = 3  # bytes of a colour: red, green, blue
 _LOG_VOXELS: Final = 4096  # written voxels to collect before the digest is updated with them
 _DIRECT_VOXELS: Final = 256  # writes of so many voxels update the digest at once
 _MEGABYTE: Final = 1_000_000
+_BLOCK_BITS: Final = 10  # a block of so many voxels in scan order is copied as a whole
+_PENDING_VOXELS: Final = 1 << 16  # written voxels to collect before their blocks are found
+_SPARSE: Final = 4  # with more than one of so many blocks to copy, the whole page is copied
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,16 @@ def _default_palette() -> bytes:
 DEFAULT_PALETTE: Final = _default_palette()
 
 
+def _dark_memory(size: int) -> mmap.mmap:
+    """Return zeros that take up memory only where they are written."""
+    # Without a reservation: most of a large volume is never written.
+    flags = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | getattr(mmap, "MAP_NORESERVE", 0)}
+    memory = mmap.mmap(-1, size, **flags if hasattr(mmap, "MAP_PRIVATE") else {})
+    if hasattr(mmap, "MADV_NOHUGEPAGE"):  # or one voxel takes up 2 MiB
+        memory.madvise(mmap.MADV_NOHUGEPAGE)
+    return memory
+
+
 class Page:
     """Video memory for one frame, initially dark.
 
@@ -77,7 +92,7 @@ class Page:
 
     Attributes
     ----------
-    pixels : bytearray
+    memory : mmap
         All pixels in scan order, `volume` times `pixel_size` bytes.
     palette : bytearray
         256 colours of red, green and blue, a byte each. Used with INDEX8 only.
@@ -90,17 +105,42 @@ class Page:
 
     def clear(self) -> None:
         """Make all voxels dark, and the palette the default one."""
-        self.pixels = bytearray(self.volume * self.pixel_size)
+        self.memory = _dark_memory(self.volume * self.pixel_size)
         self.palette = bytearray(DEFAULT_PALETTE)
         self._digest = 0
         self._clear_log()
+        self._lit_blocks: set[int] = set()  # blocks that may have lit voxels
+        self._equal_since: object = object()  # identifies the last copy between two pages
+        self._changed_blocks: set[int] = set()  # blocks written since that copy
+        self._clear_writes()
 
     def copy_from(self, other: "Page") -> None:
         """Copy pixels and palette of another page of the same size."""
-        self.pixels[:] = other.pixels
+        self._find_blocks()
+        other._find_blocks()  # noqa: SLF001 - of its own kind
+        if self._equal_since is other._equal_since:  # noqa: SLF001
+            blocks = self._changed_blocks | other._changed_blocks  # noqa: SLF001
+        else:
+            blocks = self._lit_blocks | other._lit_blocks  # noqa: SLF001
+        if len(blocks) * _SPARSE > self.volume >> _BLOCK_BITS:
+            self.memory[:] = other.memory[:]
+        else:
+            block_size = self.pixel_size << _BLOCK_BITS
+            for block in blocks:
+                place = slice(block * block_size, (block + 1) * block_size)
+                self.memory[place] = other.memory[place]
         self.palette[:] = other.palette
         self._digest = other.digest
         self._clear_log()
+        self._lit_blocks = set(other._lit_blocks)  # noqa: SLF001
+        self._equal_since = other._equal_since = object()  # noqa: SLF001
+        self._changed_blocks.clear()
+        other._changed_blocks.clear()  # noqa: SLF001
+
+    @property
+    def pixels(self) -> bytes:
+        """A copy of all pixels in scan order."""
+        return bytes(self.memory)
 
     def put(self, start: int, pixels: bytes) -> None:
         """Write pixels in scan order.
@@ -114,8 +154,8 @@ class Page:
         """
         size = self.pixel_size
         place = slice(start * size, start * size + len(pixels))
-        old = self.pixels[place]
-        self.pixels[place] = pixels
+        old = self.memory[place]
+        self.memory[place] = pixels
         self._log_replaced(range(start, start + len(pixels) // size), old, pixels)
 
     def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
@@ -144,14 +184,14 @@ class Page:
         pixel
             The pixel.
         """
-        pixels = self.pixels
+        memory = self.memory
         size = self.pixel_size
         old = bytearray(len(indices) * size)
         for k, value in enumerate(pixel):
             places = indices if size == 1 else [index * size + k for index in indices]
-            old[k::size] = bytes(map(pixels.__getitem__, places))
+            old[k::size] = bytes(map(memory.__getitem__, places))
             for place in places:
-                pixels[place] = value
+                memory[place] = value
         self._log_replaced(indices, old, pixel * len(indices))
 
     def set_colors(self, first: int, colors: bytes) -> None:
@@ -190,6 +230,10 @@ class Page:
         if old == new:
             return
         size = self.pixel_size
+        self._writes.append(indices)
+        self._pending_voxels += len(indices)
+        if self._pending_voxels > _PENDING_VOXELS:
+            self._find_blocks()
         if len(indices) >= _DIRECT_VOXELS:
             self._digest += mix_sum(indices, new, size) - mix_sum(indices, old, size)
             return
@@ -198,6 +242,23 @@ class Page:
         self._new += new
         if len(self._written) >= _LOG_VOXELS:
             self._digest = self.digest
+
+    # Blocks
+
+    def _clear_writes(self) -> None:
+        self._writes: list[Sequence[int]] = []  # whose blocks have not been found yet
+        self._pending_voxels = 0
+
+    def _find_blocks(self) -> None:
+        """Add the blocks of all collected writes to those that have changed and may be lit."""
+        for indices in self._writes:
+            if isinstance(indices, range):
+                blocks = range(indices[0] >> _BLOCK_BITS, (indices[-1] >> _BLOCK_BITS) + 1)
+                self._changed_blocks.update(blocks)
+            else:
+                self._changed_blocks.update([index >> _BLOCK_BITS for index in indices])
+        self._lit_blocks |= self._changed_blocks
+        self._clear_writes()
 
     def _color_terms(self, place: slice) -> int:
         """Return the digest terms of a part of the palette."""
@@ -236,7 +297,7 @@ class Memory:
     def __init__(self, grid: Grid, pixel_format: PixelFormat) -> None:
         self.grid = grid
         self.pixel_format = pixel_format
-        needed = (self.PAGES + 1) * grid.volume * pixel_format.size  # one more while one is cleared
+        needed = self.PAGES * grid.volume * pixel_format.size  # if all is written
         too_large = ValueError(
             f"a grid of {grid} {pixel_format.name} needs {needed // _MEGABYTE} MB of memory, more "
             "than this machine has: take a smaller one"
@@ -246,7 +307,7 @@ class Memory:
         try:
             self.front = Page(grid.volume, pixel_format.size)
             self.back = Page(grid.volume, pixel_format.size)
-        except MemoryError:
+        except (MemoryError, OSError):
             raise too_large from None
 
     def begin_frame(self, dark: bool) -> None:

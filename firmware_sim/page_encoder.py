@@ -3,6 +3,7 @@
 Reads a page; knows nothing of packets.
 """
 
+import mmap
 import re
 from typing import Final
 
@@ -46,7 +47,7 @@ def encode_page(
     writer = _OpWriter(pixel_format)
     at, end = start * size, (start + count) * size
     while at < end and writer.size + _MARGIN <= room:
-        at += writer.add(page.pixels, at, end)
+        at += writer.add(page.memory, at, end)
     writer.close_literal()
     return at // size - start, bytes(writer.ops)
 
@@ -74,7 +75,7 @@ class _OpWriter:
         """Return the number of bytes of a pixel run (2.1)."""
         return (count + 7) // 8 if self._mono else count * self._size
 
-    def add(self, pixels: bytearray, at: int, end: int) -> int:
+    def add(self, pixels: mmap.mmap, at: int, end: int) -> int:
         """Encode a stretch of equal pixels at an offset in memory; return its length in bytes."""
         size = self._size
         if self._mono and _prefers_literal(chunk := pixels[at : min(at + _CHUNK, end)]):
@@ -102,7 +103,7 @@ class _OpWriter:
             self._append_op(spec.OP_RUN, count)
         return count * size
 
-    def _extend_literal(self, pixels: bytearray) -> None:
+    def _extend_literal(self, pixels: bytes) -> None:
         self._literal += pixels
         self._pen = bytes(pixels[-self._size :])
 
@@ -124,13 +125,13 @@ class _OpWriter:
         self._literal.clear()
 
 
-def _prefers_literal(pixels: bytearray) -> bool:
+def _prefers_literal(pixels: bytes) -> bool:
     """Return whether pixels of MONO1 need fewer bytes as a LIT than as SKIPs and RUNs."""
     ops = 1 + pixels.count(b"\0\1") + pixels.count(b"\1\0")
     return ops > 1 + (len(pixels) + 7) // 8
 
 
-def _length(pattern: re.Pattern[bytes], pixels: bytearray, at: int, end: int) -> int:
+def _length(pattern: re.Pattern[bytes], pixels: mmap.mmap, at: int, end: int) -> int:
     match = pattern.match(pixels, at, end)
     return match.end() - at if match else 0
 

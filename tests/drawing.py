@@ -29,7 +29,7 @@ def page_after(payloads, grid, pixel_format):
 
 def values_of(page, pixel_format):
     """Return the pixel values of a page in scan order."""
-    raw = np.frombuffer(bytes(page.pixels), dtype=np.uint8).reshape(-1, pixel_format.bytes)
+    raw = np.frombuffer(page.pixels, dtype=np.uint8).reshape(-1, pixel_format.bytes)
     return (raw.astype(np.uint32) << np.arange(pixel_format.bytes, dtype=np.uint32) * 8).sum(axis=1)
 
 

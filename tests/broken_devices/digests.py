@@ -33,7 +33,7 @@ def digest_adds_dark_voxels(patch):
 
     old = Page.digest
     patch.setattr(Page, "digest", property(digest))
-    patch.setattr(Page, "copy_from", lambda self, other: self.put(0, bytes(other.pixels)))
+    patch.setattr(Page, "copy_from", lambda self, other: self.put(0, other.pixels))
 
 
 @mutant("8/overwritten", "8/erased")

@@ -99,7 +99,7 @@ def crumbs_high_first(patch):
 def chain_start_left_out(patch):
     def walk(old, self, octant, count, raw):
         first = self._cursor
-        before = self._page.pixels[first : first + 1] if self._format.size == 1 else None
+        before = self._page.memory[first : first + 1] if self._format.size == 1 else None
         old(self, octant, count, raw)
         if before is not None:
             self._page.put(first, bytes(before))

@@ -1,6 +1,8 @@
 """Pages, palettes and the digest: sections 2 and 8."""
 
 import random
+import subprocess
+import sys
 from array import array
 
 import pytest
@@ -113,3 +115,55 @@ def test_pages_are_cleared_copied_and_exchanged() -> None:
     assert not any(memory.back.pixels)
     assert memory.back.palette == DEFAULT_PALETTE
     assert memory.back.digest == 0
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("writes", [1, 3, 40])
+def test_copies_are_whole_whatever_was_written_and_given_up(name: str, writes: int) -> None:
+    rng = random.Random(writes)
+    grid = Grid(31, 47, 53)  # some blocks, and a part of one
+    memory = Memory(grid, FORMATS[name])
+    size = FORMATS[name].size
+    pages = {id(memory.front): bytearray(grid.volume * size)}
+    pages[id(memory.back)] = bytearray(grid.volume * size)
+    for _ in range(60):
+        dark = rng.random() < 0.2
+        memory.begin_frame(dark)
+        back, front = pages[id(memory.back)], pages[id(memory.front)]
+        back[:] = bytes(len(back)) if dark else front
+        for _ in range(rng.randrange(writes + 1)):
+            start = rng.randrange(grid.volume - 3000)
+            run = rng.choice((b"\0", b"\1")) * (size * rng.choice((1, 5, 300, 3000)))
+            if rng.random() < 0.5:
+                memory.back.put(start, run)
+                back[start * size : start * size + len(run)] = run
+            else:
+                spots = sorted({rng.randrange(grid.volume) for _ in range(9)})
+                memory.back.plot(array("Q", spots), b"\1" * size)
+                for spot in spots:
+                    back[spot * size : (spot + 1) * size] = b"\1" * size
+        assert memory.back.pixels == back
+        assert memory.front.pixels == front
+        if rng.random() < 0.7:  # else the frame is given up
+            memory.swap()
+    assert memory.front.digest == digest(pages[id(memory.front)], size)
+
+
+def test_a_large_volume_costs_what_is_lit() -> None:
+    script = """
+import resource
+from array import array
+from firmware_sim.grid import Grid
+from firmware_sim.memory import FORMATS, Memory
+
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+memory = Memory(Grid(1024, 1024, 1024), FORMATS["rgb888"])
+for frame in range(6):
+    memory.begin_frame(dark=frame % 3 == 0)
+    memory.back.plot(array("Q", range(frame, 1 << 30, 1 << 20)), b"abc")
+    memory.swap()
+assert memory.front.memory[3 * (5 + (1000 << 20))] == ord("a")
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert int(run.stdout) < 100 << 10  # KiB; the volume has 3 GiB

@@ -71,7 +71,7 @@ def test_the_device_agrees_after_many_writes():
     for _ in range(50):
         start = int(rng.integers(0, 280))
         page.put(start, rng.integers(0, 256, 3 * 20, dtype=np.uint8).tobytes())
-    raw = np.frombuffer(bytes(page.pixels), dtype=np.uint8).reshape(-1, 3).astype(int)
+    raw = np.frombuffer(page.pixels, dtype=np.uint8).reshape(-1, 3).astype(int)
     assert page.digest == digest(np.arange(300), raw @ [1, 256, 65536])
 
 
