@@ -447,7 +447,7 @@ def test_a_grid_beyond_the_memory_of_the_machine(
 ) -> None:
     monkeypatch.setattr(memory, "_memory_bytes", lambda: 3_000_000)
     assert exit_code(["--size", "128x128x128"]) == 2
-    assert "needs 18 MB of memory, more than this machine has" in capsys.readouterr().err
+    assert "needs 12 MB of memory, more than this machine has" in capsys.readouterr().err
     with pytest.raises(ValueError, match="take a smaller one"):
         open_in_process("sim:?size=128x128x128")
 
