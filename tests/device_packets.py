@@ -1,4 +1,4 @@
-"""Packets packed by hand from the document, and a device to try them on."""
+"""Packets packed by hand from protocol.md, and an emulated device to send them to."""
 
 import socket
 import struct
@@ -85,14 +85,14 @@ class Response:
 
 
 def parse_responses(wire: bytes) -> list[Response]:
-    """Take apart what a device sent; every byte of it must be of a good packet."""
+    """Parse what a device sent; every byte must belong to a valid packet."""
     return [
         Response(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:]) for body in off_wire(wire)
     ]
 
 
 class DeviceUnderTest:
-    """A device and someone who talks to it."""
+    """An emulated device, and methods to send it packets."""
 
     def __init__(self, *grid: int, session: bool = True, **config: object) -> None:
         config = {"refresh": 1, "boot": BOOT, **config}
@@ -102,12 +102,12 @@ class DeviceUnderTest:
             assert info.kind == INFO
 
     def send(self, *packets: bytes) -> list[Response]:
-        """Send packets; return the answers."""
+        """Send packets; return the responses."""
         self.device.receive(b"".join(packets))
         return parse_responses(self.device.transmit())
 
     def request(self, wire: bytes) -> Response:
-        """Send one packet; return its only answer."""
+        """Send one packet; return its only response."""
         (answer,) = self.send(wire)
         return answer
 
@@ -116,7 +116,7 @@ class DeviceUnderTest:
         return parse_responses(self.device.transmit())
 
     def show_frame(self, seq: int, frame: int, ops: bytes, flags: int = CLEAR) -> Response:
-        """Send a frame of one packet and let it be shown."""
+        """Send a frame of one packet and show it by a tick."""
         self.request(data(seq, frame, ops, flags | COMMIT))
         (ack,) = self.tick()
         return ack
@@ -131,7 +131,7 @@ class DeviceUnderTest:
 
 
 def block_with_pending_frame(rig: DeviceUnderTest) -> int:
-    """Let a packet wait; return how much of the credit it takes."""
+    """Make a packet wait for the tick; return how much of the credit it takes."""
     rig.request(data(0, 0, DOT, CLEAR | COMMIT))
     wire = data(1, 1, DOT)
     assert rig.send(wire) == []
@@ -139,14 +139,14 @@ def block_with_pending_frame(rig: DeviceUnderTest) -> int:
 
 
 def data_of_wire_size(seq: int, size: int) -> bytes:
-    """Return a DATA packet of so many bytes on the wire."""
+    """Return a DATA packet of ``size`` bytes on the wire."""
     wire = data(seq, 1, bytes(size - 9))  # END and what pads it
     assert len(wire) == size
     return wire
 
 
 def receive(connection: socket.socket, count: int) -> list[Response]:
-    """Take so many packets from a device."""
+    """Receive ``count`` packets from a device."""
     got = b""
     while got.count(b"\0") < count:
         piece = connection.recv(65_536)

@@ -1,4 +1,4 @@
-"""Section 8 of protocol.md, word for word, and a page that ops are drawn on, for the emulator."""
+"""Digest of section 8 in its simplest form, and drawing of ops on an emulator's page."""
 
 import math
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Changes each literal of one side's ``spec.py`` by one and runs the vectors of protocol.md.
+"""Mutation of each literal of one side's ``spec.py`` by one, tested by the vectors.
 
     python spec_mutations.py voxdisplay.wire.spec
     python spec_mutations.py firmware_sim.spec

@@ -1,4 +1,4 @@
-"""The device side as the conformance tests see it: packets in, packets out, and its front page."""
+"""Emulated device for the vectors of protocol.md: packets in, packets out, and its front page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HELLO = bytes.fromhex("30 00 00 01 17 5A 00 00")
 
 
 class VectorDevice:
-    """An emulated device on a bench, spoken to by hand-made packets."""
+    """An emulated device that is sent packets made by hand."""
 
     def __init__(self, grid, pixel_format, *, refresh=0, **config):
         self.device = Device(
@@ -24,12 +24,12 @@ class VectorDevice:
         self.bench = Bench(self.device)
 
     def send_raw(self, data):
-        """Give bytes to the device; return header and payload of each packet of its answer."""
+        """Send bytes to the device; return header and payload of each packet that it sends."""
         self.device.receive(data)
         return document.off_wire(self.device.transmit())
 
     def send(self, packet):
-        """Give a packet, written without its check value, to the device."""
+        """Send a packet, given without its check value, to the device."""
         return self.send_raw(document.on_wire(packet))
 
     def open_session(self):
@@ -58,7 +58,7 @@ class VectorDevice:
 
     @staticmethod
     def cobs_decode(segment):
-        """What the receiver makes of a segment, with a check value for it to be happy."""
+        """Return what the receiver decodes from a segment to which a check value was added."""
         receiver = Receiver(70000)
         body = document.cobs_decode(segment)
         data = document.on_wire(body)
@@ -114,7 +114,7 @@ def flags_of(text, group):
 
 
 def state_of(answer):
-    """Say what an ACK says, for messages."""
+    """Return the flags of an ACK in words, for messages."""
     if answer[0] >> 4 != spec.TYPE_ACK:
         return answer.hex(" ")
     names = [

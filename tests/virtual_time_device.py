@@ -1,6 +1,6 @@
-"""An emulated device and its line whose seconds are counted, not waited for.
+"""Emulated device and line in virtual time.
 
-Waiting costs nothing, and how busy the machine is does not matter. Work takes no time.
+Waiting takes no real time, work takes no virtual time, and the machine's load does not matter.
 """
 
 from firmware_sim.baud_pacing import PacedDevice

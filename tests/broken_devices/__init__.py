@@ -1,10 +1,10 @@
-"""Devices that break protocol.md in one place each, made of the emulator, chapter by chapter.
+"""Devices that break protocol.md in one place each, derived from the emulator, by section.
 
-Each has the name of its fault, how to make it, and the checks that must notice: all of them, and
-no other, may fail.
+Each has the name of its fault, a function that makes it, and the checks that must fail: all of
+them, and no others.
 """
 
-from broken_devices import (  # noqa: F401 - each enlists its own
+from broken_devices import (  # noqa: F401 - each registers its own
     acks,
     digests,
     frames,
@@ -19,5 +19,5 @@ from broken_devices import (  # noqa: F401 - each enlists its own
 )
 from broken_devices.mutant import MUTANTS as MUTANTS
 
-# What is drawn at random finds what the others find: no fault is its own.
+# Random checks find what others find, too: no fault is found by them alone.
 UNPROVEN = {"7/random-ops", "11/random-ops"}

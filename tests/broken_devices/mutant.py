@@ -1,6 +1,6 @@
-"""What a broken device is, and how one is made: something of the emulator is replaced.
+"""Broken devices: a part of the emulator is replaced by a faulty one.
 
-Knows no chapter of protocol.md.
+Knows no section of protocol.md.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ Decoder, Operands, Page = op_decoder._PacketDecoder, operands.Operands, memory.P
 class Mutant:
     """A fault.
 
-    ``make`` gets pytest's monkeypatch, ``config`` changes the device. ``fails`` are the checks that
-    must notice. No other may, unless the fault ``spreads``: all that is drawn passes through it.
-    ``likely`` is part of what the kit must suspect.
+    ``make`` takes pytest's monkeypatch; ``config`` is for the device. ``fails`` are the checks that
+    must fail. No others may, unless the fault ``spreads`` because all drawing passes through it.
+    ``likely`` must be part of the likely cause that the kit reports.
     """
 
     name: str
@@ -39,12 +39,12 @@ MUTANTS: list[Mutant] = []
 
 
 def mutant(*fails: str, spreads: bool = False, likely: str = "", **config: object):
-    def enlist(make: Callable) -> Callable:
+    def register(make: Callable) -> Callable:
         name = make.__name__.strip("_").replace("_", "-")
         MUTANTS.append(Mutant(name, make, fails, spreads, likely, config))
         return make
 
-    return enlist
+    return register
 
 
 def around(patch, owner, name, wrapper):

@@ -1,4 +1,4 @@
-"""Devices that break section 12: whatever comes."""
+"""Devices that break section 12: any input."""
 
 from __future__ import annotations
 

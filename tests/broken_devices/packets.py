@@ -1,4 +1,4 @@
-"""Devices that break sections 3 and 4: delimiting, and what every packet has."""
+"""Devices that break sections 3 and 4: delimiting and the packet format."""
 
 from __future__ import annotations
 

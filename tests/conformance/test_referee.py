@@ -1,4 +1,4 @@
-"""Both transcriptions of protocol.md's literals are the document's, name for name."""
+"""Literals of both sides against the tables of protocol.md, name for name."""
 
 import ast
 from pathlib import Path

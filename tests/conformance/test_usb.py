@@ -1,4 +1,4 @@
-"""How USB behaves, and that the driver copes: at all three depths, by the same tests.
+"""Behaviour of USB that the driver relies on, tested alike at three depths.
 
 In process and over USB/IP the emulator's backend is between; in a real Linux kernel, libusb is. A
 behaviour that the three have in common is one that the driver may be tested against.

@@ -1,4 +1,4 @@
-"""Every vector of protocol.md, through both sides."""
+"""All vectors of protocol.md, on the driver and on the emulator."""
 
 from itertools import chain
 

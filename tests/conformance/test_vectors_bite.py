@@ -1,4 +1,4 @@
-"""Every literal that either side has transcribed is held by some vector of protocol.md.
+"""Mutation test of the literals: changing any of them must fail some vector of protocol.md.
 
 `spec_mutations` changes each by one, in a process of its own, and names those that no vector holds.
 They must stand here, with the reason.

@@ -1,4 +1,4 @@
-"""Millions of hostile bytes into both receivers: no exception but the documented, and no end.
+"""Fuzzing of both receivers with hostile bytes: only documented exceptions, bounded memory.
 
 protocol.md, 12: "A receiver MUST survive any input". The bytes come from seeds: noise,
 packets with bits changed on the wire, and packets whose check value holds though their fields are

@@ -106,7 +106,7 @@ def conformance(
     try:
         with progress_bar("checking") as progress:
 
-            def ended(result: Result) -> None:
+            def on_result(result: Result) -> None:
                 nonlocal done
                 done += 1
                 if progress:
@@ -123,8 +123,8 @@ def conformance(
                 opening_s=opening_s,
                 baud=getattr(pipe, "baud", DEFAULT_BAUD),
                 seed=seed,
-                greeted=lambda said, kept: _announce(port, said, kept=kept),
-                ended=ended,
+                on_connected=lambda device, saved: _announce(port, device, saved=saved),
+                on_result=on_result,
             )
     finally:
         pipe.close()
@@ -138,9 +138,9 @@ def conformance(
         raise click.exceptions.Exit(_EXIT_BROKEN)
 
 
-def _announce(port: str, said: AnnouncedDevice, *, kept: bool) -> None:
-    note(f"{port}  {said}")
-    afterwards = "as it was" if kept else "dark: what it shows cannot be read back"
+def _announce(port: str, device: AnnouncedDevice, *, saved: bool) -> None:
+    note(f"{port}  {device}")
+    afterwards = "as it was" if saved else "dark: what it shows cannot be read back"
     note(f"this draws on the display; afterwards it will be {afterwards}")
 
 

@@ -122,8 +122,8 @@ def run_checks(
     baud: int = 115200,
     seed: int = 0,
     clock: Callable[[], float] = time.monotonic,
-    greeted: Callable[[AnnouncedDevice, bool], object] | None = None,
-    ended: Callable[[Result], object] | None = None,
+    on_connected: Callable[[AnnouncedDevice, bool], object] | None = None,
+    on_result: Callable[[Result], object] | None = None,
 ) -> Report:
     """Check the device at the other end of a pipe against protocol.md.
 
@@ -134,10 +134,10 @@ def run_checks(
         Sections, names or patterns of checks; all, if there are none.
     timeout_s, opening_s, baud, seed, clock
         As of `Probe`.
-    greeted : callable, optional
+    on_connected : callable, optional
         Called before anything is drawn, with the announced device and whether its picture could be
         saved.
-    ended : callable, optional
+    on_result : callable, optional
         Called with the result of each check.
 
     Returns
@@ -152,25 +152,25 @@ def run_checks(
     selected = select_checks(only)
     probe = Probe(pipe, timeout_s=timeout_s, opening_s=opening_s, baud=baud, seed=seed, clock=clock)
     report = Report()
-    stranger = _handshake(probe)
-    if stranger:
-        report.results += _all_not_run(stranger, selected)
-        if ended:
+    failure = _handshake(probe)
+    if failure:
+        report.results += _all_not_run(failure, selected)
+        if on_result:
             for result in report.results:
-                ended(result)
+                on_result(result)
         return report
     report.device = probe.device
-    kept = _none_if_port_lost(lambda: save_page(probe))
-    if greeted:
-        greeted(probe.device, kept is not None)
+    saved = _none_if_port_lost(lambda: save_page(probe))
+    if on_connected:
+        on_connected(probe.device, saved is not None)
     try:
         for result in _run_selected(probe, selected):
             report.results.append(result)
-            if ended:
-                ended(result)
+            if on_result:
+                on_result(result)
     finally:  # after an interrupt, too
         report.display_state = (
-            _none_if_port_lost(lambda: restore_page(probe, kept)) or "unknown: the port is gone"
+            _none_if_port_lost(lambda: restore_page(probe, saved)) or "unknown: the port is gone"
         )
     return report
 
@@ -179,44 +179,44 @@ def _handshake(probe: Probe) -> Result | None:
     """Open the first session; return the violation if the device cannot be tested at all."""
     likely = ""
     try:
-        met = probe.handshake()
-        if not met:
+        responded = probe.handshake()
+        if not responded:
             likely = handshake_diagnosis.diagnose_silence(probe)
     except TransportError as error:
-        met, likely = False, str(error)
+        responded, likely = False, str(error)
     device = probe.device
     is_sound = (
         device.format in FORMATS
         and device.voxel_count
         and device.max_payload >= spec.LIMIT_MIN_PAYLOAD
     )
-    if met and is_sound:
+    if responded and is_sound:
         return None
-    came = str(probe.info) if met else "no response that could be parsed"
+    came = str(probe.info) if responded else "no response that could be parsed"
     must = "an INFO that describes the device"
     return Result(HANDSHAKE, Verdict.BROKEN, must, came, likely, log=tuple(probe.log))
 
 
-def _all_not_run(stranger: Result, selected: list[Check]) -> Iterator[Result]:
-    yield stranger
+def _all_not_run(failure: Result, selected: list[Check]) -> Iterator[Result]:
+    yield failure
     for check in selected:
         yield Result(check, Verdict.NOT_RUN, reason="the handshake failed")
 
 
 def _run_selected(probe: Probe, selected: list[Check]) -> Iterator[Result]:
     """Run the checks until the device or the port is gone."""
-    deaf, gone = 0, ""
+    silent, gone = 0, ""
     for check in selected:
         if gone:
             yield Result(check, Verdict.NOT_RUN, reason=gone)
             continue
         try:
             result = _run_check(probe, check)
-            deaf = 0
-        except _DeviceLost as unheard:
-            result = unheard.result
-            deaf += 1
-            gone = "the device does not respond any more" if deaf == _MAX_SILENT_CHECKS else ""
+            silent = 0
+        except _DeviceLost as lost:
+            result = lost.result
+            silent += 1
+            gone = "the device does not respond any more" if silent == _MAX_SILENT_CHECKS else ""
         except TransportError as error:
             gone = str(error)
             result = _violation(probe, check, Violation("the port stays open", gone))

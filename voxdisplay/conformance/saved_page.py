@@ -46,19 +46,19 @@ def save_page(probe: Probe) -> SavedPage | None:
     return SavedPage(tuple(payloads), digest)
 
 
-def restore_page(probe: Probe, kept: SavedPage | None) -> str:
+def restore_page(probe: Probe, saved: SavedPage | None) -> str:
     """Present the saved page, or a dark one; return in words what is on display now."""
     try:
         probe.open_session()
-        if kept:
+        if saved:
             try:
-                for number, payload in enumerate(kept.payloads, 1):
-                    probe.draw(payload, commit=number == len(kept.payloads))
+                for number, payload in enumerate(saved.payloads, 1):
+                    probe.draw(payload, commit=number == len(saved.payloads))
                 ack = probe.await_shown(0, [probe.state])
             except Violation:
                 probe.open_session()
             else:
-                same = ack.digest == kept.digest
+                same = ack.digest == saved.digest
                 return "as it was" if same else "as it was, but for the palette or the digest"
         probe.draw(b"", commit=True)
         probe.await_shown(0, [probe.state])

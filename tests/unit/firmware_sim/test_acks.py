@@ -1,4 +1,4 @@
-"""What the device has taken, and has room for: section 9."""
+"""ACK, sequence numbers, window and credit of the emulator: section 9."""
 
 import pytest
 from device_packets import (

@@ -1,4 +1,4 @@
-"""The pace of the emulator's line, by a clock that is a number."""
+"""Baud-rate pacing of the emulator's line, in virtual time."""
 
 import contextlib
 import os

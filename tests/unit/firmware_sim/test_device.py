@@ -1,4 +1,4 @@
-"""What the device answers: sections 4, 5 and 10 to 13."""
+"""Responses of the emulated device: sections 4, 5 and 10 to 13."""
 
 import random
 import struct

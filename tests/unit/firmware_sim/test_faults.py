@@ -1,4 +1,4 @@
-"""A bad line: which faults there are, where they strike, and what the device makes of them."""
+"""Faults of the line: their parsing, their positions, and their effect on the device."""
 
 import math
 import random

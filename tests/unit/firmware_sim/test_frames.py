@@ -1,4 +1,4 @@
-"""What the device shows, and when: section 6."""
+"""Frames, pages and swaps of the emulator: section 6."""
 
 import pytest
 from device_packets import (

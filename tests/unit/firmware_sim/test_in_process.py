@@ -1,4 +1,4 @@
-"""Ticks, and ports in the host's own process."""
+"""Refresh ticks by a clock, and ports in the host's own process."""
 
 import threading
 

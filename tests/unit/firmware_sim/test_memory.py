@@ -1,4 +1,4 @@
-"""Pages, palettes and the digest: sections 2 and 8."""
+"""Pages, palettes and digests of the emulator: sections 2 and 8."""
 
 import random
 import subprocess

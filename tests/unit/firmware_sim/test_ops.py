@@ -1,4 +1,4 @@
-"""The ops that draw, against the plainest decoder there is, and those of PAGE: 7 and 10."""
+"""Op decoder against a voxelwise decoder, and the encoder of PAGE: sections 7 and 10."""
 
 import random
 from itertools import product

@@ -1,4 +1,4 @@
-"""Range-coded chains, section 7.7, against a host's coder written from the same text."""
+"""Decoder of range-coded chains against an encoder written from the same section 7.7."""
 
 import random
 from dataclasses import dataclass, field

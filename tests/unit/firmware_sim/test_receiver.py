@@ -1,4 +1,4 @@
-"""Segments, COBS and the check value: sections 3 and 4."""
+"""Packet receiver and sender: segments, COBS and the check value, sections 3 and 4."""
 
 import random
 

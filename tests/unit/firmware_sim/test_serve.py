@@ -1,4 +1,4 @@
-"""Pseudo-terminals and TCP."""
+"""Event loops on pseudo-terminals and TCP."""
 
 import contextlib
 import os

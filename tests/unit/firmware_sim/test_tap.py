@@ -1,4 +1,4 @@
-"""The tap, from its own description alone; and the viewer that shows it."""
+"""Tap, by its own description alone, and the start of viewers."""
 
 import contextlib
 import errno

@@ -1,4 +1,4 @@
-"""The emulator on USB: what it says of itself, its packets, and a host in the same process."""
+"""USB function, descriptors, transfers, and a host in the same process."""
 
 import errno
 import struct

@@ -1,4 +1,4 @@
-"""USB/IP: its messages, and a device that is exported."""
+"""USB/IP messages and server."""
 
 import contextlib
 import errno

@@ -1,4 +1,4 @@
-"""USB/IP: the host's side without a kernel, and servers that are none."""
+"""USB/IP client, with the emulator's server and with other servers."""
 
 import contextlib
 import errno
