@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from operator import attrgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.batch_evaluation import BatchEvaluator
@@ -29,6 +31,8 @@ AXES = "xyz"
 # ties are settled in a way that knows neither axis nor sign nor direction.
 TIE_SHIFT = 1e-7
 CORE = 0.25
+# Ends this near to each other, in voxels, are one point, if the curve does not say.
+CLOSURE_TOLERANCE = 1e-3
 # A coordinate is on a face of voxels if it is this near to a whole number.
 ON_FACE = 1e-9
 
@@ -187,14 +191,21 @@ class CurveBatch:
 
     def corners(self, samples: Samples) -> Ints:
         """Return the indices of the samples at which a curve may turn sharply: at its breaks."""
-        breaks = [curve.breaks for curve in self.curves]
-        if not any(each.size for each in breaks if each is not NO_BREAKS):
+        turns = self._turns
+        if not turns.size:
             return np.empty(0, dtype=np.int64)
-        of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
-        turn = of + 1j * np.concatenate(breaks)  # ordered by the curve, then by t
         here = samples.curve[samples.piece] + 1j * samples.t
-        at = np.minimum(np.searchsorted(here, turn), here.size - 1)
-        return np.asarray(at[here[at] == turn])
+        at = np.minimum(np.searchsorted(here, turns), here.size - 1)
+        return np.asarray(at[here[at] == turns])
+
+    @cached_property
+    def _turns(self) -> NDArray[np.complex128]:
+        """The breaks of all curves: curve + 1j * t, which is ordered by the curve, then by t."""
+        breaks = [curve.breaks for curve in self.curves]
+        if all(each is NO_BREAKS for each in breaks):
+            return np.empty(0, dtype=np.complex128)
+        of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
+        return np.asarray(of + 1j * np.concatenate(breaks))
 
     def extend(self, curves: Bools) -> None:
         """Let parameters of some curves, closed ones, go on past the ends of their ranges.
@@ -205,12 +216,11 @@ class CurveBatch:
 
     @np.errstate(under="ignore")
     def settle_ties(self, samples: Samples) -> Samples:
-        """Move all points of the curves by ``TIE_SHIFT`` from now on, but for their ends.
+        """Move all points of the curves by ``TIE_SHIFT`` from now on, but for the ends.
 
-        A curve of which an end or a corner lies on a face of voxels stays where it is: which of
-        two voxels holds a point of their face is a matter of definition. A straight
-        diagonal that passes halfway between voxels stays straight: to both of its axes the same
-        happens.
+        A curve of which a corner, or the end of an open curve, lies on a face of voxels stays
+        where it is: which of two voxels holds a point of their face is a matter of definition. A
+        straight diagonal halfway between voxels stays straight: both of its axes move alike.
 
         Parameters
         ----------
@@ -220,14 +230,17 @@ class CurveBatch:
         Returns
         -------
         Samples
-            The same, moved. The first and the last point of each curve stay: which voxels hold
-            them is a matter of definition.
+            The same, moved. The ends of open curves stay: which voxels hold them is a matter of
+            definition.
 
         """
         first = samples.bounds[:-1]
         low = np.minimum.reduceat(samples.points, first, axis=1)
         high = np.maximum.reduceat(samples.points, first, axis=1)
-        ends = np.concatenate((first, samples.bounds[1:] - 1))
+        last = samples.bounds[1:] - 1
+        gap = samples.points.take(first, axis=1) - samples.points.take(last, axis=1)
+        is_open = np.abs(gap).max(axis=0) > CLOSURE_TOLERANCE
+        ends = np.concatenate((first[is_open], last[is_open]))
         fixed = np.concatenate((ends, self.corners(samples)))
         points = samples.points.take(fixed, axis=1)
         on_face = (np.abs(points - np.rint(points)) < ON_FACE).any(axis=0)

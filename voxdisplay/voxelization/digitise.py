@@ -25,7 +25,7 @@ from voxdisplay.voxelization.adaptive_sampling import (
     split_at_jumps,
 )
 from voxdisplay.voxelization.certify import Certificate, certify
-from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
+from voxdisplay.voxelization.curve_batch import CLOSURE_TOLERANCE, CurveBatch, Samples
 from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose_curves, sample_overlooked
 from voxdisplay.voxelization.grid_plane import trace_all_planes, trace_curves
 from voxdisplay.voxelization.loop_closing import close_loop
@@ -43,8 +43,6 @@ MAX_BATCH_VOXELS = 2_000_000
 # Batches for each processor until it is seen whether the curves are still as long, and the fastest
 # has to wait for the others.
 BATCHES_PER_PROCESSOR = 8
-# Ends this near to each other, in voxels, are one point, if the curve does not say.
-CLOSURE_TOLERANCE = 1e-3
 
 ONE_PIECE = np.zeros(1, dtype=np.int64)
 ONE_PIECE.flags.writeable = False

@@ -131,7 +131,8 @@ class Sequence:
 
     def _freeze(self) -> None:
         for array in (self.voxels, self.starts, self.t):
-            array.flags.writeable = False
+            if array.flags.writeable:  # to look costs less than to set
+                array.flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.voxels)
