@@ -267,8 +267,14 @@ class _Vectorised:
     def __call__(self, t: Floats) -> Floats:
         with np.errstate(all="ignore"):
             if not self._one_by_one:
-                # A copy: a function that works in place must not change the caller's parameters.
-                return _rows(self._what, self._function(t.copy()), t.size)
+                try:
+                    # A copy: a function that works in place must not change the caller's t.
+                    return _rows(self._what, self._function(t.copy()), t.size)
+                except ArithmeticError:  # at one of them, maybe: the others have values
+                    if t.size == 1:
+                        return np.full((3, 1), np.nan)
+                parts = [self(t[i : i + 1]) for i in range(t.size)]
+                return np.concatenate(parts, axis=1) if parts else np.empty((3, 0))
             points = np.empty((3, t.size))
             for i, one in enumerate(t.tolist()):
                 points[:, i] = _point(self._what, self._function, one)
@@ -281,7 +287,7 @@ def _point(what: str, function: Function, t: float) -> Floats:
         result = function(t)
     except (ArithmeticError, ValueError):  # as of 1 / 0 and math.log(0)
         return np.full(3, np.nan)
-    point = np.asarray(result, dtype=np.float64)
+    point = _real(what, result)
     if point.shape != (3,):
         raise CurveError(f"{what} returned shape {point.shape}, not (3,), for one parameter")
     return point
@@ -291,10 +297,20 @@ def _rows(what: str, result: Any, n: int) -> Floats:
     """Return a checked copy of what a callable returned: (3, n), or rows that broadcast to that."""
     if isinstance(result, tuple | list) and len(result) == 3:
         result = np.stack(np.broadcast_arrays(*result, np.empty(n))[:3])
-    points = np.array(result, dtype=np.float64)
+    points = _real(what, result)
     if points.shape != (3, n):
         raise CurveError(
             f"{what} returned shape {points.shape}, not (3, {n}), for {n} parameters",
             hint="rows are x, y, z: np.stack((x, y, z)), or .T if they are columns",
         )
     return points
+
+
+def _real(what: str, result: Any) -> Floats:
+    """Return a copy of what a callable returned as float64, or raise CurveError."""
+    numbers = np.asarray(result)
+    if np.iscomplexobj(numbers):
+        raise CurveError(
+            f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
+        )
+    return np.array(numbers, dtype=np.float64)

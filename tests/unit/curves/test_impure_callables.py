@@ -112,6 +112,25 @@ def test_measuring_does_no_more_work_than_is_drawn(amplitude: float) -> None:
     assert sum(asked) < 40_000 * len(voxels)
 
 
+def test_a_callable_that_raises_where_it_has_no_value_is_completed() -> None:
+    def divides(t: np.ndarray) -> np.ndarray:
+        if np.any(t == 0):
+            raise ZeroDivisionError("t is 0")
+        return np.stack((20 + 5 * t, 20 + 10 * np.sin(t) / t, 20 + 0 * t))
+
+    sequence = vd.voxelize(vd.Parametric(divides, t=(-5, 5)))
+    assert {point.t for point in sequence.undefined} == {0.0}
+    assert sequence.report.e_max < 0.8661
+
+
+def test_complex_numbers_are_refused() -> None:
+    with pytest.raises(CurveError, match="returned complex numbers") as caught:
+        vd.Parametric(lambda t: np.stack((t, np.sqrt(t - 2 + 0j), t)), t=(0, 5))
+    assert ".real" in str(caught.value.hint)
+    with pytest.raises(CurveError, match="returned complex numbers"):
+        vd.Parametric(lambda t: (float(t), 1j * float(t), 0.0), t=(0, 5))
+
+
 def test_rounding_is_no_noise() -> None:
     flip = itertools.cycle((1.0, 1.0 + 1e-12))
     curve = vd.Parametric(lambda t: circle(t) * next(flip), t=(0, 2 * np.pi))
