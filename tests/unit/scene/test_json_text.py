@@ -206,6 +206,14 @@ def test_files_of_other_kinds_are_named(data: bytes, kind: str) -> None:
     assert error.hint
 
 
+@pytest.mark.parametrize("row", range(9))
+def test_the_first_wrong_row_is_named(row: int) -> None:
+    points: list[list[int]] = [[1, 2, 3]] * 9
+    points[row:] = [[4, 5]] * (9 - row)
+    error = refused(json.dumps({"type": "points", "points": points}))
+    assert error.path == f"$.points[{row}]"
+
+
 def test_errors_of_large_files() -> None:
     rows = "[12.25,7,33.5],\n" * 600_000
     start = '{"type": "points", "points": [\n'
