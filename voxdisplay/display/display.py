@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from voxdisplay.argument_checks import flag
 from voxdisplay.display.connection import Clock, Connection
 from voxdisplay.display.device_info import DeviceInfo
+from voxdisplay.display.display_operations import DisplayOperations, Progress
 from voxdisplay.display.fair_lock import FairLock
-from voxdisplay.display.operations import Operations, Progress
 from voxdisplay.display.receipt import Receipt, count_noun, describe_difference
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import (
@@ -79,7 +79,7 @@ class Display:
         self._connection = Connection(
             transport, timeout_s=timeout_s, reconnector=reconnector, capture=capture, clock=clock
         )
-        self._operations = Operations(self._connection, clock)
+        self._operations = DisplayOperations(self._connection, clock)
 
     def __repr__(self) -> str:
         """Return it in one line: ``<Display sim: 128x128x128 rgb888, 3 frames shown>``."""
@@ -314,7 +314,7 @@ class Display:
     # -- turns, and the end
 
     @contextlib.contextmanager
-    def _turn(self) -> Iterator[Operations]:
+    def _turn(self) -> Iterator[DisplayOperations]:
         """Have the display to oneself, as long as it is open and this process's."""
         if self._connection.is_inherited:
             raise LocalProtocolError(

@@ -38,7 +38,7 @@ from voxdisplay.wire.spans import decode_spans
 Progress: TypeAlias = Callable[[int, int], None]
 
 
-class Operations:
+class DisplayOperations:
     """Blocking operations on one connection.
 
     Parameters
