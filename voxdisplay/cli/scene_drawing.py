@@ -1,4 +1,4 @@
-"""Scenes drawn into frames, with notes of what is clipped, fitted, recoloured or split."""
+"""Drawing of scenes into frames, with notes on fitting, clipping, colours and split curves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MAX_UNDEFINED_NAMED: Final = 8
 
 
 def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
-    """Return the sequences of a scene's objects; note what the reader chose and curves lack.
+    """Return the sequences of a scene's objects; note the reader's choices, jumps and holes.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -
 
 
 def _remarks(sequence: vd.Sequence) -> Iterator[str]:
-    """Yield what is to be reported of a curve besides its voxels."""
+    """Yield remarks on the parameters at which a curve has no value or jumps."""
     undefined = sequence.undefined
     yield from map(str, undefined[:_MAX_UNDEFINED_NAMED])
     if len(undefined) > _MAX_UNDEFINED_NAMED:

@@ -1,7 +1,7 @@
 """Signal handling and clean shutdown of commands.
 
-Ctrl-C, SIGTERM and SIGHUP unwind a command: the port is closed, and the display shows what
-``--on-exit`` chooses.
+Ctrl-C, SIGTERM and SIGHUP unwind a command: the port is closed, and ``--on-exit`` chooses the last
+picture.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ def test_pattern(
     check: bool,
     as_json: bool,
 ) -> None:
-    """Show a pattern that tells the axes of a display apart.
+    """Show a pattern by which the axes of a display can be told apart.
 
     --check examines the display's memory. Whether the optics show that memory the right way round,
     only eyes can see: the pattern is made for them.
@@ -110,7 +110,7 @@ def test_pattern(
 
 
 def legend(name: str, grid: vd.Grid, *, one_color: bool) -> str:
-    """Return what a pattern shows, on a display of a size, for a person who looks at it."""
+    """Return a description of a pattern, for a person who looks at a display of a size."""
     if not one_color:
         return _LEGENDS[name]
     text = _ONE_COLOR_LEGENDS.get(name, _LEGENDS[name])
@@ -179,7 +179,7 @@ def _verdict(finding: AxisFinding) -> str:
     if finding.correct:
         return "yes"
     if finding.found is None:
-        return "no: what was read back is no pattern that is swapped or mirrored"
+        return "no: the page read back is not the pattern with axes swapped or mirrored"
     how = [
         *(["swapped"] if finding.axis not in finding.found else []),
         *(["mirrored"] if finding.found.startswith("-") else []),

@@ -165,7 +165,7 @@ class _ReadbackDisplay:
         return self._display.digest()
 
     def read(self) -> Pixels:
-        """See `Display.read`. A palette cannot be read, but the digest tells the default one."""
+        """See `Display.read`. A palette cannot be read; the digest identifies the default one."""
         page = self._display.read()
         if self._palette_unknown:
             meant = vd.Frame(self._display.info.grid, vd.PixelFormat.INDEX8)
