@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 GAPS_HINT = 'to split the points into strands there, write "gaps": "split" beside "file"'
 
+_MOST_UNNAMED = 7  # so many columns may have other values of a point
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
@@ -196,7 +197,12 @@ class _Rows:
     def refuse_ambiguity(self, points: Floats) -> None:
         """Raise CurveError if another reading of the rows is as likely."""
         layout = self.layout
-        if layout.numeric > 3 and not layout.names and len(points) >= 3:
+        unnamed = not layout.names
+        if layout.numeric > _MOST_UNNAMED and unnamed and len(points) in {1, 3}:
+            problem = f"{layout.numeric} columns: is each row a point, or each column?"
+            hint = f"write one point in each row, or {NAMES_HINT}"
+            raise self.table.error(layout.first, problem, hint)
+        if layout.numeric > 3 and unnamed and len(points) >= 3:
             counted = points[:, 0] - np.arange(len(points))
             if counted[0] in (0, 1) and (counted == counted[0]).all():
                 problem = f"column {layout.axes[0] + 1} counts rows, or is x"

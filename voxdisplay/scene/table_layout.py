@@ -22,6 +22,7 @@ NAMES_HINT = "name the columns that are x, y and z in a first line"
 _MAX_HEADER = 2  # names and units
 # Either two numbers with a point each, or one with a comma: 1,5, 2,5, 3,5
 _COMMA_PAIRS = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?:,\s+[+-]?[0-9]+,[0-9]+)+,?\s*")
+_SEPARATOR_LINE = re.compile(r'"?sep=.?"?', re.IGNORECASE)
 _IN_BRACKETS = re.compile(r"\[[^\[\]]{0,40}\]|\([^()]{0,40}\)")
 
 
@@ -87,10 +88,12 @@ def listed(names: list[str]) -> str:
 
 
 def _counting_lines(table: TableText, head: list[int]) -> int:
-    """Return how many lines are a count of rows, and the title that may follow it.
+    """Return how many lines are a count of rows and its title, or name the separator.
 
-    So begin the .xyz files of chemistry, and .pts files.
+    So begin the .xyz files of chemistry and .pts files, and files for spreadsheets (``sep=;``).
     """
+    if head and _SEPARATOR_LINE.fullmatch(table.lines[head[0]].strip()):
+        return 1
     count = table.lines[head[0]].strip() if head else ""
     if not (count.isascii() and count.isdigit()) or len(count) > 9:
         return 0
@@ -141,7 +144,7 @@ def _column_names(
     line = header[0] if header else first - 1
     if line < 0 or not (header or table.is_comment(line)):
         return []
-    text = table.lines[line].strip().lstrip("#").strip() if not header else table.lines[line]
+    text = table.lines[line].strip().lstrip("#%").strip() if not header else table.lines[line]
     row = table.fields(first, separator)
     width = len(without_last_empty(row))
     for plain in (text, _IN_BRACKETS.sub("", text)):  # units may have blanks before them

@@ -76,8 +76,8 @@ class TableText:
         return CurveError(f"{self.name}, line {line + 1}: {problem}", hint=hint)
 
     def is_comment(self, line: int) -> bool:
-        """Return whether a line begins with #."""
-        return self.lines[line].lstrip().startswith("#")
+        """Return whether a line begins with # or, as of MATLAB, with %."""
+        return self.lines[line].lstrip().startswith(("#", "%"))
 
     def fields(self, line: int, separator: str | None, text: str | None = None) -> list[str]:
         """Return the fields of a line, or of another text in its place, without their quotes.

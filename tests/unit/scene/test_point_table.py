@@ -55,6 +55,7 @@ def refused(folder: Path, text: str | bytes, name: str = "data.csv") -> SceneErr
         "1,2,3,\n4,5,6.5,\n",
         "x,y,z,\n1,2,3,\n4,5,6.5\n",
         "x,y,z\nmm,mm,mm\n1,2,3\n4,5,6.5\n",
+        "% x,y,z\n1,2,3\n4,5,6.5\n",
         "1e0,2.0D0,+3\n4,5,6.5\n",
         "1.0E+00,2,3\n4,5,6.5e0\n",
     ],
@@ -90,6 +91,8 @@ def test_columns_x_y_z_need_no_note(tmp_path: Path, text: str) -> None:
         ("a.csv", "east,north,height\n1,2,3\n4,5,6.5\n", "('east', 'north', 'height')"),
         ("a.csv", "name,east,north,up\na,1,2,3\nb,4,5,6.5\n", "columns 2, 3, 4"),
         ("a.csv", "1,2,3,4\n4,5,6.5,7\n", "columns 1, 2, 3 of 4"),
+        ("a.csv", "sep=;\r\nx;y;z\r\n1;2;3\r\n4;5;6,5\r\n", "semicolons with decimal commas"),
+        ("a.csv", '"sep=\t"\n1\t2\t3\n4\t5\t6,5\n', "tabs with decimal commas"),
         # units and words
         ("a.csv", "x [mm],y [mm],z [mm]\n1,2,3\n4,5,6.5\n", "'x [mm]', 'y [mm]', 'z [mm]'"),
         ("a.txt", "x [mm] y [mm] z [mm]\n1 2 3\n4 5 6.5\n", "columns 1, 2, 3"),
@@ -157,6 +160,8 @@ def test_names_in_another_encoding(tmp_path: Path) -> None:
             "points",
         ),
         ("x,y,z\n1,2,3,4\n", "3 columns have names, but line 2 has 4", "first line"),
+        (",".join("123456789") + "\n", "line 1: 9 columns: is each row a point", "in each row"),
+        ("1 2 3 4 5 6 7 8\n" * 3, "8 columns: is each row a point, or each column?", "first line"),
         # wrong
         ("1,2,3\n1,2\n", "line 2: '1,2' has 2 columns, not 3", "x, y and z"),
         ("1,2,3\n1,2,3,4\n", "line 2: '1,2,3,4' has 4 columns, not 3", "x, y and z"),
