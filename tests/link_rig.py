@@ -110,7 +110,7 @@ class Rig:
         self.sent = []  # packets, in order
         self._heard = PacketStream()
         self._asked = []  # tags of STATUS without answer
-        self.refusals = {"NO_SESSION"}  # all that may be told, and only by a device that restarted
+        self.refusals = {"NO_SESSION"}  # refusals that are allowed: that of a device that restarted
         self._pages = {self.bench.snapshot().pixels}  # all that may be seen
         self._tickets = {}
 
@@ -213,7 +213,7 @@ class Rig:
         assert snapshot.digest == frame.digest()
 
     def assert_reported(self, ticket):
-        """The host was told that a frame is on display, with its digest, and of none twice."""
+        """Check that a frame was reported as displayed, with its digest, and none twice."""
         assert len(set(self.shown)) == len(self.shown)
         last = [event for event in self.events if isinstance(event, FrameShown)][-1]
         assert (last.ticket, last.digest) == (ticket, self._tickets[ticket].digest())

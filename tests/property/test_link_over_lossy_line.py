@@ -57,7 +57,7 @@ def rig_of(seed, device):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(seeds, devices)
 def test_without_faults_every_frame_is_shown_and_nothing_is_sent_twice(seed, device):
-    """9.3: "Then, and only then, the host sends it again"; and nothing is asked."""
+    """9.3: "Then, and only then, the host sends it again"; and nothing is polled."""
     rig = rig_of(seed, device)
     drawn = frames(rig.rng, rig.rng.randrange(1, 5), device["pixel_format"])
     tickets = [rig.present(frame) for frame in drawn]
@@ -266,7 +266,7 @@ def test_a_device_without_digest_gives_none(features):
 
 @pytest.mark.parametrize("refresh", [0, 30_000, 150])
 @pytest.mark.parametrize("moment", [0, 1, 3, 8])
-def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
+def test_a_device_that_dies_is_given_up_within_the_timeout(refresh, moment):
     rig = Rig(refresh=refresh, timeout_s=3)
     for _ in range(4):
         rig.present(random_frame(rig.rng))
@@ -279,7 +279,7 @@ def test_a_device_that_dies_is_given_up_within_the_patience(refresh, moment):
     assert rig.now - died_s <= 3 + (1000 / refresh if refresh else 0) + 0.01
 
 
-def test_a_device_that_dies_when_there_is_little_patience():
+def test_a_device_that_dies_under_a_short_timeout():
     rig = Rig(timeout_s=0.3)
     rig.present(random_frame(rig.rng))
     rig.run(lambda: rig.link.ready)
@@ -298,7 +298,7 @@ def test_a_device_that_talks_but_never_shows_anything():
     assert rig.now < 8
 
 
-def test_a_device_that_is_slower_than_patience_is_waited_for():
+def test_a_device_that_is_slower_than_the_timeout_is_waited_for():
     """A device that waits for its tick cannot answer: 6, point 6."""
     rig = Rig(refresh=50, timeout_s=2)  # a tick in 20 s
     drawn = [random_frame(rig.rng) for _ in range(3)]
@@ -309,7 +309,7 @@ def test_a_device_that_is_slower_than_patience_is_waited_for():
     assert rig.link.counters.sessions == 1
 
 
-def test_a_refused_frame_is_told_and_the_next_is_shown():
+def test_a_refused_frame_is_an_event_and_the_next_is_shown():
     rig = Rig()
     rig.refusals.add("OP")
     rig.link.present([b"\x07"])

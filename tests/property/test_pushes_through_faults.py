@@ -91,7 +91,7 @@ def random_frame(rng, display):
 
 
 class Oracle:
-    """Pages that may be displayed, and what the host was told of them."""
+    """Pages that may be displayed, and the outcomes that the host was given."""
 
     def __init__(self, line):
         self.line = line

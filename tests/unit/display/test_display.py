@@ -60,17 +60,17 @@ def test_the_text_of_a_device_cannot_steer_a_terminal():
     assert display.info.firmware.isprintable()
 
 
-def test_progress_is_told():
+def test_progress_is_reported():
     display, _ = open_display()
-    told = []
+    reports = []
     payloads = payloads_of(display, random_frame(display))
-    display.present(random_frame(display), progress=lambda *place: told.append(place))
-    assert told == sorted(told)
-    assert told[-1][0] == told[-1][1] == len(payloads)
-    told.clear()
-    display.read(progress=lambda *place: told.append(place))
-    assert told == sorted(told)
-    assert told[-1] == (display.info.grid.voxels,) * 2
+    display.present(random_frame(display), progress=lambda *place: reports.append(place))
+    assert reports == sorted(reports)
+    assert reports[-1][0] == reports[-1][1] == len(payloads)
+    reports.clear()
+    display.read(progress=lambda *place: reports.append(place))
+    assert reports == sorted(reports)
+    assert reports[-1] == (display.info.grid.voxels,) * 2
 
 
 def test_a_frame_of_another_shape_or_format_is_refused_and_nothing_is_sent():
@@ -319,7 +319,7 @@ def test_an_interrupted_read_does_not_disturb_the_next():
 
     with pytest.raises(KeyboardInterrupt):
         display.read(progress=interrupt)
-    display._connection.link.read(3, 4)  # as if it had been asked and not been fetched
+    display._connection.link.read(3, 4)  # as if it had been requested and not fetched
     assert (display.read() == frame.array()).all()
 
 
@@ -338,7 +338,7 @@ def test_a_display_says_what_it_shows():
     frame = display.frame()
     frame.draw([(1, 2, 3)])
     display.present(frame)
-    pipe.now += 1000  # a long time in which nothing was asked
+    pipe.now += 1000  # a long idle time
     assert display.digest() == frame.digest() == pipe.bench.snapshot().digest
     assert display.counters.statuses >= 2
     pipe.bench.power_cycle()

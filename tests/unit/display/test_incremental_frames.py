@@ -72,7 +72,7 @@ def test_without_waiting_too():
     assert pipe.bench.snapshot().digest != frame.digest()
 
 
-def test_a_device_that_restarts_is_not_asked_to_keep_anything():
+def test_after_a_restart_no_difference_is_sent():
     display, pipe = open_display()
     display.present(random_frame(display))
     frame = display.frame(keep=True)
@@ -118,7 +118,7 @@ def test_what_is_not_known_is_not_made_up(features):
     assert_shows(pipe, frame)
 
 
-def test_a_difference_that_does_not_take_is_mended_by_the_whole():
+def test_a_difference_that_fails_is_followed_by_the_full_frame():
     display, pipe = open_display()
     display.present(random_frame(display))
     pipe.device.memory.front.put(7, b"\x01\x02\x03")  # and nobody has noticed

@@ -91,7 +91,7 @@ def test_damage_of_others_counts_once_and_the_count_wraps_around():
     assert LossRate().count_damage(0) == 0
 
 
-def test_the_rate_is_told_once_the_line_was_busy():
+def test_the_rate_is_known_once_the_line_was_busy():
     rate = DeliveryRate()
     deliver(rate, 3, 200, at_once=1, trip_s=0.02)
     assert rate.bytes_per_s is None

@@ -133,7 +133,7 @@ def test_a_packet_that_is_lost_again_and_again():
     assert "noisy" in caught.value.hint
 
 
-def test_damage_is_asked_about_at_once():
+def test_damage_is_followed_by_a_poll_at_once():
     """9.4: "SHOULD ask with STATUS at once"."""
     link = open_link()
     link.present([b"\xa0"])

@@ -66,7 +66,7 @@ def test_credit_counts_from_the_end_of_the_packet_that_last_names():
         assert not window.has_credit(room - 63)
 
 
-def test_what_is_received_is_told_once():
+def test_what_is_received_is_reported_once():
     window = SendWindow(10**6)
     sent(window, 5)
     done = window.acknowledge(ack(1, 3, received=0b101))  # 0, and 2 and 4

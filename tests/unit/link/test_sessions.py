@@ -125,7 +125,7 @@ def test_an_info_that_is_too_short_breaks_the_protocol():
         Link(SESSION, 0.0).receive(document.on_wire(packets.pack(INFO)[:20]), 0.0)
 
 
-def test_an_info_of_another_major_is_told_as_it_is():
+def test_an_info_of_another_major_opens_a_session_unchecked():
     link = Link(SESSION, 0.0)
     (event,) = link.receive(document.on_wire(bytes.fromhex("90 00 00 02 17 5A 07 B0")), 0.0)
     assert event.info.major == 2
@@ -187,7 +187,7 @@ def test_the_hosts_own_packets_are_dropped_and_so_is_an_unknown_type():
     assert link.stream.counters.unknown == 1
 
 
-def test_an_answer_to_what_was_not_asked():
+def test_an_answer_to_no_poll_is_ignored():
     link = open_link()
     assert receive(link, ack(0, 99, flags=spec.ACK_FLAG_ASKED), 0.1) == []
     assert transmit(link, 0.2) == []
@@ -248,7 +248,7 @@ def test_a_device_that_restarts_all_the_time():
 
 @pytest.mark.parametrize("code", range(2, 15))
 @pytest.mark.parametrize("session", [0, SESSION])
-def test_what_a_device_refuses_is_told_and_a_session_begun(code, session):
+def test_a_refusal_is_an_event_and_a_session_is_opened(code, session):
     link = open_link()
     link.present([b"\xe0"])
     transmit(link, 0.0)

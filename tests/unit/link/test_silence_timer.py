@@ -13,7 +13,7 @@ from voxdisplay.wire import spec
 # -- silence
 
 
-def test_status_is_asked_ever_more_rarely_and_at_most_four_times():
+def test_polls_back_off_and_at_most_four_are_outstanding():
     """9.3: "MUST have no more than 4 of them without answer at one time"."""
     link = Link(SESSION, 0.0, timeout_s=100)
     transmit(link, 0.0)
@@ -81,8 +81,8 @@ def test_a_caller_that_was_away_does_not_blame_the_device():
 # -- asking what is on display
 
 
-def test_an_idle_link_may_be_asked_what_is_on_display():
-    """However long nothing was to be said; and a lost STATUS is asked again."""
+def test_an_idle_link_can_request_the_digest():
+    """However long it was idle; and a lost STATUS is sent again."""
     link = open_link()
     link.request_status()
     (status,) = transmit(link, 100.0)
@@ -96,7 +96,7 @@ def test_an_idle_link_may_be_asked_what_is_on_display():
     assert link.next_timeout(101.0) is None
 
 
-def test_a_device_without_digest_is_asked_for_none():
+def test_a_device_without_digest_reports_none():
     link = open_link(features=0)
     link.request_status()
     (status,) = transmit(link, 1.0)
@@ -130,7 +130,7 @@ def test_a_page_that_does_not_match():
         assert caught.value.section == "10"
 
 
-def test_a_page_that_nobody_asked_for_is_dropped():
+def test_a_page_without_a_request_is_dropped():
     link = open_link()
     assert receive(link, packets.Page(seq=1, start=0, count=1), 0.0) == []
     link.read(0, 1)
@@ -185,7 +185,7 @@ def test_many_reads_take_no_tag_whose_answer_is_still_to_come():
     assert link.idle
 
 
-def test_a_page_tells_that_those_asked_for_before_it_are_lost():
+def test_a_page_shows_that_earlier_requests_are_lost():
     """9: "answered in the order in which they are taken"."""
     link = open_link(rx_buffer=1 << 16)
     for k in range(3):
