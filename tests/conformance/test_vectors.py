@@ -203,8 +203,8 @@ def test_coders_of_the_driver(vector):
     index = places @ [1, nx, nx * ny]
     values = np.zeros(nx * ny * nz, dtype=np.uint32)
     values[index] = [int.from_bytes(pixel, "little") for pixel in voxels.values()]
-    coding = EncoderConfig(Grid(*vector.grid), pixel_format, 1024)
-    for payloads in (encode_spans(values, coding), encode_chains(places, values[index], coding)):
+    config = EncoderConfig(Grid(*vector.grid), pixel_format, 1024)
+    for payloads in (encode_spans(values, config), encode_chains(places, values[index], config)):
         device = VectorDevice(vector.grid, vector["format"])
         device.open_session()
         device.send(bytes((0x15, 0, 0)) + b"".join(payloads))
@@ -225,9 +225,9 @@ def test_coders_of_the_driver_by_a_plain_reading(vector):
     content = PageUpdate(None, np.flatnonzero(pixels), lambda index: pixels[index])
     features = features_of(vector) - {"palette", "read", "digest", "arc"}
     bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in features)
-    coding = EncoderConfig(Grid(*vector.grid), format_, 64, bits)
+    config = EncoderConfig(Grid(*vector.grid), format_, 64, bits)
     drawn = decode_plainly(
-        chain.from_iterable(encode_update(content, coding)), vector.grid, format_
+        chain.from_iterable(encode_update(content, config)), vector.grid, format_
     )
     assert drawn.page == meant.page
     assert not drawn.two_pixels
@@ -236,7 +236,7 @@ def test_coders_of_the_driver_by_a_plain_reading(vector):
     for entry, color in meant.palette.items():
         palette[entry] = color
     entries = np.array(sorted(meant.palette), dtype=int)
-    payloads = PayloadLayout(color_blocks(entries, palette, coding), coding).payloads
+    payloads = PayloadLayout(color_blocks(entries, palette, config), config).payloads
     again = decode_plainly(payloads, vector.grid, format_)
     assert again.palette.items() >= meant.palette.items()
 
@@ -269,5 +269,5 @@ def test_arcs_of_the_driver(vector):
     voxels = np.array(list(vector.voxels()))
     pens = np.array([int.from_bytes(pixel, "little") for pixel in vector.voxels().values()])
     pixel_format = PixelFormat(vector["format"].lower())
-    coding = EncoderConfig(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
-    assert encode_range_coded(voxels, pens, coding) == [vector.hex("ops")]
+    config = EncoderConfig(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
+    assert encode_range_coded(voxels, pens, config) == [vector.hex("ops")]

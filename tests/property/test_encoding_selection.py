@@ -195,13 +195,13 @@ def test_no_coder_alone_takes_fewer_bytes(device, seed):
     features = features - {"palette"}
     frame = random_frame(rng, (grid, format_, most, features))
     size = sum(map(len, frame.payloads(most, features)))
-    coding = frame._encoder_config(most, features)
+    config = frame._encoder_config(most, features)
     values = format_.values(frame.array())
-    assert size <= sum(map(len, encode_spans(values, coding)))
+    assert size <= sum(map(len, encode_spans(values, config)))
     items = frame._visible(dark=False)
     if not frame._has_base and items:
         plain_coding = EncoderConfig(grid, format_, most)
-        for each in (coding, plain_coding):
+        for each in (config, plain_coding):
             chains = encode_chains(items.voxels, items.values, each)
             assert size <= sum(map(len, chains))
 
@@ -268,9 +268,9 @@ def test_bricks_alone_are_not_better_for_a_surface():
     frame.draw(shell)
     features = {"oct", "dots", "line"}
     size = sum(map(len, frame.payloads(1024, features)))
-    coding = frame._encoder_config(1024, features)
+    config = frame._encoder_config(1024, features)
     index = np.sort(frame.grid.index_of(shell))
-    assert size <= sum(map(len, encode_set_payloads(index, np.ones(len(index), dtype=int), coding)))
+    assert size <= sum(map(len, encode_set_payloads(index, np.ones(len(index), dtype=int), config)))
 
 
 @pytest.mark.slow

@@ -52,13 +52,13 @@ def pens_for(rng, voxels, grid, format_):
 
 @settings(max_examples=250, deadline=None, derandomize=True)
 @given(codings, seeds, st.integers(0, 600))
-def test_chains_draw_what_was_meant(coding, seed, count):
+def test_chains_draw_what_was_meant(config, seed, count):
     rng = np.random.default_rng(seed)
-    grid, format_ = coding.grid, coding.format
+    grid, format_ = config.grid, config.format
     voxels = walk(rng, grid, count)
     pens = pens_for(rng, voxels, grid, format_)
-    payloads = encode_chains(voxels, pens, coding)
-    assert all(0 < len(payload) <= coding.max_payload for payload in payloads)
+    payloads = encode_chains(voxels, pens, config)
+    assert all(0 < len(payload) <= config.max_payload for payload in payloads)
     meant = np.zeros(grid.voxels, dtype=np.uint32)
     meant[grid.index_of(voxels)] = pens
     shuffled = [payloads[k] for k in rng.permutation(len(payloads))]
@@ -91,18 +91,18 @@ def random_values(rng, format_, count):
 
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(codings, seeds)
-def test_spans_draw_what_was_meant(coding, seed):
+def test_spans_draw_what_was_meant(config, seed):
     rng = np.random.default_rng(seed)
-    count = coding.grid.voxels
+    count = config.grid.voxels
     kept = rng.integers(1, count, endpoint=True)
     values = np.zeros(count, dtype=np.uint32)
     at = rng.integers(0, count - kept, endpoint=True)
-    values[at : at + kept] = random_values(rng, coding.format, kept)
-    payloads = encode_spans(values, coding)
-    assert all(0 < len(payload) <= coding.max_payload for payload in payloads)
+    values[at : at + kept] = random_values(rng, config.format, kept)
+    payloads = encode_spans(values, config)
+    assert all(0 < len(payload) <= config.max_payload for payload in payloads)
     shuffled = [payloads[k] for k in rng.permutation(len(payloads))]
     assert (
-        values_of(page_after(shuffled, coding.grid, coding.format), coding.format) == values
+        values_of(page_after(shuffled, config.grid, config.format), config.format) == values
     ).all()
 
 
@@ -194,12 +194,12 @@ def test_any_packet_is_a_value_or_breaks_the_protocol(body):
 @pytest.mark.slow
 @settings(max_examples=5000, deadline=None, derandomize=True)
 @given(codings, seeds, st.integers(0, 2000))
-def test_many_more_chains(coding, seed, count):
-    test_chains_draw_what_was_meant.hypothesis.inner_test(coding, seed, count)
+def test_many_more_chains(config, seed, count):
+    test_chains_draw_what_was_meant.hypothesis.inner_test(config, seed, count)
 
 
 @pytest.mark.slow
 @settings(max_examples=5000, deadline=None, derandomize=True)
 @given(codings, seeds)
-def test_many_more_spans(coding, seed):
-    test_spans_draw_what_was_meant.hypothesis.inner_test(coding, seed)
+def test_many_more_spans(config, seed):
+    test_spans_draw_what_was_meant.hypothesis.inner_test(config, seed)

@@ -351,16 +351,16 @@ def bench_speeds(repeats: int, side: int) -> None:
         ),
         "head": (spans.encode_spans(head, dense), len(head), dense),
     }
-    for name, (ops, amount, coding) in coded.items():
-        seconds = statistics.median(decode_s(ops, coding) for _ in range(repeats))
+    for name, (ops, amount, config) in coded.items():
+        seconds = statistics.median(decode_s(ops, config) for _ in range(repeats))
         rows.append((f"the emulator's decoding: {name}", seconds, amount, "voxels"))
     for name, seconds, amount, what in rows:
         print(f"{name:<40}{seconds:10.5f}{amount / seconds / 1e6:10.2f} M {what}/s")
 
 
-def decode_s(payloads: list[bytes], coding: EncoderConfig) -> float:
+def decode_s(payloads: list[bytes], config: EncoderConfig) -> float:
     """Return the processor time of the emulator for a frame: delimiting, CRC, and drawing."""
-    shape, pixel = tuple(coding.grid), coding.format.value
+    shape, pixel = tuple(config.grid), config.format.value
     device = Device(Config(grid=shape, pixel_format=pixel, refresh=0))
     link = Link(1, 0.0)
     seconds = 0.0

@@ -157,7 +157,7 @@ def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
     longest, speed = receiver.payload_bytes, line.bytes_per_s
     coded = frame.iter_payloads(longest, select_features(receiver.features, speed), speed)
     payloads = list(chain.from_iterable(coded)) or [b""]
-    coding = EncoderConfig(frame.grid, frame.format, longest)
+    config = EncoderConfig(frame.grid, frame.format, longest)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()
     wire_bytes = 0
@@ -166,7 +166,7 @@ def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
         flags = spec.DATA_FLAG_CLEAR | commit * spec.DATA_FLAG_COMMIT
         data = packets.Data(seq=number % 256, frame=0, flags=flags, ops=payload)
         wire_bytes += len(packets.encode(data))
-        for name, op_bytes in list_ops(payload, coding):
+        for name, op_bytes in list_ops(payload, config):
             count[name] += 1
             size[name] += op_bytes
     return Plan(

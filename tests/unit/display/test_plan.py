@@ -45,10 +45,10 @@ def memory(grid, format_, density):
 def test_the_ops_are_all_that_is_in_a_payload(grid, format_, density):
     frame = curves(grid, format_) if density is None else memory(grid, format_, density)
     for longest in (64, 1024):
-        coding = EncoderConfig(frame.grid, frame.format, longest)
+        config = EncoderConfig(frame.grid, frame.format, longest)
         every = {"line", "box", "dots", "oct"} | ({"diff"} if format_ == "index8" else set())
         for payload in frame.payloads(longest) + frame.payloads(longest, every):
-            ops = list(list_ops(payload, coding))
+            ops = list(list_ops(payload, config))
             assert sum(size for _, size in ops) == len(payload)
             assert {name for name, _ in ops} <= set(plan_names())
 
@@ -79,13 +79,13 @@ def plan_names():
     ],
 )  # fmt: skip
 def test_ops_by_hand(payload, ops):
-    coding = EncoderConfig(vd.Grid(17, 64, 40), vd.PixelFormat.RGB565, 64)
-    assert list(list_ops(bytes.fromhex(payload), coding)) == ops
+    config = EncoderConfig(vd.Grid(17, 64, 40), vd.PixelFormat.RGB565, 64)
+    assert list(list_ops(bytes.fromhex(payload), config)) == ops
 
 
 def test_pixels_of_one_bit():
-    coding = EncoderConfig(vd.Grid(5, 3, 7), vd.PixelFormat.MONO1, 64)
-    assert list(list_ops(bytes.fromhex("C9 A5 02 A0"), coding)) == [("LIT", 3), ("RUN", 1)]
+    config = EncoderConfig(vd.Grid(5, 3, 7), vd.PixelFormat.MONO1, 64)
+    assert list(list_ops(bytes.fromhex("C9 A5 02 A0"), config)) == [("LIT", 3), ("RUN", 1)]
 
 
 @pytest.mark.parametrize("density", [None, 0.0, 0.3])

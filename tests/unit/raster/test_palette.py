@@ -108,9 +108,9 @@ def test_what_is_no_palette(colors):
 )
 def test_entries_are_set_in_ops_that_fit(entries, most):
     palette = np.random.default_rng(1).integers(0, 256, (256, 3), dtype=np.uint8)
-    coding = EncoderConfig(Frame(GRID).grid, PixelFormat.INDEX8, most, 1 << spec.FEATURE_PALETTE)
+    config = EncoderConfig(Frame(GRID).grid, PixelFormat.INDEX8, most, 1 << spec.FEATURE_PALETTE)
     payloads = PayloadLayout(
-        color_blocks(np.array(entries, dtype=int), palette, coding), coding
+        color_blocks(np.array(entries, dtype=int), palette, config), config
     ).payloads
     assert all(len(payload) <= most for payload in payloads)
     drawn = decode_plainly(payloads, GRID, PixelFormat.INDEX8).palette

@@ -87,9 +87,9 @@ def test_a_payload_is_filled_to_the_last_byte_and_no_further(format_):
     pens = [max(1, (37 * k + 1) & format_.full) for k in range(40)]
     (whole,) = encode(lone, pens, grid=Grid(300, 4, 3), format_=format_)
     size = len(whole)
-    coding = {"grid": Grid(300, 4, 3), "format_": format_}
-    assert encode(lone, pens, max_payload=size, **coding) == [whole]
-    first, second = encode(lone, pens, max_payload=size - 1, **coding)
+    config = {"grid": Grid(300, 4, 3), "format_": format_}
+    assert encode(lone, pens, max_payload=size, **config) == [whole]
+    first, second = encode(lone, pens, max_payload=size - 1, **config)
     assert len(first) < size
     assert len(chains_in(second, Grid(300, 4, 3), format_)) <= 2
 

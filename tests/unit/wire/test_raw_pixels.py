@@ -63,12 +63,12 @@ def test_a_full_page_costs_its_pixels_and_hardly_more(format_):
 
 def test_narrow_gaps_are_written_and_wide_ones_skipped():
     grid = Grid(3, 5, 7)
-    coding = EncoderConfig(grid, PixelFormat.INDEX8, 64)
+    config = EncoderConfig(grid, PixelFormat.INDEX8, 64)
     page = np.zeros(grid.voxels, dtype=np.uint8)
     page[[4, 8, 13]] = 9
     # SKIP 4, LIT of 5 with three that are dark between, SKIP 4, LIT of 1.
     expected = bytes([0x83, 0xC4, 9, 0, 0, 0, 9, 0x83, 0xC0, 9])
-    assert list(raw_pixels.encode_raw(page, coding)) == [[expected]]
+    assert list(raw_pixels.encode_raw(page, config)) == [[expected]]
 
 
 def test_noise_is_told_from_what_has_runs():

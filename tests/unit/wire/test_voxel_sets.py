@@ -78,10 +78,10 @@ def test_a_dots_op_has_at_most_256_voxels_and_fits(format_, count, most):
     grid = Grid(300, 4, 3)
     index = np.sort(np.random.default_rng(1).permutation(grid.voxels)[:count])
     value = max(1, format_.full - 1)
-    coding = EncoderConfig(grid, format_, most, DOTS)
-    made = encode_set(index, np.full(count, value), coding)
-    assert made.blocks.size.max() <= coding.max_block_bytes
-    payloads = encode_set_payloads(index, np.full(count, value), coding)
+    config = EncoderConfig(grid, format_, most, DOTS)
+    made = encode_set(index, np.full(count, value), config)
+    assert made.blocks.size.max() <= config.max_block_bytes
+    payloads = encode_set_payloads(index, np.full(count, value), config)
     assert max(map(len, payloads)) <= most
     drawn = decode_plainly(payloads, grid, format_)
     assert np.flatnonzero(drawn.page).tolist() == index.tolist()
@@ -237,13 +237,13 @@ def test_cells_are_merged_to_cuboids():
 
 def test_the_bound_is_one():
     rng = np.random.default_rng(3)
-    coding = EncoderConfig(GRID, PixelFormat.MONO1, 1024, OCT | DOTS)
+    config = EncoderConfig(GRID, PixelFormat.MONO1, 1024, OCT | DOTS)
     for density in (0.001, 0.02, 0.3, 0.9, 1):
         index = np.flatnonzero(rng.random(GRID.voxels) < density)
-        (bound,) = min_bytes(index, index * 0, 1, coding)
-        made = encode_set(index, np.ones(len(index), dtype=int), coding)
+        (bound,) = min_bytes(index, index * 0, 1, config)
+        made = encode_set(index, np.ones(len(index), dtype=int), config)
         assert 0 <= bound <= made.bytes_per_value.sum()
-    parts = min_bytes(index, index // 7000, 4, coding)
+    parts = min_bytes(index, index // 7000, 4, config)
     assert len(parts) == 4
     # A whole solid has nothing but full cells, but for a side of 33.
     assert parts.sum() < GRID.voxels / 8
@@ -252,8 +252,8 @@ def test_the_bound_is_one():
 def test_the_bytes_of_each_pixel_are_counted():
     index = np.sort(np.random.default_rng(5).permutation(GRID.voxels)[:500])
     values = np.where(index % 3, 7, 200)
-    coding = EncoderConfig(GRID, PixelFormat.INDEX8, 65535, OCT | DOTS)
-    made = encode_set(index, values, coding)
-    (payload,) = encode_set_payloads(index, values, coding)
+    config = EncoderConfig(GRID, PixelFormat.INDEX8, 65535, OCT | DOTS)
+    made = encode_set(index, values, config)
+    (payload,) = encode_set_payloads(index, values, config)
     assert made.values.tolist() == [7, 200]
-    assert made.bytes_per_value.sum() + 2 * coding.pen_bytes == len(payload)
+    assert made.bytes_per_value.sum() + 2 * config.pen_bytes == len(payload)
