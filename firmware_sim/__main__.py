@@ -27,7 +27,7 @@ def main(argv: list[str] | None = None) -> int:
         be opened, exit with 2.
     """
     with _stop_on_signal() as stop:
-        from firmware_sim.program import run  # noqa: PLC0415 - after the signal handlers
+        from firmware_sim.command_line import run  # noqa: PLC0415 - after the signal handlers
 
         return run(argv, stop)
 

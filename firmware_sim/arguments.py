@@ -16,9 +16,9 @@ from firmware_sim.config import (
     parse_refresh,
     parse_size,
 )
-from firmware_sim.excerpt import excerpt
 from firmware_sim.faults import KINDS, forms, parse_faults
 from firmware_sim.memory import FORMATS
+from firmware_sim.quoting import excerpt
 
 _EXAMPLES: Final = """\
 examples:

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from firmware_sim import spec
-from firmware_sim.excerpt import excerpt
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, PixelFormat
+from firmware_sim.quoting import excerpt
 from firmware_sim.sender import max_wire_bytes
 
 FEATURES: Final = {

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim import fault_types
-from firmware_sim.excerpt import excerpt
 from firmware_sim.fault_types import BYTES, TIMED, Event, Fault, HitSelector, Piece
+from firmware_sim.quoting import excerpt
 
 KINDS: Final[dict[str, type[Fault]]] = {
     "flip": fault_types.Flip,

@@ -23,8 +23,8 @@ from firmware_sim.config import (
 )
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
-from firmware_sim.excerpt import excerpt
 from firmware_sim.faults import parse_faults
+from firmware_sim.quoting import excerpt
 
 # Key of the URL: what it sets (a field of Config, or a property of the line), and its parser.
 _KEYS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {

@@ -17,8 +17,8 @@ from typing import Any, Final
 
 from firmware_sim.baud_pacing import PacedDevice
 from firmware_sim.device_on_line import DeviceOnLine
-from firmware_sim.excerpt import excerpt
 from firmware_sim.in_process import InProcessPort, open_in_process
+from firmware_sim.quoting import excerpt
 from firmware_sim.readiness import Waitable, wait_ready
 
 __all__ = [

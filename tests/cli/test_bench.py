@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import voxdisplay as vd
-from voxdisplay.cli import measurements
+from voxdisplay.cli import bench_measurements
 from voxdisplay.cli.main import main
 
 
@@ -14,7 +14,7 @@ from voxdisplay.cli.main import main
 def quick(monkeypatch):
     """Measure as little as can be."""
     for name in ("_BUDGET_S", "_RAW_BUDGET_S", "_NOISE_BUDGET_S"):
-        monkeypatch.setattr(measurements, name, 0.01)
+        monkeypatch.setattr(bench_measurements, name, 0.01)
 
 
 @pytest.mark.usefixtures("quick")
@@ -49,8 +49,8 @@ def test_the_raw_pipe_damages_nothing():
     """Segments of fewer than 8 bytes are not counted (protocol.md, section 3)."""
     with vd.open("sim:?size=3x5x7") as display:
         transport = display._connection._transport
-        info = measurements.request_info(transport, 1.0)
-        measurements.measure_raw_pipe(transport, info, 1.0)
+        info = bench_measurements.request_info(transport, 1.0)
+        bench_measurements.measure_raw_pipe(transport, info, 1.0)
         display._connection.restart(1.0)
         assert display.counters.device_damaged == 0
 
@@ -59,7 +59,7 @@ def test_the_raw_pipe_damages_nothing():
 def test_noise_is_as_long_as_asked(format_):
     with vd.open(f"sim:?size=32x32x32&format={format_}") as display:
         sizes = [
-            sum(map(len, measurements.noise_frame(display.info, size, 1).payloads(1024)))
+            sum(map(len, bench_measurements.noise_frame(display.info, size, 1).payloads(1024)))
             for size in (512, 2048)
         ]
     assert 512 <= sizes[0] <= 600 + 16

@@ -8,7 +8,7 @@ import click
 import pytest
 from conftest import ROOT
 
-from voxdisplay.cli import documents
+from voxdisplay.cli import document_paths
 
 
 def test_protocol_is_the_document(run, tmp_path):
@@ -26,13 +26,13 @@ def test_a_wheel_has_the_protocol_inside_the_package(tmp_path, monkeypatch):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
     assert included["protocol.md"] == "voxdisplay/protocol.md"
-    monkeypatch.setattr(documents, "_PACKAGE", tmp_path / "voxdisplay")
+    monkeypatch.setattr(document_paths, "_PACKAGE", tmp_path / "voxdisplay")
     (tmp_path / "voxdisplay").mkdir()
     (tmp_path / "voxdisplay" / "protocol.md").touch()
-    assert documents.protocol_path() == tmp_path / "voxdisplay" / "protocol.md"
+    assert document_paths.protocol_path() == tmp_path / "voxdisplay" / "protocol.md"
 
 
 def test_an_installation_that_lacks_it_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(documents, "_PACKAGE", tmp_path / "voxdisplay")
+    monkeypatch.setattr(document_paths, "_PACKAGE", tmp_path / "voxdisplay")
     with pytest.raises(click.ClickException, match=r"protocol\.md is missing"):
-        documents.protocol_path()
+        document_paths.protocol_path()

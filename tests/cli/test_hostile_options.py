@@ -3,7 +3,7 @@
 import click
 import pytest
 
-from voxdisplay.cli import measurements
+from voxdisplay.cli import bench_measurements
 from voxdisplay.cli.command_table import ENTRIES
 from voxdisplay.cli.main import cli, main
 
@@ -48,7 +48,7 @@ def here(tmp_path, monkeypatch):
     monkeypatch.delenv("VOXDISPLAY_PORT", raising=False)
     monkeypatch.setattr("voxdisplay.view.live.run.run", lambda *_: None)
     for name in ("_BUDGET_S", "_RAW_BUDGET_S", "_NOISE_BUDGET_S"):
-        monkeypatch.setattr(measurements, name, 0.01)
+        monkeypatch.setattr(bench_measurements, name, 0.01)
 
 
 def command_lines(name):

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from voxdisplay.errors import SceneError
 from voxdisplay.scene import read_scene
-from voxdisplay.scene.mismatch import find_mismatch
 from voxdisplay.scene.objects import TYPES, Object, SceneFile
 from voxdisplay.scene.schema import schema
+from voxdisplay.scene.type_mismatch import find_mismatch
 
 FOLDER = Path(__file__).parents[2] / "examples"
 EXAMPLES = [json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))]

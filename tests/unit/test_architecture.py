@@ -121,7 +121,7 @@ def test_the_emulator_needs_only_the_standard_library():
 
 
 def test_the_emulator_itself_loads_nothing_else():
-    script = "import sys, firmware_sim.program, firmware_sim.usb; print(*sys.modules)"
+    script = "import sys, firmware_sim.command_line, firmware_sim.usb; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in run.stdout.split()}
     assert not loaded & {"usb", "numpy", "serial", "voxdisplay"}

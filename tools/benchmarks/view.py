@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay.view.animation import Turntable, save_gif
+from voxdisplay.view.axes_and_grid import draw_stage
 from voxdisplay.view.half_blocks import half_blocks
 from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import RenderOptions, render_page, render_voxels
-from voxdisplay.view.stage import draw_stage
 
 SEED = 22
 RGB = vd.PixelFormat.RGB888

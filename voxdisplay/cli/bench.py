@@ -12,7 +12,7 @@ from voxdisplay.cli.options import default_port, json_option, no_reset, port_opt
 from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout, progress_bar
 
 if TYPE_CHECKING:
-    from voxdisplay.cli.measurements import Coding, Generation, LinkSpeed, RawPipe
+    from voxdisplay.cli.bench_measurements import Coding, Generation, LinkSpeed, RawPipe
     from voxdisplay.display.baud import Baud
 
 _STEPS: Final = 6
@@ -36,7 +36,7 @@ def bench(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
     Takes less than 20 seconds. The link is measured beside the raw pipe: the same port without
     packets, ACKs and drawing. Draws on the display, which is dark afterwards.
     """
-    from voxdisplay.cli import measurements  # noqa: PLC0415 - loads numpy
+    from voxdisplay.cli import bench_measurements  # noqa: PLC0415 - loads numpy
     from voxdisplay.cli.signals import close_on_exit  # noqa: PLC0415
     from voxdisplay.display.baud import open_at_rate  # noqa: PLC0415
     from voxdisplay.display.handshake import request_info  # noqa: PLC0415
@@ -56,7 +56,7 @@ def bench(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
         transport = open_at_rate(port, baud, timeout_s, note, reset=not no_reset())
         try:
             greeting = request_info(transport, timeout_s)
-            raw = measurements.measure_raw_pipe(transport, greeting, timeout_s)
+            raw = bench_measurements.measure_raw_pipe(transport, greeting, timeout_s)
             step()
             display = vd.open(transport, timeout_s=timeout_s)
         except BaseException:
@@ -65,17 +65,18 @@ def bench(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
         with close_on_exit(display, "blank"):
             info = display.info
             frames = []
-            for name, scene in measurements.scenes(info.grid):
-                generation, sequences = measurements.measure_generation(name, scene)
+            for name, scene in bench_measurements.scenes(info.grid):
+                generation, sequences = bench_measurements.measure_generation(name, scene)
                 generations.append(generation)
                 step()
                 frame = display.frame()
                 for sequence, item in zip(sequences, scene.items, strict=True):
                     frame.draw(sequence, item.color)
                 frames.append(frame)
-                codings.append(measurements.measure_coding(name, frame, info, raw.bytes_per_s))
+                coding = bench_measurements.measure_coding(name, frame, info, raw.bytes_per_s)
+                codings.append(coding)
                 step()
-            link = measurements.measure_link(display, frames[0], raw)
+            link = bench_measurements.measure_link(display, frames[0], raw)
             display.clear()
             step()
     if as_json:

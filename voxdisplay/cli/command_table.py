@@ -48,14 +48,16 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
         "voxelize": TableEntry("voxelize", "voxelize", "Write the voxels of a scene's curves."),
         "preview": TableEntry("preview", "preview", "Draw a scene as a picture or a film."),
         "plan": TableEntry("plan", "plan_command", "Print bytes and frames per second of a scene."),
-        "schema": TableEntry("documents", "schema", "Print the path of the JSON Schema of scenes."),
+        "schema": TableEntry(
+            "document_paths", "schema", "Print the path of the JSON Schema of scenes."
+        ),
     },
     "Develop a device": {
         "conformance": TableEntry(
             "conformance", "conformance", "Check a device against protocol.md."
         ),
         "annotate": TableEntry("annotate", "annotate", "Explain a capture of push --capture."),
-        "protocol": TableEntry("documents", "protocol", "Print the path of protocol.md."),
+        "protocol": TableEntry("document_paths", "protocol", "Print the path of protocol.md."),
     },
 }
 ENTRIES: Final = {name: entry for group in COMMANDS.values() for name, entry in group.items()}

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats, Ints
-from voxdisplay.curves.representation import short_repr
+from voxdisplay.curves.short_repr import short_repr
 
 NO_BREAKS: Floats = np.empty(0)
 NO_BREAKS.flags.writeable = False

@@ -11,8 +11,8 @@ import math
 from collections.abc import Callable, Iterator
 
 from voxdisplay.errors import RemoteProtocolError
+from voxdisplay.link.bandwidth_delay import DeliveryRate
 from voxdisplay.link.counters import LinkCounters
-from voxdisplay.link.delivery_rate import DeliveryRate
 from voxdisplay.link.events import (
     Event,
     FrameShown,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from voxdisplay.errors import TransportTimeout
+from voxdisplay.link.bandwidth_delay import MIN_PACKETS, DeliveryRate
 from voxdisplay.link.counters import LinkCounters
-from voxdisplay.link.delivery_rate import MIN_PACKETS, DeliveryRate
 from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
 from voxdisplay.link.payload_size import LossRate
 from voxdisplay.link.readback import ReadRequests

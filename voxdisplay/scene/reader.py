@@ -24,9 +24,9 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
-from voxdisplay.scene.mismatch import MOST_COMPARED, describe_value, find_mismatch
 from voxdisplay.scene.model import Scene, SceneItem
 from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
+from voxdisplay.scene.type_mismatch import MOST_COMPARED, describe_value, find_mismatch
 from voxdisplay.scene.values import MAX_SIDE
 
 MAX_BYTES = 16 << 20

@@ -21,8 +21,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
-from voxdisplay.scene.mismatch import field_types
 from voxdisplay.scene.objects import TYPES, SceneFile
+from voxdisplay.scene.type_mismatch import field_types
 from voxdisplay.scene.values import Color, Formula, Number, OneColor, Side, Vector
 
 ID = "urn:voxdisplay:scene"

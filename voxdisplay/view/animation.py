@@ -20,11 +20,11 @@ import numpy as np
 from voxdisplay.errors import MissingExtra
 from voxdisplay.printable_text import printable_lines
 from voxdisplay.raster.grid import Grid
+from voxdisplay.view.axes_and_grid import AXIS_COLORS
 from voxdisplay.view.glow import accumulate_light
 from voxdisplay.view.lit_voxels import LitVoxels
 from voxdisplay.view.picture import RenderOptions, auto_exposure, render_voxels
 from voxdisplay.view.pillow import Image
-from voxdisplay.view.stage import AXIS_COLORS
 
 # Number of pictures that the palette is made from, spread over the film; weight of a colour's
 # frequency in it: 0 none, 1 proportional.

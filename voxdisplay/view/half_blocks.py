@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.raster.grid import Grid
+from voxdisplay.view.axes_and_grid import AXIS_COLORS, axis_tips
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.lit_voxels import LitVoxels
 from voxdisplay.view.picture import RenderOptions, render_voxels
-from voxdisplay.view.stage import AXIS_COLORS, axis_tips
 
 RESET = "\x1b[0m"
 _UPPER_HALF = "\N{UPPER HALF BLOCK}"

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.view.axes_and_grid import BACKGROUND, draw_stage
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.glow import Light, accumulate_light, blur
 from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels
 from voxdisplay.view.pillow import Image, ImageChops
-from voxdisplay.view.stage import BACKGROUND, draw_stage
 
 SIZE = (800, 600)
 

@@ -20,7 +20,7 @@ from voxdisplay.raster.display_list import OrderedVoxels
 from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.wire import spans, spec, voxel_sets
 from voxdisplay.wire.chains import Chains, build_chains
-from voxdisplay.wire.incremental import Incremental, run_to_end
+from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
 from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout, concatenate_blocks, no_blocks
 from voxdisplay.wire.range_coded_chains import encode_range_coded

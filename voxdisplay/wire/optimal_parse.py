@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
-from voxdisplay.wire.incremental import Incremental
+from voxdisplay.wire.incremental_work import Incremental
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, counted_op_bytes
 
 # States: the op that drew the previous run.

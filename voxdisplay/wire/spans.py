@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.pixel_format import PixelFormat, Values
 from voxdisplay.wire import spec
-from voxdisplay.wire.incremental import Incremental, run_to_end
+from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import (
     SHORT_COUNT,
     Bools,

@@ -28,7 +28,7 @@ from device_packets import (
 )
 
 from firmware_sim import __main__ as entry
-from firmware_sim import faults, memory, npy, program, serve
+from firmware_sim import command_line, faults, memory, npy, serve
 from firmware_sim.__main__ import main
 from firmware_sim.config import Config
 from firmware_sim.device import Device
@@ -190,13 +190,13 @@ def test_the_program_in_this_process(
             listen_tcp("::1", 0).close()
         except OSError:
             pytest.skip("no IPv6 here")
-    announce = program._announce
+    announce = command_line._announce
 
     def announce_and_end(*place: object) -> None:
         announce(*place)
         os.kill(os.getpid(), signal.SIGTERM)
 
-    monkeypatch.setattr(program, "_announce", announce_and_end)
+    monkeypatch.setattr(command_line, "_announce", announce_and_end)
     arguments = [str(tmp_path / "port") if a == "LINK" else a for a in arguments]
     before = signal.getsignal(signal.SIGTERM)
     assert main(arguments) == 0
@@ -211,7 +211,7 @@ def test_a_picture_that_cannot_be_dumped_does_not_stop_the_device(
     device = Device(Config((3, 5, 7), refresh=0))
     folder = tmp_path / "pictures"
     folder.mkdir()
-    program._dump_swaps(device, folder / "front.npy")
+    command_line._dump_swaps(device, folder / "front.npy")
     device.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
     assert np.load(folder / "front.npy")[0, 0, 0].tolist() == [255, 255, 255]
     (folder / "front.npy").unlink()
@@ -231,7 +231,7 @@ def test_a_signal_before_anything_is_open_ends_the_program_cleanly(
     with entry._stop_on_signal() as stop:
         for _ in range(70_000 if name == "SIGINT" else 1):  # more than a pipe holds
             signal.raise_signal(getattr(signal, name))
-        assert program.run(["--size", "3x5x7"], stop) == 0
+        assert command_line.run(["--size", "3x5x7"], stop) == 0
     assert json.loads(capsys.readouterr().out)["size"] == "3x5x7"
 
 
@@ -268,7 +268,7 @@ def run_with(redirection: str, *arguments: str) -> subprocess.CompletedProcess[s
 
 ENDS_ITSELF = """
 import os, signal, sys
-from firmware_sim import program
+from firmware_sim import command_line
 from firmware_sim.__main__ import main
 announce = program._announce
 def announce_and_end(place):
@@ -300,8 +300,8 @@ def test_a_dump_that_fails_with_stderr_closed_does_not_stop_the_device(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     device = Device(Config((3, 5, 7), refresh=0))
-    program._dump_swaps(device, tmp_path / "front.npy")
-    monkeypatch.setattr(program, "write_npy", _fail)
+    command_line._dump_swaps(device, tmp_path / "front.npy")
+    monkeypatch.setattr(command_line, "write_npy", _fail)
     monkeypatch.setattr(sys, "stderr", None)
     device.receive(hello() + data(0, 0, DOT, CLEAR | COMMIT))
     assert device.swaps == 1
@@ -347,7 +347,7 @@ def test_nothing_is_written_through_a_link_laid_beside_the_dump(
     (tmp_path / "victim").write_text("precious")
     (tmp_path / ".front.npy.guessed.tmp").symlink_to(tmp_path / "victim")
     with pytest.raises(OSError, match=r"front\.npy cannot be written"):
-        program._dump_swaps(Device(Config((3, 5, 7))), tmp_path / "front.npy")
+        command_line._dump_swaps(Device(Config((3, 5, 7))), tmp_path / "front.npy")
     assert (tmp_path / "victim").read_text() == "precious"
 
 
@@ -456,7 +456,7 @@ def test_a_grid_beyond_the_memory_of_the_machine(
 def test_both_notations_of_sizes(size: str, capsys: pytest.CaptureFixture[str]) -> None:
     with entry._stop_on_signal() as stop:
         signal.raise_signal(signal.SIGTERM)
-        assert program.run(["--size", size], stop) == 0
+        assert command_line.run(["--size", size], stop) == 0
     assert json.loads(capsys.readouterr().out)["size"] == "3x5x7"
     port = open_in_process(f"sim:?size={size}")
     assert port.bench.snapshot().grid == (3, 5, 7)

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 from device_packets import CLEAR, COMMIT, DOT, data, hello
 
-from firmware_sim import program, serve
+from firmware_sim import command_line, serve
 from firmware_sim import viewer as viewers
 from firmware_sim.__main__ import main
 from firmware_sim.bench import Bench
@@ -376,13 +376,13 @@ def test_the_program_shows_itself_here_only(
         time.sleep(60)
         """,
     )
-    announce = program._announce
+    announce = command_line._announce
 
     def announce_and_end(place: dict[str, str]) -> None:
         announce(place)
         os.kill(os.getpid(), signal.SIGTERM)
 
-    monkeypatch.setattr(program, "_announce", announce_and_end)
+    monkeypatch.setattr(command_line, "_announce", announce_and_end)
     dump = tmp_path / "front.npy"
     for arguments, address in (([], "127.0.0.1:0"), (["[::1]:5"], "[::1]:5")):
         command = ["--size", "3x5x7", "--dump", str(dump), "--view", *arguments]

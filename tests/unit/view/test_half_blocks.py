@@ -8,10 +8,10 @@ import pytest
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.view.axes_and_grid import BACKGROUND
 from voxdisplay.view.half_blocks import CAMERA, RESET, half_blocks, has_true_color
 from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import RenderOptions, render_voxels
-from voxdisplay.view.stage import BACKGROUND
 
 GRID = Grid(3, 5, 7)
 COLUMNS, ROWS = 60, 20

@@ -3,7 +3,7 @@
 import pytest
 from link_rig import Rig, random_frame
 
-from voxdisplay.link.delivery_rate import MAX_PACKETS, MIN_BYTES, MIN_PACKETS, DeliveryRate
+from voxdisplay.link.bandwidth_delay import MAX_PACKETS, MIN_BYTES, MIN_PACKETS, DeliveryRate
 from voxdisplay.link.payload_size import INITIAL_PAYLOAD, MIN_PAYLOAD, OVERHEAD_BYTES, LossRate
 
 
