@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from voxdisplay.curves import arguments
 from voxdisplay.errors import CurveError, SceneError
 from voxdisplay.expressions.parse import constant, parse
-from voxdisplay.scene.points_file import read_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -110,6 +109,9 @@ class EvaluationContext:
         with as_scene_error(f"{self.path}.{key}"):
             if self.folder is None:
                 raise CurveError("this scene has no folder, and may name no file")
+            # Most scenes name no file, and are drawn sooner without its readers.
+            from voxdisplay.scene.points_file import read_points  # noqa: PLC0415
+
             found = read_points(self.folder, name, split=split)
         if found.note:
             self.notes.append(found.note)

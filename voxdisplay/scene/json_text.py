@@ -12,7 +12,6 @@ from typing import Any, NoReturn
 
 from voxdisplay.errors import SceneError
 from voxdisplay.expressions.parse import excerpt
-from voxdisplay.scene.json_syntax import explain_syntax_error
 
 # An unfinished string ends with the text, so that no match is tried twice.
 _STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*+"?|//[^\n\r]*', re.DOTALL)
@@ -63,6 +62,8 @@ class JsonText:
             if "\\u" in self._text or not self._text.isascii():
                 json.dumps(value, ensure_ascii=False).encode()
         except json.JSONDecodeError as error:
+            from voxdisplay.scene.json_syntax import explain_syntax_error  # noqa: PLC0415 - rare
+
             found = explain_syntax_error(self._text, error.pos)
             raise self._error_at(
                 found.at, f"the file is not JSON: {found.problem}", found.hint
