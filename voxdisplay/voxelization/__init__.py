@@ -1,6 +1,6 @@
-"""From curves to voxels: ordered, connected sequences along parametric space curves.
+"""Voxelisation of parametric space curves: ordered, 26-connected sequences of voxels.
 
-``voxelize(curve)`` gives a `Sequence`; `measure` judges any list of voxels. This package knows
+``voxelize(curve)`` returns a `Sequence`; `measure` judges any list of voxels. This package knows
 curves only by their positions, and neither displays nor colours nor the wire. It needs numpy; with
 the extra `fast`, much work is done compiled, with the same voxels
 (`voxdisplay.compute.kernel_backend`).
@@ -40,28 +40,28 @@ def voxelize(
     reach: float | None = None,
     certified: bool = False,
 ) -> Sequence:
-    """Find the voxels along a curve.
+    """Return the voxels along a curve.
 
     Parameters
     ----------
     curve : Curve
         Any continuous curve; where it jumps, the sequence is split.
     method : {"grid-plane", "march"}
-        The method of `grid_plane`, for which what is said below holds, or the paper's own, which
-        is there for comparison: `march`.
+        Grid-plane intersection digitisation (`grid_plane`), for which the guarantees below hold, or
+        the tangent march of the paper (`tangent_march`), for comparison.
     variant : {1, 2, 3}
     tangent : {"analytic", "difference"}, optional
-        How the march finds distances, and tangents: see `march.follow`.
+        How the march measures distances and tangents: see `tangent_march.follow`.
     pitch, reach : float, optional
         Step sizes of the march's search for the nearest point: in degrees where the parameter is
         an angle around z, as for the paper's curves, else in voxels. By default those of the
-        paper's tables: see `march.follow`.
+        paper's tables: see `tangent_march.follow`.
     certified : bool
-        Prove what the report says, and that no feature is missed, however narrow, by bounds of
+        Prove the guarantees, and that no feature is missed, however narrow, by interval bounds of
         the curve's formula (`certify`); it takes about twice the time. Without it, features much
-        narrower than 1/64 of the range of t may be missed. Whether there is a proof, the report's
-        ``certified`` says, and what it says or why there is none, the sequence's ``proof``: a
-        curve that is a callable has no bounds, one that jumps cannot be proven to be one.
+        narrower than 1/64 of the range of t may be missed. The report's ``certified`` is True if
+        there is a proof; the sequence's ``proof`` is the certificate, or the reason why there is
+        none: a callable has no bounds, and a curve that jumps is not connected.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def voxelize_many(
     reach: float | None = None,
     certified: bool = False,
 ) -> list[Sequence]:
-    """Find the voxels along many curves: as `voxelize`, but much faster than one by one."""
+    """Return the voxels along many curves: as `voxelize`, but much faster than one by one."""
     curves = _as_curves(curves)
     choice("method", method, ("grid-plane", "march"))
     certified = flag("certified", certified)

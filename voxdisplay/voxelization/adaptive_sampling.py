@@ -1,8 +1,7 @@
-"""How finely curves must be sampled to see their features, and where they jump.
+"""Adaptive sampling of curves, with detection of jumps.
 
-The samples are called knots: what is between two of them is taken to be nearly straight. This
-module also stops at curves that cannot be drawn, before they cost time and memory. It must not
-know what a voxel sequence is.
+Between two samples a curve is taken to be nearly straight. Curves that cannot be drawn are refused
+here, before they cost time and memory. This module must not know what a voxel sequence is.
 """
 
 from __future__ import annotations
@@ -18,32 +17,32 @@ from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.curve_batch import AXES, CurveBatch, Samples
 from voxdisplay.voxelization.length_estimate import estimated_min_length
 
-# More than this is no picture on a display (256^3 has 17 million voxels in all) but a mistake.
+# A longer curve is a mistake, not a picture: 256^3 has 17 million voxels in all.
 MAX_VOXELS = 10_000_000
 MAX_SAMPLES = 4_000_000
 # From so many samples of a curve on, its length is estimated before it gets more.
 MANY_SAMPLES = 1 << 13
-# A knot interval may be this long (voxels, along its longest axis) and bend this far off its
-# chord (voxels). No guarantee rests on these: they only decide how small a feature is seen.
+# A step between samples may be this long (voxels, along its longest axis) and bend this far off its
+# chord (voxels). No guarantee rests on these: they only decide how small a feature is found.
 MAX_CHORD = 3.0
 MAX_SAG = 0.05
-# Into how many parts an interval is cut at once, at most.
+# A step is cut into at most so many parts at once.
 MAX_PARTS = 16
-# What has to be cut is cut so much finer than it looks to need: parts that just fail would take
-# one more look at everything, which takes longer than a few more knots.
+# Steps are cut so much finer than they seem to need: parts that just failed would take one more
+# pass over everything, which takes longer than a few more samples.
 OVERSPLIT = 1.3
-# A step wider than this between neighbouring parameters is a jump; a narrower one cannot be told
-# from a step between adjacent voxels.
+# A step between neighbouring parameters that is longer than this, in voxels, is a jump; a shorter
+# one cannot be told from a step between adjacent voxels.
 MIN_JUMP = 1.0
 
-# The first look at a curve: so many steps. A polynomial turns so rarely that fewer show it.
+# Number of steps of the initial sampling. A polynomial turns so rarely that fewer will do.
 INITIAL_STEPS = 64
 INITIAL_STEPS_PER_COEFFICIENT = 4
 
 
 @cache
 def _initial_shares(degree: int | None) -> Floats:
-    """Give the parameters of the first look, as shares of the range.
+    """Return the parameters of the initial samples, as shares of the range.
 
     They are spread evenly but for a jitter (multiples of the golden ratio, modulo 1), so that no
     oscillation can hide between them by having their period.
@@ -63,7 +62,7 @@ def _initial_shares(degree: int | None) -> Floats:
 
 
 def sample_adaptively(batch: CurveBatch) -> Samples:
-    """Sample curves finely enough to see their features, and cut them at their jumps.
+    """Return samples of curves that resolve their features, cut at jumps.
 
     Steps are split until none is longer than ``MAX_CHORD`` or bends more than ``MAX_SAG``; the bend
     h^2 |P''| / 8 is taken from second divided differences. A step that is still wider than
@@ -89,7 +88,7 @@ def sample_adaptively(batch: CurveBatch) -> Samples:
 
 
 def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
-    """Split steps of samples, one piece for each curve, as far as `knots` says."""
+    """Split steps of samples, one piece for each curve, to the limits of `sample_adaptively`."""
     estimated: set[int] = set()
     while True:
         parts, chord = subdivision_counts(samples, batch.resolution)
@@ -103,7 +102,7 @@ def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
 
 @np.errstate(all="ignore")  # between pieces, a step has no meaning and may be of any size
 def limit_chords(batch: CurveBatch, samples: Samples, longest: float) -> Samples:
-    """Split steps until none is longer than ``longest`` voxels in max norm, as far as can be."""
+    """Split steps until none is longer than ``longest`` voxels in max norm, if t can be split."""
     while True:
         chord = np.abs(samples.points[:, 1:] - samples.points[:, :-1]).max(axis=0)
         curve = samples.curve[samples.piece[:-1]]
@@ -120,7 +119,7 @@ def limit_chords(batch: CurveBatch, samples: Samples, longest: float) -> Samples
 
 
 def initial_samples(batch: CurveBatch) -> Samples:
-    """Sample curves, one piece for each, before anything is known of them."""
+    """Return the initial samples of curves, one piece for each."""
     check_lengths(batch)
     degrees = batch.degrees
     index = np.arange(len(degrees))
@@ -145,7 +144,7 @@ def initial_samples(batch: CurveBatch) -> Samples:
 def _insert_breaks(
     batch: CurveBatch, piece: Ints, t: Floats, breaks: list[Floats]
 ) -> tuple[Ints, Floats]:
-    """Put the parameters where curves may turn sharply between others."""
+    """Insert the parameters at which curves may turn sharply."""
     of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
     turn = np.concatenate(breaks)
     inside = (turn > batch.first[of]) & (turn < batch.last[of])
@@ -157,7 +156,7 @@ def _insert_breaks(
 @with_kernel
 @np.errstate(all="ignore")
 def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floats]:
-    """Tell into how many parts each step should be cut, and how long it is in max norm."""
+    """Return into how many parts each step should be cut, and its length in max norm."""
     joined = samples.joined
     h = np.where(joined, samples.t[1:] - samples.t[:-1], 1.0)
     step = samples.points[:, 1:] - samples.points[:, :-1]
@@ -182,7 +181,7 @@ def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floa
 
 
 def _check_estimates(batch: CurveBatch, samples: Samples, parts: Ints, estimated: set[int]) -> None:
-    """Stop at curves that look too long as soon as they need many samples; each once."""
+    """Raise CurveError if a curve that needs many samples is too long; check each once."""
     count = np.add.reduceat(parts * samples.joined, samples.bounds[:-1])
     for index in np.flatnonzero(count > MANY_SAMPLES).tolist():
         if index not in estimated:
@@ -216,7 +215,7 @@ def _length_error(batch: CurveBatch, index: int, length: float) -> CurveError:
 
 
 def _check_limits(batch: CurveBatch, samples: Samples, parts: Ints, chord: Floats) -> None:
-    """Stop before the work gets out of hand: ``parts`` is what comes next."""
+    """Raise CurveError before a curve takes too many samples; ``parts`` are the next ones."""
     if parts.sum() <= MAX_SAMPLES // 16 and chord.sum() <= MAX_VOXELS:
         return
     starts = samples.bounds[:-1]
@@ -248,7 +247,7 @@ def _roughness_error(batch: CurveBatch, index: int) -> CurveError:
 
 
 def _divergence_error(batch: CurveBatch, index: int, samples: Samples, at: int) -> CurveError:
-    """Name the axis that leaps in the step after sample ``at``, and find out where."""
+    """Return the error that names the axis, and the t, that leaps in the step after ``at``."""
     t, points = samples.t[at : at + 2], samples.points[:, at : at + 2]
     row = int(np.argmax(np.abs(points[:, 1] - points[:, 0])))
     while t[1] - t[0] > batch.resolution[index]:
@@ -265,7 +264,7 @@ def _divergence_error(batch: CurveBatch, index: int, samples: Samples, at: int) 
 
 
 def split_at_jumps(batch: CurveBatch, samples: Samples) -> Samples:
-    """Make pieces of what settled, ending where a curve jumps."""
+    """Split refined samples into pieces where curves jump."""
     finest = samples.t[1:] - samples.t[:-1] < 2 * batch.resolution[samples.piece[:-1]]
     finest &= samples.joined
     if not finest.any():

@@ -1,7 +1,7 @@
-"""Proving that a sequence shows its curve, all of it and nothing else.
+"""Proof that a sequence shows its curve: coverage, distance and connectivity.
 
-A proof here trusts nothing that came before it, neither sampling nor root finding nor the choice
-of voxels: it takes voxels as they are, with a parameter t_i for each, and boxes that hold the
+A proof trusts no earlier step, neither sampling nor root finding nor the choice of voxels: it takes
+the voxels as they are, with a parameter t_i for each, and boxes that hold the
 curve. The curve is that of exact arithmetic; its float64 positions are not used in any argument.
 Let c_i be the centre of voxel i.
 
@@ -16,12 +16,12 @@ which hold the curve's ends whatever that takes, within 0.8661: ``END_ERROR``. S
 *The sequence is connected.* Integers.
 
 What may fail is the search for such i and s; then there is no certificate. That leaves the boxes
-to be trusted, which means `curves.interval` and what it says it assumes. Why proofs are found, as
+to be trusted: `expressions.interval` and its assumptions. Why proofs are found, as
 a rule: a crossing's voxel is at most sqrt(1/2) from the point where it was found and the two thin
 out to neighbours; a box is less than 1 wide, and no part of the curve passes a mid-plane unseen
 without coming back within a box.
 
-This module does not know how voxels are chosen, nor how to mend them.
+This module must not know how voxels are chosen or restored.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from numpy.typing import NDArray
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.curves.curve import Curve
 
-# What is proven, in voxels; the first in max norm.
+# Proven bounds, in voxels; the first in max norm.
 COVERAGE = 2.5
 ERROR = 0.7072
 END_ERROR = 0.8661
-# What is computed here is off by much less.
+# An upper bound of rounding errors of this module's own sums.
 ROUNDING = 1e-9
-# Boxes nearer than this to a voxel are near enough not to look for a nearer one.
+# For a box nearer than this to a voxel no nearer voxel is searched for.
 CLOSE_ENOUGH = 1.4
-# How many voxels before and after the one nearest in t are tried for a box, at first and at last.
+# Numbers of voxels before and after the one nearest in t that are tried for a box, in turn.
 SEARCH_SPANS = (0, 2, 24)
 # Parameters tried for a voxel in each round, and rounds.
 TRIES, ROUNDS = 17, 3
@@ -50,7 +50,7 @@ TRIES, ROUNDS = 17, 3
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What is proven of a sequence.
+    """Proven bounds of a sequence.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def certify(
     *,
     closed: bool,
 ) -> Certificate | str:
-    """Prove a sequence, or say what cannot be proven.
+    """Return the certificate of a sequence, or the reason why there is none.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def box_distances(
     *,
     closed: bool,
 ) -> Floats:
-    """Bound how far the points in each box are from one centre, in max norm: (n,).
+    """Return, for each box, a bound of its points' distance from some centre, in max norm: (n,).
 
     Parameters are those of `certify`, but for ``centres``, (3, N): any with parameters t, (N,).
     """
@@ -147,7 +147,7 @@ def box_distances(
 
 
 def _voxel_errors(curve: Curve, centres: Floats, t: Floats) -> Floats:
-    """Bound how far centres, (3, N), are from the curve: (N,)."""
+    """Return bounds of the distances of centres, (3, N), from the curve: (N,)."""
     off = _distances(curve, centres, t)
     # Where the point at t will not do, another one may: the foot of a perpendicular.
     far = np.flatnonzero(~(off <= ERROR - ROUNDING))
@@ -161,7 +161,7 @@ def _voxel_errors(curve: Curve, centres: Floats, t: Floats) -> Floats:
 
 
 def _distances(curve: Curve, centres: Floats, t: Floats) -> Floats:
-    """Bound the distances of centres, (3, m), from P(t), (m,): nan where nothing is known."""
+    """Return bounds of the distances of centres, (3, m), from P(t), (m,); nan if unknown."""
     with np.errstate(all="ignore"):
         box = curve.enclosure(t, t)
     if box is None:
@@ -171,7 +171,7 @@ def _distances(curve: Curve, centres: Floats, t: Floats) -> Floats:
 
 
 def _nearest(curve: Curve, centres: Floats, low: Floats, high: Floats) -> Floats:
-    """Look for the points nearest to centres, (3, m), between parameters: (m,). No proof."""
+    """Return parameters, (m,), of points near centres, (3, m), between others. No proof."""
     share = np.linspace(0.0, 1.0, TRIES)
     each: Ints = np.arange(low.size)
     t = low

@@ -1,9 +1,9 @@
-"""Where curves are: checked positions of many curves at once.
+"""Checked evaluation of many curves at once.
 
 Parameters and points only; this module must not know what a voxel is. All arrays hold many curves
 (or pieces of curves), one after the other, so that a thousand short curves cost at most a thousand
-calls of ``Curve.position`` and nothing else a thousand times. What a curve gets never depends on
-its neighbours in the batch: decisions are taken per interval, and positions found per curve.
+calls of ``Curve.position`` and nothing else a thousand times. Results for a curve never depend on
+its neighbours in the batch: decisions are taken per interval, and positions computed per curve.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Samples:
 
     @property
     def joined(self) -> Bools:
-        """Which of the K - 1 steps stay inside a piece."""
+        """True for those of the K - 1 steps that stay inside a piece."""
         return np.asarray(self.piece[1:] == self.piece[:-1])
 
     @property
@@ -73,7 +73,7 @@ class Samples:
         return self.piece.searchsorted(np.arange(self.curve.size + 1))
 
     def curve_starts(self, curves: int) -> Ints:
-        """Index of the first sample of each of so many curves: (curves,)."""
+        """Return the index of the first sample of each of so many curves: (curves,)."""
         return self.bounds[self.curve.searchsorted(np.arange(curves))]
 
 
@@ -85,7 +85,7 @@ class CurveBatch:
     curves : iterable of Curve
         Each with a finite range a < b.
     number : int, optional
-        What messages call the first of them; without it they take the curve for the only one.
+        Number of the first curve in messages; without it they do not name the curve.
 
     Raises
     ------
@@ -117,7 +117,7 @@ class CurveBatch:
         self._extended: Bools | None = None  # whose parameters go on past the end of the range
         self._centres: Floats | None = None  # of the curves' boxes, (3, curves)
         self._tie_shift = np.empty(0)
-        # Parameters nearer to each other than this cannot be told apart everywhere in the range.
+        # Parameters nearer to each other than this may be equal floats somewhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
 
     def _complete(self, index: int, curve: Curve, also: Iterable[float] = ()) -> Curve:
@@ -151,7 +151,7 @@ class CurveBatch:
 
     @property
     def thread_safe(self) -> bool:
-        """Whether `evaluate` may be called from several threads at once."""
+        """True if `evaluate` may be called from several threads at once."""
         return all(self._evaluator.map_curves(attrgetter("thread_safe")))
 
     @property
@@ -161,16 +161,16 @@ class CurveBatch:
 
     @property
     def degrees(self) -> list[int | None]:
-        """Those of the curves, see `Curve.degree`."""
+        """`Curve.degree` of each curve."""
         return self._evaluator.map_curves(attrgetter("degree"))
 
     def message_prefix(self, index: int) -> str:
-        """Give the beginning of a message about a curve: nothing if it is the only one."""
+        """Return the beginning of a message about a curve: empty if it is the only one."""
         return "" if self._number is None else f"curve {self._number + index}: "
 
     @np.errstate(all="ignore")
     def evaluate(self, curve: Ints, t: Floats) -> Floats:
-        """Give the points P(t), (3, n), of the curves with these (ascending) indices, (n,).
+        """Return the points P(t), (3, n), of the curves with these ascending indices, (n,).
 
         Raises
         ------
@@ -208,9 +208,9 @@ class CurveBatch:
         return np.asarray(of + 1j * np.concatenate(breaks))
 
     def extend(self, curves: Bools) -> None:
-        """Let parameters of some curves, closed ones, go on past the ends of their ranges.
+        """Accept parameters past the ends of the ranges of some curves, closed ones.
 
-        Those are one round further: ``last`` and more is ``first`` and more.
+        They mean the next round: ``last`` and more is ``first`` and more.
         """
         self._extended = curves
 
@@ -275,7 +275,7 @@ class CurveBatch:
         return CurveError(f"{where} is too far out to have a voxel", axis=AXES[row], hint=hint)
 
     def subdivide(self, samples: Samples, parts: Ints) -> Samples:
-        """Cut steps of samples into equal parts.
+        """Return samples with steps cut into equal parts.
 
         Parameters
         ----------

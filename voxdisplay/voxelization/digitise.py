@@ -1,6 +1,7 @@
-"""From curves to sequences, in batches: sample, trace, thin, close, prove, hand out.
+"""Digitisation pipeline: curves to sequences, in batches.
 
-This module only puts the steps in order; it must not know how they are done.
+Sample, find crossings, trace, thin, close, prove. This module only orders the steps; it must not
+know how they are done.
 """
 
 from __future__ import annotations
@@ -36,12 +37,11 @@ from voxdisplay.voxelization.sequence import Sequence
 from voxdisplay.voxelization.thinning import thin_events
 from voxdisplay.voxelization.voxel_events import VoxelEvents
 
-# Curves handled at once: enough to forget what a batch costs, but not many if they are long. So
-# many voxels may be in hand on all processors together.
+# Curves handled at once: enough to make the cost of a batch negligible, but fewer if they are long:
+# all processors together hold at most so many voxels.
 MAX_BATCH_CURVES = 4096
 MAX_BATCH_VOXELS = 2_000_000
-# Batches for each processor until it is seen whether the curves are still as long, and the fastest
-# has to wait for the others.
+# Batches for each processor before their size is adapted again to the length of the curves.
 BATCHES_PER_PROCESSOR = 8
 
 ONE_PIECE = np.zeros(1, dtype=np.int64)
@@ -50,7 +50,7 @@ ONE_PIECE.flags.writeable = False
 
 @np.errstate(all="ignore")
 def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
-    """Find the voxels of curves, one sequence for each, by grid-plane intersection."""
+    """Return the sequences of curves, in order, by grid-plane intersection digitisation."""
     curves = list(curves)
     sequences: list[Sequence] = []
 
@@ -136,9 +136,9 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
 
 @contextmanager
 def _garbage_collection_paused() -> Iterator[None]:
-    """Keep Python from looking for garbage while many objects are made, all of which stay.
+    """Pause the garbage collector while many objects are made that all stay.
 
-    With every so many it would go through all there are. If its collector is off, that stays so.
+    It would go through all of them again and again. If it is off, it stays off.
     """
     if not gc.isenabled():
         yield
@@ -158,7 +158,7 @@ def _with_proof(
     thin: VoxelEvents,
     traced: VoxelEvents,
 ) -> Sequence:
-    """Give the sequence with its proof, mended if need be, or with what is in the way of one."""
+    """Return the sequence with its proof, restored if need be, or with the reason why not."""
     if index in boxes.obstacles:
         return replace(sequence, proof=boxes.obstacles[index])
     if len(sequence.starts) > 1:
@@ -180,17 +180,17 @@ def _with_proof(
             thin = thin_events(full, samples, keep_tips=True)
         else:
             full = within_range(traced.take(traced.piece == thin.piece[0]), curve)
-        mended = restore_coverage(thin, full, ends, box, closed=closed)
-        voxels = np.ascontiguousarray(mended.voxels.T)
-        voxels.flags.writeable = mended.t.flags.writeable = False
-        second = certify(curve, ends, box, voxels, mended.t, closed=closed)
+        restored = restore_coverage(thin, full, ends, box, closed=closed)
+        voxels = np.ascontiguousarray(restored.voxels.T)
+        voxels.flags.writeable = restored.t.flags.writeable = False
+        second = certify(curve, ends, box, voxels, restored.t, closed=closed)
         if isinstance(second, Certificate):
-            return replace(sequence, voxels=voxels, t=mended.t, proof=second)
+            return replace(sequence, voxels=voxels, t=restored.t, proof=second)
     return replace(sequence, proof=proof)
 
 
 def _starts(events: VoxelEvents) -> Ints:
-    """Find where pieces begin. A gap that could not be bridged is a jump like any other."""
+    """Return where pieces begin. A gap that could not be bridged counts as a jump."""
     ends = np.flatnonzero(events.piece[1:] != events.piece[:-1])
     gaps = events.gaps()
     ends = np.sort(np.concatenate((ends, gaps))) if gaps.size else ends
@@ -198,21 +198,22 @@ def _starts(events: VoxelEvents) -> Ints:
 
 
 def _closed(batch: CurveBatch, samples: Samples) -> list[bool]:
-    """Tell which curves are closed, and stop at those that only say so."""
+    """Return which curves are closed; raise CurveError if one is declared so but is not."""
     first = samples.curve_starts(len(batch.curves))
     last = np.append(first[1:], samples.t.size) - 1
     apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
     closed: list[bool] = (apart <= CLOSURE_TOLERANCE).tolist()
     for index in np.flatnonzero(apart <= CLOSURE_TOLERANCE).tolist():
         own = samples.points[:, first[index] : last[index] + 1]
-        closed[index] = bool(
-            np.abs(own - own[:, :1]).max() > CLOSURE_TOLERANCE
-        )  # a mere point is not
-    told = [(at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None]
-    for index, says in told:
+        # A curve that stays in one point is not closed.
+        closed[index] = bool(np.abs(own - own[:, :1]).max() > CLOSURE_TOLERANCE)
+    declared = [
+        (at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None
+    ]
+    for index, is_closed in declared:
         ends = samples.points[:, [first[index], last[index]]]
-        closed[index] = says
-        if says and (np.abs(np.diff(np.floor(ends))) > 1).any():
+        closed[index] = is_closed
+        if is_closed and (np.abs(np.diff(np.floor(ends))) > 1).any():
             raise CurveError(
                 f"{batch.message_prefix(index)}the curve is said to be closed, but its ends are "
                 f"{apart[index]:.6g} voxels apart",

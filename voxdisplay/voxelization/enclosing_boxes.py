@@ -1,8 +1,8 @@
-"""Boxes around curves: what is proven to be in them, and what was overlooked without them.
+"""Boxes that provably enclose curves, and samples of the features they reveal.
 
-Samples say nothing about what a curve does between them, however many there are; bounds of its
-formula do. Here the range of t is cut until each interval's part of the curve is proven to be in
-a small box (`Curve.enclosure`). Knows neither voxels nor how bounds are found.
+Samples prove nothing about a curve between them, however many there are; bounds of its formula
+do. The range of t is cut until each interval's part of the curve is proven to be in a small box
+(`Curve.enclosure`). This module must not know voxels, nor how bounds are computed.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from voxdisplay.voxelization.index_ranges import expand_ranges
 
 # Boxes are narrower than this on every axis, in voxels.
 WIDTH = 1.0
-# A part of the curve that may be further than this from the straight line between two samples, in
-# voxels along an axis, was overlooked: samples are put in.
+# A part of the curve that may be further than this from the chord between two samples, in voxels
+# along an axis, was overlooked: samples are inserted.
 MAX_DEVIATION = 0.5
-# More boxes than this for one curve are not worth their proof.
+# Boxes for one curve, at most.
 MAX_BOXES = 2_000_000
 # Intervals of which nothing is known lie around single parameters; as many as these, beside those
 # that a curve has to begin with, are a stretch without values, which cutting cannot settle.
 MAX_UNBOUNDED = 4096
-# Into how many parts an interval is cut at once, at most.
+# An interval is cut into at most so many parts at once.
 MAX_PARTS = 16
 # Intervals whose bounds are found at once: what is computed stays in a core's cache.
 INTERVALS_PER_CALL = 1 << 12
@@ -40,11 +40,11 @@ class Boxes:
     Attributes
     ----------
     curve : (n,) int64 array
-        Whose, ascending.
+        Index of the curve, ascending.
     step : (n,) int64 array
         The sample before each.
     t_lo, t_hi : (n,) float64 arrays
-        Ascending along a curve. If there is no doubt about it, its range without a gap.
+        Ascending along a curve; without a gap if it is not among ``obstacles``.
     low, high : (3, n) float64 arrays
         Bounds of P(t), t_lo <= t <= t_hi, in voxels.
     doubts : dict of int to str
@@ -61,12 +61,12 @@ class Boxes:
     obstacles: dict[int, str]
 
     def of_curve(self, index: int) -> slice:
-        """Find the boxes of a curve."""
+        """Return the slice of a curve's boxes."""
         return slice(*np.searchsorted(self.curve, (index, index + 1)))
 
 
 def enclose_curves(batch: CurveBatch, samples: Samples) -> Boxes:
-    """Put curves into boxes narrower than ``WIDTH``.
+    """Return boxes narrower than ``WIDTH`` that enclose curves.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _provable(curve: Ints, doubts: dict[int, str]) -> Bools:
 
 
 def _subdivide(step: Ints, t_lo: Floats, t_hi: Floats, parts: Ints) -> tuple[Ints, Floats, Floats]:
-    """Cut intervals into equal parts, which share their ends to the last bit."""
+    """Return intervals cut into equal parts, which share their ends to the last bit."""
     nth = expand_ranges(np.zeros_like(parts), parts)
     step, t_lo, t_hi = np.repeat(step, parts), np.repeat(t_lo, parts), np.repeat(t_hi, parts)
     parts = np.repeat(parts, parts)
@@ -163,7 +163,7 @@ def _bounds(batch: CurveBatch, curve: Ints, t_lo: Floats, t_hi: Floats) -> tuple
 
 
 def sample_overlooked(batch: CurveBatch, samples: Samples, boxes: Boxes) -> Samples:
-    """Put samples where the curve may be elsewhere than the samples there are suggest.
+    """Return samples with more where a curve may leave the chords of those there are.
 
     Parameters
     ----------

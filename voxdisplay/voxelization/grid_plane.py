@@ -1,4 +1,4 @@
-"""Grid-plane intersection digitisation: from curves to voxels that lie along them.
+"""Grid-plane intersection digitisation of curves.
 
 The method of Klette and Rosenfeld, *Digital Geometry* (2004), sections 2.3.5 and 11.1.1: a curve
 is drawn with the voxel centres nearest to where it crosses the mid-planes x_a = i + 1/2, the
@@ -9,11 +9,11 @@ crossing lies on a face of such a cell and is given the nearest of the face's co
 sqrt(1/2) away. Between two consecutive crossings the curve stays in one closed cell, so that
 their voxels are two of its corners: equal or 26-adjacent.
 
-Crossings of all planes give more voxels than needed. Where one axis dominates, its planes alone
-do, and of a face's corners the one nearest to the *line* through the crossing is better than the
-one nearest to the point. Both are liberties: where they tear the sequence, they are taken back.
+Crossings of all planes yield more voxels than needed. Where one axis dominates, its planes alone
+will do, and of a face's corners the one nearest to the *tangent* at the crossing is better than the
+one nearest to the point. Where either tears the sequence, it is reverted.
 
-This module ends with connected events; thinning them is `thinning`.
+The result are connected events; `thinning` removes those that are not needed.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from voxdisplay.voxelization.plane_crossings import TIE_TOLERANCE, Crossings
 from voxdisplay.voxelization.root_finding import find_roots
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, Voxels, adjacent
 
-# Longest steps, in voxels, between which all crossings are looked for where the sequence gapes.
-# Below 1 a step passes at most one plane of an axis; each further try is a finer look.
+# Longest steps, in voxels, between which all crossings are searched for where the sequence has a
+# gap. Below 1 a step passes at most one plane of an axis; each further try is finer.
 STEP_LIMITS = (0.7, 0.35, 0.17, 0.08)
 # Gains this near to each other, in square voxels, are the same: which crossing comes first does not
 # count.
@@ -42,7 +42,7 @@ EIGHTHS = np.linspace(0.0, 1.0, 9)
 
 @np.errstate(under="ignore")
 def trace_curves(batch: CurveBatch, crossings: Crossings, samples: Samples) -> VoxelEvents:
-    """Follow curves through the mid-planes.
+    """Return the connected voxel events of curves.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def trace_curves(batch: CurveBatch, crossings: Crossings, samples: Samples) -> V
 
 @np.errstate(under="ignore")
 def trace_all_planes(batch: CurveBatch, samples: Samples) -> VoxelEvents:
-    """Follow curves through all mid-planes they pass between samples: as `trace`, but slowly.
+    """Return the events of all mid-planes that curves cross: as `trace_curves`, but slower.
 
-    Where a curve wriggles across its own way, the axis that changes most hides the others.
+    Where a curve oscillates across its own direction, the dominant axis hides the others.
     """
     samples = limit_chords(batch, samples, STEP_LIMITS[0])
     piece, t, voxels = _all_crossings(batch, samples)
@@ -79,7 +79,7 @@ def trace_all_planes(batch: CurveBatch, samples: Samples) -> VoxelEvents:
 
 
 def _with_ends(crossings: Crossings, samples: Samples) -> Crossings:
-    """Put the voxels of each piece's first and last point around its crossings."""
+    """Return crossings with the voxels of each piece's first and last point around them."""
     inner, bounds = crossings.events, samples.bounds
     ends = bounds.repeat(2)[1:-1]
     ends[1::2] -= 1
@@ -99,7 +99,7 @@ def _with_ends(crossings: Crossings, samples: Samples) -> Crossings:
 
 @with_kernel
 def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
-    """Prefer the better corners where neighbours stay neighbours; ends of pieces are added."""
+    """Return events at the better corners where they stay adjacent, with the ends of pieces."""
     crossings = _with_ends(crossings, samples)
     events, better, gain = crossings.events, crossings.better, crossings.gain
     nearest = events.voxels
@@ -124,7 +124,7 @@ def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
 
 
 def _bridge_gaps(batch: CurveBatch, events: VoxelEvents, curve: Ints) -> VoxelEvents:
-    """Fill in the crossings of all planes where consecutive voxels are not neighbours."""
+    """Insert the crossings of all planes where consecutive voxels are not adjacent."""
     for look in STEP_LIMITS:
         gaps = events.gaps()
         if not gaps.size:
@@ -144,7 +144,7 @@ def _bridge_gaps(batch: CurveBatch, events: VoxelEvents, curve: Ints) -> VoxelEv
 def _samples_between(
     batch: CurveBatch, events: VoxelEvents, gaps: Ints, curve: Ints, longest: float
 ) -> Samples:
-    """Sample the curves from event k to k + 1 for each k in ``gaps``; a "piece" is one gap."""
+    """Return samples from event k to k + 1 for each k in ``gaps``; a piece is one gap."""
     begin, end = events.t[gaps, None], events.t[gaps + 1, None]
     t = ((1 - EIGHTHS) * begin + EIGHTHS * end).ravel()
     gap = np.arange(gaps.size).repeat(EIGHTHS.size)
@@ -154,7 +154,7 @@ def _samples_between(
 
 
 def _all_crossings(batch: CurveBatch, samples: Samples) -> tuple[Ints, Floats, Voxels]:
-    """Find the crossings of mid-planes of all axes, in order: piece, t and nearest voxel."""
+    """Return the crossings of all mid-planes, in order: piece, t and nearest voxel."""
     cells = np.floor(samples.points - 0.5)
     passed = np.abs(cells[:, 1:] - cells[:, :-1]) == 1
     step, axis = (passed & samples.joined).T.nonzero()
@@ -174,7 +174,7 @@ def _all_crossings(batch: CurveBatch, samples: Samples) -> tuple[Ints, Floats, V
 def _insert_voxels(
     events: VoxelEvents, gaps: Ints, gap: Ints, t: Floats, voxels: Voxels
 ) -> VoxelEvents:
-    """Insert voxels into gaps: ``gap`` says into which."""
+    """Insert voxels into gaps; ``gap`` is the index of the gap of each."""
     at = gaps[gap]
     other = VoxelEvents(events.piece[at], t, voxels, np.full(t.size, NO_HEADING))
     return events.insert(at + 1, other)

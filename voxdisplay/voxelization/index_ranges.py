@@ -15,14 +15,14 @@ Arrays = tuple[NDArray[Any], ...]
 
 
 def expand_ranges(low: Ints, count: Ints) -> Ints:
-    """Write out ranges: low, low + 1, ... ``count`` numbers for each."""
+    """Return the numbers of ranges: low, low + 1, ... ``count`` of them for each."""
     end: Ints = count.cumsum()
     total = int(end[-1]) if end.size else 0
     return np.asarray((low - (end - count)).repeat(count) + np.arange(total))
 
 
 def split_blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
-    """Cut [0, stop) into blocks of about ``size``.
+    """Yield blocks [begin, end) of about ``size`` that make up [0, stop).
 
     Cuts are made at ``starts``, where curves begin, and at multiples of ``size`` from there, so
     that a curve is cut in the same places whatever comes before it.
@@ -38,7 +38,7 @@ def split_blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]
 
 @with_kernel
 def insert_columns(at: Ints, arrays: Arrays, fresh: Arrays) -> Arrays:
-    """Put columns between those of arrays, (M,) or (3, M): before the ones ``at``, ascending."""
+    """Insert columns into arrays, (M,) or (3, M), before those at the ascending indices ``at``."""
     size = arrays[0].shape[-1]
     old = np.ones(size + at.size, dtype=bool)
     new = at + np.arange(at.size)

@@ -1,10 +1,9 @@
-"""Closing loops: where a closed sequence meets itself at its first voxel.
+"""Closing of small loops at their first voxel.
 
-Thinned as if it were open, a closed curve gives a sequence that begins and ends with the voxel of
-its first point S. That voxel must stay, but nothing says it suits its neighbours: often the ones
-before and after it touch. Then the loop is led through it by a small detour, found by trying all.
-Everything here is local to the seam and works on one curve; what decides is where the curve is,
-given as points, and no curve is known.
+A closed curve without a long straight run (see `seams`) is thinned as if it were open, from the
+voxel of its first point S to the same voxel. Often the voxels before and after it are adjacent, a
+chord. Then the loop is led through S by a small detour, found by exhaustive search. All of this is
+local to S and works on one curve, given as points: this module must not know curves.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ SAMPLES_PER_VOXEL = 16
 
 
 def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: float) -> VoxelEvents:
-    """Make a closed sequence of one that returns to its first voxel.
+    """Return a closed sequence made of one that returns to its first voxel.
 
     Parameters
     ----------
@@ -44,8 +43,8 @@ def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: flo
     -------
     Events
         The first voxel is the same; the last is a neighbour of it. No two voxels near the seam
-        are neighbours but consecutive ones, or else there is no way to have it so with voxels
-        that are near the curve, and the curve near them.
+        are neighbours but consecutive ones, unless that is impossible with voxels near the
+        curve that cover it.
 
     """
     size = loop.t.size
@@ -54,12 +53,12 @@ def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: flo
         loop = loop.take(np.arange(size))
     if size < 5 or not _touches_at_seam(loop.voxels):
         return loop
-    ring = _thin_across(loop)
-    return _lead_through(ring, loop, position, end) or loop
+    ring = _cut_across(loop)
+    return _reroute(ring, loop, position, end) or loop
 
 
 def _touches_at_seam(voxels: NDArray[np.int32]) -> bool:
-    """Tell whether a closed sequence, (3, n), has a chord across its seam."""
+    """Return whether a closed sequence, (3, n), has a chord across its seam."""
     size = voxels.shape[1]
     reach = min(WINDOW - 1, size - 1)
     around = np.arange(-reach, reach + 1)
@@ -73,8 +72,8 @@ def _touches_at_seam(voxels: NDArray[np.int32]) -> bool:
     return bool((touch & across).any())
 
 
-def _thin_across(loop: VoxelEvents) -> VoxelEvents:
-    """Take the short cut across the seam, the first there is. It skips the first voxel."""
+def _cut_across(loop: VoxelEvents) -> VoxelEvents:
+    """Take the first shortcut across the seam. It skips the first voxel."""
     size = loop.t.size
     reach = min(WINDOW, (size - 1) // 2)
     around = np.arange(-reach, reach + 1) % size
@@ -87,10 +86,10 @@ def _thin_across(loop: VoxelEvents) -> VoxelEvents:
     return loop.take(np.delete(np.arange(size), skipped))
 
 
-def _lead_through(
+def _reroute(
     ring: VoxelEvents, loop: VoxelEvents, position: Callable[[Floats], Floats], end: float
 ) -> VoxelEvents | None:
-    """Lead a ring through the first voxel of ``loop``, without chords; None if there is no way."""
+    """Return a ring led through the first voxel of ``loop`` without chords; None if impossible."""
     size = ring.t.size
     if size == loop.t.size:
         return None  # a chord, but what is between its ends goes its own way
@@ -129,7 +128,7 @@ def _best_detour(
     points: Floats,
     square: dict[Voxel, float],
 ) -> tuple[list[Voxel], int, list[Voxel], int] | None:
-    """Choose ways from ``start`` to both sides of a ring, as near to the curve as can be.
+    """Return the paths from ``start`` to both sides of a ring that lie nearest to the curve.
 
     Returns
     -------
@@ -137,11 +136,11 @@ def _best_detour(
         Over the voxels ``out`` to ``after[j]``, over ``back`` to ``before[i]``.
 
     """
-    near_by = [voxel for voxel, far in square.items() if far <= 0.5]
+    candidates = [voxel for voxel, far in square.items() if far <= 0.5]
     best, least = None, np.inf
     for (out, j), (back, i) in product(
-        list(_chordless_paths(start, after, near_by)),
-        list(_chordless_paths(start, before, near_by)),
+        list(_chordless_paths(start, after, candidates)),
+        list(_chordless_paths(start, before, candidates)),
     ):
         touching = (
             any(_adjacent(a, b) for a in [*out, after[j]] for b in [*back, before[i]])
@@ -156,41 +155,41 @@ def _best_detour(
 
 
 def _chordless_paths(
-    start: Voxel, side: list[Voxel], near_by: list[Voxel]
+    start: Voxel, side: list[Voxel], candidates: list[Voxel]
 ) -> Iterator[tuple[list[Voxel], int]]:
-    """List chordless paths from ``start`` over at most ``MAX_DETOUR`` voxels to a side of the ring.
+    """Yield chordless paths from ``start`` over at most ``MAX_DETOUR`` voxels to a ring's side.
 
     Yields
     ------
-    way : list of voxels
+    path : list of voxels
         Those in between, none of them on the rest of the side.
     index : int
-        Where on ``side`` the way goes on.
+        The voxel of ``side`` at which the path arrives.
 
     """
 
-    def extend(way: list[Voxel]) -> Iterator[tuple[list[Voxel], int]]:
-        tip = way[-1]
+    def extend(path: list[Voxel]) -> Iterator[tuple[list[Voxel], int]]:
+        tip = path[-1]
         touched = [j for j, voxel in enumerate(side) if _adjacent(tip, voxel)]
         if touched:
             # The furthest it touches is where it must join: any other would leave a chord.
             join = touched[-1]
             if not any(
-                _adjacent(voxel, side[k]) for voxel in way[:-1] for k in range(join, len(side))
+                _adjacent(voxel, side[k]) for voxel in path[:-1] for k in range(join, len(side))
             ):
-                yield way[1:], join
-        if len(way) > MAX_DETOUR:
+                yield path[1:], join
+        if len(path) > MAX_DETOUR:
             return
-        for voxel in near_by:
-            free = voxel != tip and not any(_adjacent(other, voxel) for other in way[:-1])
+        for voxel in candidates:
+            free = voxel != tip and not any(_adjacent(other, voxel) for other in path[:-1])
             if free and _adjacent(tip, voxel):
-                yield from extend([*way, voxel])
+                yield from extend([*path, voxel])
 
     yield from extend([start])
 
 
 def _square_distances(points: Floats, known: set[Voxel]) -> dict[Voxel, float]:
-    """Give the squared distance from points, (3, n), of the voxels around them, in a fixed order.
+    """Return the squared distances of the voxels around points, (3, n), in a fixed order.
 
     At most a little too large, for the points stand for a curve.
     """
@@ -203,7 +202,7 @@ def _square_distances(points: Floats, known: set[Voxel]) -> dict[Voxel, float]:
 
 
 def _covered(points: Floats, voxels: list[Voxel]) -> bool:
-    """Tell whether all points, (3, n), are within ``MAX_UNCOVERED`` of a voxel."""
+    """Return whether all points, (3, n), are within ``MAX_UNCOVERED`` of a voxel."""
     centres = np.array(voxels, dtype=float).T + 0.5
     apart = centres[:, :, None] - points[:, None, :]
     return bool(((apart * apart).sum(axis=0).min(axis=0) <= MAX_UNCOVERED * MAX_UNCOVERED).all())

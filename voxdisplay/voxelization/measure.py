@@ -1,7 +1,7 @@
-"""The judge of a list of voxels: is it connected, and how far is it from its curve.
+"""Independent measurement of voxel lists: gaps, contacts, distances from a curve, coverage.
 
-Takes any (N, 3) array, wherever it comes from. It must not know how voxels are chosen and shares
-no code with the methods it judges: curves are sampled here anew, by bisection.
+Any (N, 3) array will do. This module must not know how voxels are chosen and shares no code with
+the methods it judges: curves are sampled here anew, by bisection.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ GOLDEN = (5**0.5 - 1) / 2
 
 
 def gaps(voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None) -> Ints:
-    """Find where a sequence is torn.
+    """Return where consecutive voxels of a sequence are not adjacent.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def gaps(voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None) 
 
 
 def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
-    """List where a sequence touches itself.
+    """Return the pairs of voxels at which a sequence touches itself.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
 
 
 def count_contacts(voxels: Voxels, *, closed: bool = False) -> int:
-    """Count the pairs that `contacts` would list, without listing them."""
+    """Return the number of pairs that `contacts` would list."""
     total = 0
     cells = SpatialHash(voxels.T)
     for offset in COLUMNS[:5]:
@@ -101,7 +101,7 @@ def count_contacts(voxels: Voxels, *, closed: bool = False) -> int:
 def neighbour_violations(
     voxels: Voxels, *, closed: bool = False, starts: Voxels | None = None
 ) -> Ints:
-    """Find the voxels that break the two-neighbour rule.
+    """Return the voxels that break the two-neighbour rule.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def neighbour_violations(
 
 
 def _joins_next(size: int, closed: bool, starts: Voxels | None) -> Bools:
-    """Tell after which voxels, (N,), the next one must follow: the first after the last."""
+    """Return after which voxels, (N,), the next one must follow: the first after the last."""
     joint = np.ones(size, dtype=bool)
     if size:
         joint[-1] = closed and size > 1
@@ -136,13 +136,13 @@ def _joins_next(size: int, closed: bool, starts: Voxels | None) -> Bools:
 
 
 def _adjacent_to_next(voxels: Voxels) -> Bools:
-    """Tell which voxels are near the next one, the first after the last."""
+    """Return which voxels are adjacent to the next one, the last to the first."""
     wide = voxels.astype(np.int64)
     return np.asarray((np.abs(np.roll(wide, -1, axis=0) - wide) <= 1).all(axis=1))
 
 
 def _adjacent_pairs(voxels: Voxels) -> Ints:
-    """List all pairs i < j of 26-adjacent or equal voxels, (c, 2)."""
+    """Return all pairs i < j of 26-adjacent or equal voxels, (c, 2)."""
     cells = SpatialHash(voxels.T)
     found = []
     for offset in COLUMNS[:5]:
@@ -154,7 +154,7 @@ def _adjacent_pairs(voxels: Voxels) -> Ints:
 
 
 def _later(cells: SpatialHash, voxels: Voxels, offset: tuple[int, int]) -> tuple[Ints, Ints]:
-    """Look up the neighbours in a column; in a voxel's own column only those sorted after it."""
+    """Return the neighbours in a column; in a voxel's own column those sorted after it."""
     low, high = cells.column_ranges(voxels[cells.order].T, offset)
     if offset == (0, 0):
         low = np.arange(1, len(voxels) + 1)
@@ -167,7 +167,7 @@ def _later(cells: SpatialHash, voxels: Voxels, offset: tuple[int, int]) -> tuple
 @np.errstate(all="ignore")
 @np.errstate(under="ignore")
 def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> Floats:
-    """Measure how far voxel centres are from a curve.
+    """Return the distances of voxel centres from a curve.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ class _Boxes:
         self.largest = float(self._radius.max(initial=0.0))
 
     def candidates(self, centres: Floats, of: Ints, box: Ints) -> Iterator[tuple[Ints, Ints]]:
-        """Pair voxels with the segments among which their nearest ones are.
+        """Yield voxels with the segments among which their nearest ones are.
 
         Parameters
         ----------
@@ -271,7 +271,7 @@ class _Boxes:
 
 @np.errstate(under="ignore")
 def coverage(voxels: Voxels, curve: Curve) -> float:
-    """Measure how far a curve gets away from the voxels that should show it.
+    """Return the largest distance of a curve from the voxels that show it.
 
     Parameters
     ----------
@@ -307,14 +307,14 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
 
 
 def _sag_budget(voxels: Voxels) -> int:
-    """Return how many samples of a curve may be spent on its bends between voxels this many."""
+    """Return how many samples may be spent on the bends of a curve with these voxels."""
     return MIN_SAG_SAMPLES + SAG_SAMPLES_PER_VOXEL * len(voxels)
 
 
 def _polyline(
     curve: Curve, budget: int, hints: Floats | None = None
 ) -> tuple[Floats, Floats, Bools]:
-    """Sample a curve finely, and at any hints.
+    """Return fine samples of a curve, and those at any hints.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def _position(curve: Curve, t: Floats) -> Floats:
 
 
 def _segment_distances(point: Floats, begin: Floats, end: Floats) -> Floats:
-    """Distances, (n,), of points from segments, (3, n) each."""
+    """Return the distances, (n,), of points from segments, (3, n) each."""
     along, apart = end - begin, point - begin
     length = np.maximum((along * along).sum(axis=0), np.finfo(float).tiny)
     share = np.clip((apart * along).sum(axis=0) / length, 0.0, 1.0)
@@ -385,7 +385,7 @@ def _segment_distances(point: Floats, begin: Floats, end: Floats) -> Floats:
 
 
 def _arc_distances(curve: Curve, point: Floats, low: Floats, high: Floats) -> Floats:
-    """Least distances, (n,), of points (3, n) from P(t), low <= t <= high, one arc for each."""
+    """Return the distances, (n,), of points, (3, n), from arcs P(t), low <= t <= high."""
 
     def square(t: Floats) -> Floats:
         apart = _position(curve, t) - point
@@ -415,6 +415,6 @@ def _arc_distances(curve: Curve, point: Floats, low: Floats, high: Floats) -> Fl
 
 
 def _group_minima(group: Ints, values: Floats) -> tuple[Ints, Floats]:
-    """Give the groups there are, of an ascending list (n,), and the least value of each."""
+    """Return the distinct groups of an ascending list, (n,), and the least value of each."""
     first = np.flatnonzero(np.diff(group, prepend=-1))
     return group[first], np.minimum.reduceat(values, first) if first.size else values

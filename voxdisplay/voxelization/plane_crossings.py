@@ -1,8 +1,7 @@
-"""Where curves pass the mid-planes of their dominant axis, and with which voxels to draw that.
+"""Crossings of curves with the mid-planes of their dominant axis, and the voxels at them.
 
-The bulk of the work is done here, in blocks, a constant number of array operations each. Nothing
-in this module looks at two crossings at once: whether the voxels hang together is
-``grid_plane.py``'s business.
+Most of the computing time is spent here, in blocks, a constant number of array operations each.
+Nothing in this module compares two crossings: `grid_plane` keeps their voxels connected.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ from voxdisplay.voxelization.index_ranges import expand_ranges, split_blocks
 from voxdisplay.voxelization.root_finding import TOLERANCE, find_roots
 from voxdisplay.voxelization.voxel_events import VoxelEvents, Voxels
 
-# Knot intervals handled at once: enough to forget what a call costs, few enough for what is
-# computed per crossing to stay in cache.
+# Steps handled at once: enough to make the cost of a call negligible, few enough for the arrays to
+# stay in cache.
 BLOCK = 1 << 15
-# So many blocks are worth threads.
+# With so many blocks threads pay.
 MIN_PARALLEL_BLOCKS = 8
-# So much nearer (in voxels) or longer (relatively) counts as equal. Ties are not to be decided by
-# the last bit, or lines along edges and diagonals waver.
+# So much nearer (in voxels) or longer (relatively) counts as equal. Ties must not be decided by the
+# last bit, or lines along edges and diagonals waver.
 TIE_TOLERANCE = 1e-10
 # A corner must be better by this much, in square voxels, to be preferred to the nearest one.
 MIN_GAIN = 1e-8
@@ -41,10 +40,10 @@ Ends = tuple[Floats, Floats]
 
 @dataclass(frozen=True, slots=True)
 class Crossings:
-    """Crossings of dominant mid-planes: ``events`` hold the nearest corners, ``better`` others.
+    """Crossings of dominant mid-planes: nearest corners in ``events``, others in ``better``.
 
-    ``gain`` (M,) says by how much, in square voxels, the corner in ``better`` (3, M) is nearer to
-    the tangent; infinite where there is no better one.
+    ``gain``, (M,), is by how much, in square voxels, the corner in ``better``, (3, M), is nearer
+    to the tangent; infinite where there is no better one.
     """
 
     events: VoxelEvents
@@ -60,9 +59,9 @@ class Slopes(NamedTuple):
 
 
 class CrossingGuesses(NamedTuple):
-    """Where curves should cross the planes of the axis that changes most, one entry per plane."""
+    """Estimated crossings of the planes of the dominant axis, one entry per plane."""
 
-    knot: Ints  # the last before it
+    sample: Ints  # the last before it
     axis: NDArray[np.int8]
     descends: NDArray[np.bool_]
     level: Floats  # of the plane: i + 1/2
@@ -71,7 +70,7 @@ class CrossingGuesses(NamedTuple):
 
 
 class CornerChoices(NamedTuple):
-    """Corners of the faces crossed, as the voxels they are the centres of: see `corners`."""
+    """Corners of the faces crossed, as voxels: see `rank_corners`."""
 
     nearest: Voxels
     better: Voxels
@@ -80,9 +79,9 @@ class CornerChoices(NamedTuple):
 
 
 def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
-    """Find all crossings between samples, along curves, of planes of the axis that changes most.
+    """Return all crossings, between samples, of planes of the dominant axis.
 
-    Their events are connected only where one axis goes on to dominate.
+    Their events are connected only where one axis stays dominant.
     """
     slopes = _slopes_between_corners(batch, samples)
 
@@ -114,7 +113,7 @@ def dominant_crossings(batch: CurveBatch, samples: Samples) -> Crossings:
 
 
 def _slopes_between_corners(batch: CurveBatch, samples: Samples) -> Slopes:
-    """Estimate dP/dt after and before each sample: the same but where a curve turns sharply."""
+    """Estimate dP/dt before and after each sample: different at corners only."""
     corners = batch.corners(samples)
     if not corners.size:
         slopes = slopes_at(samples)
@@ -136,7 +135,7 @@ def _slopes_between_corners(batch: CurveBatch, samples: Samples) -> Slopes:
 @with_kernel
 @np.errstate(all="ignore")
 def slopes_at(samples: Samples) -> Floats:
-    """Estimate dP/dt at the samples, (3, K), from parabolas through three of them."""
+    """Return estimates of dP/dt at the samples, (3, K), from parabolas through three of them."""
     joined = samples.joined
     h = np.where(joined, samples.t[1:] - samples.t[:-1], 1.0)
     slopes = np.zeros_like(samples.points)
@@ -160,7 +159,7 @@ def slopes_at(samples: Samples) -> Floats:
 @with_kernel
 @np.errstate(all="ignore")
 def guess_crossings(samples: Samples, slopes: Slopes, low: int, high: int) -> CrossingGuesses:
-    """Guess, by cubics, where the steps from samples low..high-1 cross their dominant planes."""
+    """Estimate, by cubics, where the steps from samples low..high-1 cross dominant planes."""
     stop = min(high + 1, samples.t.size)
     points = samples.points[:, low:stop]
     cells = np.floor(points - 0.5)
@@ -196,22 +195,22 @@ def guess_crossings(samples: Samples, slopes: Slopes, low: int, high: int) -> Cr
     u = (level - begin[of]) / length[of]
     rest = 1.0 - u
     tau = u * (u * (3 - 2 * u) + rest * (m_left[of] * rest - m_right[of] * u))
-    knot = left[of]
-    t_left = samples.t[knot]
-    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), samples.t[knot + 1])
-    return CrossingGuesses(knot, axis[of], passed[of] < 0, level, tau, t)
+    sample = left[of]
+    t_left = samples.t[sample]
+    t = np.minimum(np.maximum(t_left + tau * h[of], t_left), samples.t[sample + 1])
+    return CrossingGuesses(sample, axis[of], passed[of] < 0, level, tau, t)
 
 
 def _block_crossings(
-    batch: CurveBatch, samples: Samples, slopes: Slopes, aims: CrossingGuesses
+    batch: CurveBatch, samples: Samples, slopes: Slopes, guesses: CrossingGuesses
 ) -> Crossings:
-    aims, points = _refine_crossings(batch, samples, aims)
-    piece, t = samples.piece[aims.knot], aims.t
+    guesses, points = _refine_crossings(batch, samples, guesses)
+    piece, t = samples.piece[guesses.sample], guesses.t
     curve = samples.curve[piece]
-    nearest, better, gain, foot = rank_corners(samples, slopes, aims, points)
+    nearest, better, gain, foot = rank_corners(samples, slopes, guesses, points)
     check = np.isfinite(foot).nonzero()[0]
     if check.size:  # at the foot of the perpendicular the curve must be near enough
-        left = aims.knot[check]
+        left = guesses.sample[check]
         t_foot = np.clip(
             t[check] + foot[check] * (samples.t[left + 1] - samples.t[left]),
             batch.first[curve[check]],
@@ -221,56 +220,64 @@ def _block_crossings(
         far = check[(apart * apart).sum(axis=0) > 0.5]
         gain[far] = np.inf
 
-    heading = (2 * aims.axis + aims.descends).astype(np.int8)
+    heading = (2 * guesses.axis + guesses.descends).astype(np.int8)
     return Crossings(VoxelEvents(piece.astype(np.int32), t, nearest, heading), better, gain)
 
 
 def _refine_crossings(
-    batch: CurveBatch, samples: Samples, aims: CrossingGuesses
+    batch: CurveBatch, samples: Samples, guesses: CrossingGuesses
 ) -> tuple[CrossingGuesses, Floats]:
-    """Find where planes are crossed, and the points there, but not those that are jumped over."""
-    curve = samples.curve[samples.piece[aims.knot]]
-    points = batch.evaluate(curve, aims.t)
-    miss = _select_axis(points, aims.axis) - aims.level
-    off = (np.abs(miss) > TOLERANCE).nonzero()[0]
+    """Return refined crossings and their points, without planes that are jumped over."""
+    curve = samples.curve[samples.piece[guesses.sample]]
+    points = batch.evaluate(curve, guesses.t)
+    residual = _select_axis(points, guesses.axis) - guesses.level
+    off = (np.abs(residual) > TOLERANCE).nonzero()[0]
     if not off.size:
-        return aims, points
-    bracket, ends = _brackets(samples, aims, miss, off)
-    axis = aims.axis[off].astype(np.int64)
-    aims.t[off], points[:, off], found = find_roots(
-        batch, curve[off], axis, aims.level[off], bracket, ends
+        return guesses, points
+    bracket, ends = _brackets(samples, guesses, residual, off)
+    axis = guesses.axis[off].astype(np.int64)
+    guesses.t[off], points[:, off], found = find_roots(
+        batch, curve[off], axis, guesses.level[off], bracket, ends
     )
     hit = off[found]
-    left = aims.knot[hit]
-    aims.tau[hit] = (aims.t[hit] - samples.t[left]) / (samples.t[left + 1] - samples.t[left])
+    left = guesses.sample[hit]
+    guesses.tau[hit] = (guesses.t[hit] - samples.t[left]) / (samples.t[left + 1] - samples.t[left])
     if found.all():
-        return aims, points
-    kept = np.ones(aims.t.size, dtype=bool)
+        return guesses, points
+    kept = np.ones(guesses.t.size, dtype=bool)
     kept[off] = found
-    return CrossingGuesses._make(each[kept] for each in aims), points[:, kept]
+    return CrossingGuesses._make(each[kept] for each in guesses), points[:, kept]
 
 
 def _brackets(
-    samples: Samples, aims: CrossingGuesses, miss: Floats, off: Ints
+    samples: Samples, guesses: CrossingGuesses, residual: Floats, off: Ints
 ) -> tuple[Ends, Ends]:
-    """Narrow steps, by guesses that are off by ``miss``, to where the crossings are."""
-    left, axis, t, level = aims.knot[off], aims.axis[off], aims.t[off], aims.level[off]
+    """Return brackets of the crossings, from steps and guesses that are off by ``residual``."""
+    left, axis, t, level = (
+        guesses.sample[off],
+        guesses.axis[off],
+        guesses.t[off],
+        guesses.level[off],
+    )
     begin = _select_axis(samples.points[:, left], axis)
     length = _select_axis(samples.points[:, left + 1], axis) - begin
     h = samples.t[left + 1] - samples.t[left]
     low, high = samples.t[left], samples.t[left] + h
     at_low, at_high = begin - level, begin + length - level
-    after = (miss[off] < 0) == (at_low < 0)  # the crossing comes after the guess
+    after = (residual[off] < 0) == (at_low < 0)  # the crossing comes after the guess
     bracket = np.where(after, t, low), np.where(after, high, t)
-    return bracket, (np.where(after, miss[off], at_low), np.where(after, at_high, miss[off]))
+    return bracket, (
+        np.where(after, residual[off], at_low),
+        np.where(after, at_high, residual[off]),
+    )
 
 
 @with_kernel
 @np.errstate(all="ignore")
 def rank_corners(
-    samples: Samples, slopes: Slopes, aims: CrossingGuesses, points: Floats
+    samples: Samples, slopes: Slopes, guesses: CrossingGuesses, points: Floats
 ) -> CornerChoices:
-    """Look for the corners of the crossed faces that are nearest to the tangents.
+    """Return the corners of the crossed faces that are nearest to the points and the tangents.
 
     For a line, and up to the second order for a curve, that is the best voxel among all with
     this coordinate on the dominant axis.
@@ -281,7 +288,7 @@ def rank_corners(
         Along the curves.
     slopes : Slopes
         At the samples.
-    aims : Aims
+    guesses : Aims
         Which planes are crossed, where.
     points : (3, n) float64 array
         The crossings.
@@ -298,7 +305,7 @@ def rank_corners(
         the perpendicular along the tangent, in steps between samples. Infinite elsewhere.
 
     """
-    left, axis, tau = aims.knot, aims.axis, aims.tau
+    left, axis, tau = guesses.sample, guesses.axis, guesses.tau
     h = samples.t[left + 1] - samples.t[left]
     tangent = slopes.leaving.take(left, axis=1) * h  # per step, not per t
     after = slopes.arriving.take(left + 1, axis=1) * h
@@ -308,14 +315,14 @@ def rank_corners(
     along = tangent / length
     # The curve is found near the plane, and followed to the plane itself along its tangent.
     at = axis * np.int64(axis.size) + np.arange(axis.size)  # of flat rows
-    off_plane = (points.take(at) - aims.level) / along.take(at)
+    off_plane = (points.take(at) - guesses.level) / along.take(at)
     lost = ~(np.abs(off_plane) < MAX_PROJECTION)
     if lost.any():
         off_plane[lost] = 0.0
         along[:, lost & ~np.isfinite(along).all(axis=0)] = 0.0
     on_plane = points - off_plane * along
     nearest = np.floor(on_plane + TIE_TOLERANCE)
-    plane = aims.level - 0.5
+    plane = guesses.level - 0.5
     nearest.reshape(-1)[at] = plane
     apart = nearest + 0.5 - on_plane
     project = (apart * along).sum(axis=0)
@@ -358,10 +365,10 @@ def rank_corners(
 
 
 def _other_axes(rows: Floats, axis: NDArray[np.int8]) -> tuple[Floats, Floats]:
-    """Pick from three rows, (3, n), the two that are not named by ``axis`` (n,), in order."""
+    """Return the two of three rows, (3, n), other than ``axis``, (n,), in order."""
     return np.where(axis == 0, rows[1], rows[0]), np.where(axis == 2, rows[1], rows[2])
 
 
 def _select_axis(rows: Floats, axis: NDArray[np.int8]) -> Floats:
-    """Pick from three rows, (3, n), the one named by ``axis`` (n,)."""
+    """Return of three rows, (3, n), the one of ``axis``, (n,)."""
     return np.asarray(np.where(axis == 0, rows[0], np.where(axis == 1, rows[1], rows[2])))

@@ -1,8 +1,8 @@
-"""Taking thinning back where it took too much: from a sequence that is not proven to one that is.
+"""Restoration of voxels that thinning removed but the proof needs.
 
-Thinning sees voxels only, and may cut off, by several short cuts in a row or across the seam of a
-closed curve, what no voxel left is near to. There the voxels it started from are put back; they
-have chords, but show all. Knows events and boxes; whether it helped is for `certify` to find out.
+Several shortcuts in a row, or one across the seam of a closed curve, may cut off a part of the
+curve to which no remaining voxel is near. There the voxels before thinning are put back; they have
+chords, but cover the curve. This module knows events and boxes; `certify` checks the result.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def restore_coverage(
     *,
     closed: bool,
 ) -> VoxelEvents:
-    """Put voxels back where boxes are too far from any.
+    """Return thinned events with voxels put back where boxes are too far from any.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Where the coordinates of curves take given values.
+"""Bracketed root finding for coordinates of curves, many brackets at once.
 
-Root finding for many brackets at once. What the values mean is not known here.
+This module must not know what the values are that coordinates are to take.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def find_roots(
     bracket: tuple[Floats, Floats],
     ends: tuple[Floats, Floats],
 ) -> tuple[Floats, Floats, Bools]:
-    """Find where coordinates take given values, by bracketed secants (the Illinois rule).
+    """Return where coordinates take given values, by bracketed secants (the Illinois rule).
 
     Parameters
     ----------

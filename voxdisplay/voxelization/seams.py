@@ -29,7 +29,7 @@ NEAR_START = 3
 def move_seams(
     batch: CurveBatch, crossings: Crossings, samples: Samples, closed: list[bool]
 ) -> tuple[Crossings, Samples, list[bool]]:
-    """Let closed curves begin in the middle of their longest runs.
+    """Return crossings and samples of which closed curves begin amid their longest runs.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def move_seams(
 
 
 def _seams(crossings: Crossings, piece: Ints) -> Ints:
-    """Find a crossing in the middle of the longest run of each piece; -1 if there is no long one.
+    """Return a crossing in the middle of the longest run of each piece; -1 if none is long.
 
     Of those near the middle, one that has no better corner than the nearest: both of its copies
     will have the same voxel.

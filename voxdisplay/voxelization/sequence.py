@@ -1,6 +1,6 @@
-"""What comes out: an ordered list of voxels along a curve, and what can be said of it.
+"""Voxel sequences, and reports of their quality.
 
-A sequence is a value. It knows no colour and no display; ``clip`` is told a display's shape.
+A sequence is a value. It must not know colours or displays; ``clip`` takes the shape of one.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from voxdisplay.voxelization.certify import END_ERROR, Certificate
 
 @dataclass(frozen=True)
 class Report:
-    """How good a sequence is.
+    """Quality figures of a sequence.
 
     Attributes
     ----------
     voxels : int
-        How many there are.
+        Number of voxels.
     closed : bool
         Whether the last is followed by the first.
     pieces : int
@@ -38,7 +38,7 @@ class Report:
     contacts : int
         Pairs i < j, j - i > 1 (cyclically if closed), of equal or 26-adjacent voxels.
     seconds : float
-        What it took to find the voxels (a share by voxels, where many curves were done at once).
+        Time spent on the voxels (a share by voxels, where many curves were done at once).
     certified : bool
         Whether it is proven that voxels are within 0.7072 of the curve (the first and the last
         within 0.8661), and all of the curve, however narrow a feature, within 2.5 in max norm of
@@ -96,9 +96,9 @@ class Sequence:
     curve : Curve
         What the voxels show.
     seconds : float
-        What it took to find them.
+        Time spent on them.
     proof : Certificate, str or None
-        What is proven of them; or why there is no proof, though one was asked for.
+        The proven bounds, or the reason why there is no proof, if one was asked for.
 
     """
 
@@ -165,7 +165,7 @@ class Sequence:
         """Distance of every voxel's centre from the curve, in voxels: (N,)."""
         apart = measure.distances(self.voxels, self.curve)
         lost = apart > END_ERROR
-        if lost.any():  # at features too narrow for who does not know where to look
+        if lost.any():  # at features that are too narrow to be found without a hint
             hints = self.t[lost]
             apart[lost] = measure.distances(self.voxels[lost], self.curve, hints=hints)
         return apart
@@ -182,12 +182,12 @@ class Sequence:
 
     @cached_property
     def contact_pairs(self) -> NDArray[np.int64]:
-        """Where the sequence touches itself, as index pairs: see `measure.contacts`."""
+        """Index pairs at which the sequence touches itself: see `measure.contacts`."""
         return measure.contacts(self.voxels, closed=self.closed)
 
     @cached_property
     def report(self) -> Report:
-        """How good the sequence is. Found when first asked for: it can take longer than drawing."""
+        """Quality figures, computed when first asked for: that can take longer than drawing."""
         return Report(
             voxels=len(self),
             closed=self.closed,
@@ -204,7 +204,7 @@ class Sequence:
 
 
 def clip(sequence: Sequence, grid: tuple[int, int, int]) -> NDArray[np.int64]:
-    """Find the stretches of a sequence inside a grid.
+    """Return the stretches of a sequence inside a grid.
 
     Parameters
     ----------

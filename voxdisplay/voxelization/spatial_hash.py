@@ -1,6 +1,6 @@
-"""Finding what lies near what, among points in space, by hashing them into cubic cells.
+"""Spatial hash of points in cubic cells, for neighbourhood queries.
 
-This module knows points only: neither voxels nor curves.
+This module must not know voxels or curves.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from voxdisplay.compute.array_types import Ints
 from voxdisplay.voxelization.index_ranges import expand_ranges
 
-# Pairs that are worked on at once: what bounds the memory of a search.
+# Pairs worked on at once: this bounds the memory of a search.
 PAIRS_PER_BLOCK = 1 << 17
 
 # Offsets (dx, dy) of the columns of cells around a cell; the first five with no pair twice.
@@ -44,7 +44,7 @@ class SpatialHash:
     def column_ranges(
         self, cells: NDArray[np.integer], offset: tuple[int, int]
     ) -> tuple[Ints, Ints]:
-        """Find the items near cells, (3, n), in one column.
+        """Return the items near cells, (3, n), in one column.
 
         Returns
         -------
@@ -63,7 +63,7 @@ class SpatialHash:
         return np.where(known, low, 0), np.where(known, np.maximum(high, low), 0)
 
     def neighbours(self, cells: NDArray[np.integer]) -> Iterator[tuple[Ints, Ints]]:
-        """Pair cells, (3, n), with the items in the 27 cells around each.
+        """Yield cells, (3, n), with the items in the 27 cells around each.
 
         Yields
         ------

@@ -1,4 +1,4 @@
-"""The tangent march: voxel by voxel along a curve, by the paper's own method.
+"""Tangent march: the paper's own voxelisation method, for comparison.
 
 From a voxel, the signs of the curve's tangent give seven neighbours to go on to; the one nearest
 to the curve is taken, until the last point's voxel is reached. Kept for comparison: nothing is
@@ -47,7 +47,7 @@ MAX_LENGTH_RATIO = 4
 
 @dataclass(frozen=True, eq=False)
 class MarchTrace:
-    """A march, as the paper reports it.
+    """Voxels, parameters and distances of a march, as the paper reports them.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class MarchTrace:
     t : (N,) float64 array
         The parameter guessed for each voxel; where the march loses its way, not ascending.
     distances : (N,) float64 array
-        What the variant took for the distance from the curve, in voxels.
+        The variant's own estimate of the distance from the curve, in voxels.
 
     """
 
@@ -99,7 +99,7 @@ def follow(
     reach: float | None = None,
     guess: ParameterEstimate | None = None,
 ) -> MarchTrace:
-    """March along a curve.
+    """Return the march along a curve.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def follow(
 
 
 def search_steps(variant: int, pitch: float | None, reach: float | None) -> tuple[float, float]:
-    """Give pitch and reach of a variant's search, checked; defaults for those that are None."""
+    """Return checked pitch and reach of a variant's search; defaults for those that are None."""
     choice("variant", variant, tuple(PITCHES))
     pitch = PITCHES[variant] if pitch is None else number("pitch", pitch)
     reach = REACH if reach is None else number("reach", reach)
@@ -186,7 +186,7 @@ def search_steps(variant: int, pitch: float | None, reach: float | None) -> tupl
 
 
 class _MarchingCurve:
-    """How one march looks at its curve."""
+    """Positions, tangents and distance estimates of one curve for the march."""
 
     def __init__(
         self,
@@ -245,7 +245,7 @@ class _MarchingCurve:
         return np.asarray(t + along @ (points - here) / max(float(along @ along), 1e-300))
 
     def distances(self, voxels: Floats, t: Floats) -> Floats:
-        """Distances, (n,), of voxels (3, n) from the curve around parameters, (n,)."""
+        """Return the distances, (n,), of voxels, (3, n), from the curve around t, (n,)."""
         tests = t[:, None] + self._pitch * self._steps
         if not self._cylinder:
             tests = np.clip(tests, *self._curve.t_range)
@@ -266,7 +266,7 @@ class _MarchingCurve:
 
 
 def azimuth_estimate(t: Floats, points: Floats) -> ParameterEstimate | None:
-    """Give equation 11 for a curve x0 + R cos t, y0 + R sin t, z(t), if these points are on one."""
+    """Return equation 11 if these points are on a curve x0 + R cos t, y0 + R sin t, z(t)."""
     cosine, sine = np.cos(t), np.sin(t)
     one, none = np.ones(t.size), np.zeros(t.size)
     unknowns = np.concatenate((np.stack((one, none, cosine)), np.stack((none, one, sine))), axis=1)

@@ -1,8 +1,8 @@
-"""Thinning: from a connected list of voxels to one without short cuts.
+"""Thinning of connected voxel lists to chordless ones, by cheapest paths.
 
 A *chord* is a pair of neighbouring voxels that are not consecutive in the sequence; each one
-gives some voxel a third neighbour. Integer work on events, but for one look at where the curve
-is, as points: what turns back within two voxels, as a hairpin does, may not lose its far end.
+gives some voxel a third neighbour. This module knows events, and the curve as points: a hairpin,
+which turns back within two voxels, must not lose its far end.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.index_ranges import expand_ranges
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, adjacent
 
-# How many events ahead a chord is looked for. Longer ones belong to the curve: it comes back.
+# Events ahead that a shortcut may lead. Longer chords belong to the curve: it comes back.
 WINDOW = 12
 # Voxels compared with those after them at once.
 BLOCK = 1 << 12
-# How far from the voxels at both ends of a short cut samples of the curve may be between them, in
+# How far from the voxels at both ends of a shortcut samples of the curve may be between them, in
 # voxels. The curve itself is to be within 2.5: the rest is for how far it may be from its samples,
 # which is much more than `adaptive_sampling.MAX_SAG` at cusps.
 MAX_UNCOVERED = 2.0
@@ -37,7 +37,7 @@ TINY = float(np.finfo(float).tiny)
 
 
 def drop_repeats(events: VoxelEvents) -> VoxelEvents:
-    """Drop events whose voxel is that of the event before them in the piece."""
+    """Remove consecutive events of a piece that share a voxel."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
     return events.take(np.concatenate(([True], ~same))) if same.any() else events
 
@@ -93,9 +93,9 @@ def thin_events(
 
 
 def continues_run(events: VoxelEvents) -> NDArray[np.bool_]:
-    """Tell which events, (M,), are one step further than the last on the axis both head along.
+    """Return which events, (M,), are one step further than the last on the axis both head along.
 
-    Events that run on have no chord among them: they are as far apart as their indices are.
+    Events of a run have no chord among them: they are as far apart as their indices are.
     """
     heading, size = events.heading, events.t.size
     on = np.zeros(size, dtype=bool)
@@ -110,7 +110,7 @@ def continues_run(events: VoxelEvents) -> NDArray[np.bool_]:
 def _shortcuts(
     events: VoxelEvents, samples: Samples | None, *, keep_tips: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find all shortcuts, as indices of their ends, in ascending order of these."""
+    """Return all shortcuts, as indices of their ends, in ascending order of these."""
     size = events.t.size
     # Only near turns: between them the step i, i + 1 is all there is.
     turn = (~continues_run(events)).nonzero()[0]
@@ -242,7 +242,7 @@ def _squared_distances(events: VoxelEvents, samples: Samples, index: NDArray[np.
 def _skips_tip(
     events: VoxelEvents, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Tell which short cuts would take a tip and still leave a chord beside them."""
+    """Return which shortcuts would remove a tip and still leave a chord beside them."""
     voxels, size = events.voxels, events.t.size
     before, after = np.maximum(starts - 1, 0), np.minimum(stops + 1, size - 1)
     piece = events.piece
@@ -263,7 +263,7 @@ def _skips_tip(
 def _uncovers_curve(
     events: VoxelEvents, samples: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Tell which short cuts leave a point of the curve out of ``MAX_UNCOVERED``."""
+    """Return which shortcuts leave a point of the curve further than ``MAX_UNCOVERED``."""
     # Complex numbers are ordered by their real parts, then by their imaginary ones.
     order = samples.piece + 1j * samples.t
     ends = np.stack((starts, stops))
@@ -281,7 +281,7 @@ def _uncovers_curve(
 def find_shortcuts(
     voxels: NDArray[np.int32], stretch: NDArray[np.integer]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find all shortcuts between n voxels, (3, n), within stretches, (n,): starts and stops."""
+    """Return all shortcuts between n voxels, (3, n), within stretches, (n,): starts, stops."""
     touch = _adjacency_in_window(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
     start, w = touch[1:].T.nonzero()
     if start.size:
@@ -305,7 +305,7 @@ def furthest_shortcuts(voxels: NDArray[np.int32], stretch: NDArray[np.integer]) 
 
 
 def _adjacency_in_window(rows: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Tell which of n voxels touch the ones after them: [w - 1, i] for voxels i and i + w.
+    """Return which of n voxels touch the ones after them: [w - 1, i] for voxels i and i + w.
 
     A fourth row, twice the stretch, keeps those of different stretches apart.
     """

@@ -1,6 +1,6 @@
-"""The events of a curve: the voxels it is to be drawn with, in order, before and after thinning.
+"""Voxel events of curves: candidate voxels in order, with the parameters that call for them.
 
-Plain integer bookkeeping. This module must not know curves or where the voxels came from.
+Integer bookkeeping only. This module must not know curves or the origin of the voxels.
 """
 
 from __future__ import annotations
@@ -41,28 +41,28 @@ class VoxelEvents:
     heading: NDArray[np.int8]
 
     def take(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> VoxelEvents:
-        """Give the events at an index array or under a mask."""
+        """Return the events at an index array or under a mask."""
         if index.dtype == bool:
             (index,) = index.nonzero()
         voxels = self.voxels.take(index, axis=1)
         return VoxelEvents(self.piece[index], self.t[index], voxels, self.heading[index])
 
     def insert(self, at: NDArray[np.intp], other: VoxelEvents) -> VoxelEvents:
-        """Put other events before those at the indices ``at``, which ascend."""
+        """Return these events with others before those at the ascending indices ``at``."""
         mine, others = ((each.piece, each.t, each.voxels, each.heading) for each in (self, other))
         return VoxelEvents(*insert_columns(at, mine, others))
 
     def with_voxels(self, voxels: Voxels) -> VoxelEvents:
-        """Give the same events with other voxels."""
+        """Return the same events with other voxels."""
         return replace(self, voxels=voxels)
 
     @property
     def joined(self) -> NDArray[np.bool_]:
-        """Which of the M - 1 steps stay inside a piece."""
+        """True for those of the M - 1 steps that stay inside a piece."""
         return np.asarray(self.piece[1:] == self.piece[:-1])
 
     def gaps(self) -> NDArray[np.intp]:
-        """Find the steps within a piece between voxels that are not neighbours: k for k, k + 1."""
+        """Return the steps within a piece between voxels that are not adjacent: k for k, k + 1."""
         return find_gaps(self.piece, self.voxels)
 
 
@@ -70,13 +70,13 @@ NO_HEADING = np.int8(-1)
 
 
 def adjacent(here: Voxels, there: Voxels) -> NDArray[np.bool_]:
-    """Tell which voxels, (3, n) each, are 26-adjacent or equal."""
+    """Return which voxels, (3, n) each, are 26-adjacent or equal."""
     close = np.abs(here - there) <= 1
     return np.asarray(close[0] & close[1] & close[2])
 
 
 @with_kernel
 def find_gaps(piece: NDArray[np.int32], voxels: Voxels) -> NDArray[np.intp]:
-    """Give the k for which voxels k and k + 1, (3, M), are of one piece but not near: ascending."""
+    """Return the k, ascending, for which voxels k and k + 1 of one piece are not adjacent."""
     apart = (piece[1:] == piece[:-1]) & ~adjacent(voxels[:, :-1], voxels[:, 1:])
     return np.asarray(apart.nonzero()[0])

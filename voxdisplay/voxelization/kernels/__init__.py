@@ -1,8 +1,7 @@
-"""The compiled twins of functions of this package: see `voxdisplay.compute.kernel_backend`.
+"""Compiled kernels of functions of this package: see `voxdisplay.compute.kernel_backend`.
 
-What is computed, and in what order, is what numpy does in their place, so that all bits agree: the
-functions of the same name say what and why. One loop takes the place of many array operations, and
-looks at nothing twice.
+They compute the same in the same order as the numpy functions of the same names, so that all bits
+agree; those functions document what and why. One loop takes the place of many array operations.
 """
 
 from voxdisplay.voxelization.kernels.sampling import (

@@ -1,4 +1,4 @@
-"""Arrays as kernels take them."""
+"""Contiguous arrays, as kernels take them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ Rows = TypeVar("Rows", bound=NDArray[Any])
 
 
 def packed(rows: Rows) -> Rows:
-    """Give rows that lie one after the other, so that there is one kernel to compile."""
+    """Return rows as a C-contiguous array, so that there is one kernel to compile."""
     array: Rows = np.ascontiguousarray(rows)  # type: ignore[assignment]
     return array

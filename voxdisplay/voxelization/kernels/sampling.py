@@ -1,6 +1,6 @@
-"""From samples to the voxels of crossings: the twins of `adaptive_sampling` and `plane_crossings`.
+"""Kernels of `adaptive_sampling` and `plane_crossings`: samples, slopes, crossings, corners.
 
-Several threads may be in them at once.
+They hold no state: several threads may run them at once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def subdivision_counts(samples: Samples, resolution: Floats) -> tuple[Ints, Floa
 
 @jit
 def _larger(a: float, b: float) -> float:
-    """Give the larger, or the one that is not a number, as numpy does."""
+    """Return the larger, or the one that is not a number, as numpy does."""
     return a if a >= b or a != a else b  # noqa: PLR0124 - that is how to tell
 
 
@@ -164,7 +164,7 @@ def _guess_crossings(
         count += passed != 0
         total += abs(passed)
     size = int(total)
-    knot, axes = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int8)
+    sample, axes = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int8)
     descends = np.empty(size, dtype=np.bool_)
     levels, taus, times = np.empty(size), np.empty(size), np.empty(size)
     at = 0
@@ -182,21 +182,21 @@ def _guess_crossings(
             u = (level - begin) / length
             rest = 1.0 - u
             tau = u * (u * (3 - 2 * u) + rest * (m_left * rest - m_right * u))
-            knot[at], axes[at], descends[at] = k, axis, passed < 0
+            sample[at], axes[at], descends[at] = k, axis, passed < 0
             levels[at], taus[at] = level, tau
             times[at] = min(max(t[k] + tau * h, t[k]), t[k + 1])
             at += 1
-    return knot, axes, descends, levels, taus, times
+    return sample, axes, descends, levels, taus, times
 
 
 def rank_corners(
-    samples: Samples, slopes: Slopes, aims: CrossingGuesses, points: Floats
+    samples: Samples, slopes: Slopes, guesses: CrossingGuesses, points: Floats
 ) -> CornerChoices:
     """See `plane_crossings.rank_corners`."""
     tangents = packed(slopes.arriving), packed(slopes.leaving)
-    aimed = aims.knot, aims.axis, aims.level, aims.tau
+    guessed = guesses.sample, guesses.axis, guesses.level, guesses.tau
     limits = TIE_TOLERANCE, MIN_GAIN, MAX_PROJECTION, MAX_SQUARE
-    known = (*tangents, *aimed, packed(points), *limits)
+    known = (*tangents, *guessed, packed(points), *limits)
     return CornerChoices(*_rank_corners(samples.t, *known))
 
 
@@ -215,7 +215,7 @@ def _rank_corners(
     t: Floats,
     arriving: Floats,
     leaving: Floats,
-    knot: Ints,
+    sample: Ints,
     axes: Bytes,
     level: Floats,
     tau: Floats,
@@ -225,11 +225,11 @@ def _rank_corners(
     most_projection: float,
     most_square: float,
 ) -> tuple[Voxels, Voxels, Floats, Floats]:
-    size = knot.size
+    size = sample.size
     nearest, better = np.empty((3, size), dtype=np.int32), np.empty((3, size), dtype=np.int32)
     gain, foot = np.full(size, np.inf), np.full(size, np.inf)
     for k in range(size):
-        left, axis, share, plane = knot[k], axes[k], tau[k], level[k] - 0.5
+        left, axis, share, plane = sample[k], axes[k], tau[k], level[k] - 0.5
         h = t[left + 1] - t[left]
         x, y, z = points[0, k], points[1, k], points[2, k]
         along_x = _between(leaving[0, left] * h, arriving[0, left + 1] * h, share)

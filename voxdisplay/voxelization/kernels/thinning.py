@@ -1,11 +1,11 @@
-"""From the voxels of crossings to sequences: the twins of `grid_plane`, `thinning` and others.
+"""Kernels of `grid_plane`, `thinning`, `voxel_events` and `index_ranges`.
 
-Several threads may be in them at once.
+They hold no state: several threads may run them at once.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +27,11 @@ NO_BOUNDS = np.empty(0, dtype=np.int64)
 TINY = float(np.finfo(float).tiny)
 
 
-class Way(NamedTuple):
-    """Samples along the curve: indices of the first of each piece, parameters, points."""
-
-    bounds: Ints
-    t: Floats
-    points: Floats
-
-
-class Prices(NamedTuple):
-    """The constants of `thinning`."""
-
-    voxel: float
-    units: float
-    far: float
-    farthest: float
+# Samples along the curve: indices of the first of each piece, parameters, points. A plain tuple:
+# numba's cache of a function names the classes of its arguments, and would outlive them.
+CurvePoints = tuple[Ints, Floats, Floats]
+# Those of `thinning`: VOXEL_COST, COST_UNITS, FAR, MAX_UNCOVERED squared.
+CostConstants = tuple[float, float, float, float]
 
 
 @jit
@@ -193,17 +183,17 @@ def thin_events(
     events: VoxelEvents, samples: Samples | None = None, *, keep_tips: bool = False
 ) -> VoxelEvents:
     """See `thinning.thin_events`."""
-    way = Way(NO_BOUNDS, NO_NUMBERS, NO_POINTS)
+    curve: CurvePoints = NO_BOUNDS, NO_NUMBERS, NO_POINTS
     if samples:
-        way = Way(samples.bounds, samples.t, packed(samples.points))
+        curve = samples.bounds, samples.t, packed(samples.points)
     full = events.piece, events.t, packed(events.voxels), events.heading
-    prices = Prices(VOXEL_COST, COST_UNITS, FAR, MAX_UNCOVERED * MAX_UNCOVERED)
-    return VoxelEvents(*_thin_events(*full, way, prices, keep_tips, WINDOW))
+    constants = VOXEL_COST, COST_UNITS, FAR, MAX_UNCOVERED * MAX_UNCOVERED
+    return VoxelEvents(*_thin_events(*full, curve, constants, keep_tips, WINDOW))
 
 
 @jit
 def _near_turns(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> Bools:
-    """Tell where a turn is within reach: see `thinning.continues_run`."""
+    """Return for each event whether a turn is within the window: see `thinning.continues_run`."""
     size = piece.size
     reach = np.zeros(size + 1, dtype=np.int32)
     for k in range(size):
@@ -224,7 +214,7 @@ def _near_turns(piece: Pieces, voxels: Voxels, heading: Bytes, window: int) -> B
 
 @jit
 def _is_shortcut(voxels: Voxels, i: int, j: int, ahead: int) -> bool:
-    """Tell whether i leads to j; ``ahead`` events after i are adjacent to it."""
+    """Return whether i leads to j; ``ahead`` events after i are adjacent to it."""
     if not _adjacent(voxels, i, j):
         return False
     for k in range(i + 1 + ahead, j):  # noqa: SIM110 - no generators in kernels
@@ -250,7 +240,7 @@ def _skips_tip(piece: Pieces, voxels: Voxels, i: int, j: int) -> bool:
 
 @jit
 def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
-    """Give the square of the distance between a voxel and a point."""
+    """Return the squared distance between a voxel's centre and a point."""
     x = points[0, p] - (voxels[0, i] + 0.5)
     y = points[1, p] - (voxels[1, i] + 0.5)
     z = points[2, p] - (voxels[2, i] + 0.5)
@@ -258,30 +248,37 @@ def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
 
 
 @jit
-def _uncovers(way: Way, t: Floats, voxels: Voxels, i: int, j: int, p: int, farthest: float) -> bool:
-    """Tell whether a point of the curve, of those from ``p`` on, is far from both ends."""
-    while p < way.t.size and way.t[p] < t[j]:
-        if min(_square(voxels, i, way.points, p), _square(voxels, j, way.points, p)) > farthest:
+def _uncovers(
+    curve: CurvePoints, t: Floats, voxels: Voxels, i: int, j: int, p: int, farthest: float
+) -> bool:
+    """Return whether a point of the curve, from ``p`` on, is far from both ends."""
+    _, sample_t, points = curve
+    while p < sample_t.size and sample_t[p] < t[j]:
+        if min(_square(voxels, i, points, p), _square(voxels, j, points, p)) > farthest:
             return True
         p += 1
     return False
 
 
 @jit
-def _cost(way: Way, prices: Prices, piece: Pieces, t: Floats, voxels: Voxels, k: int) -> int:
+def _cost(
+    curve: CurvePoints, constants: CostConstants, piece: Pieces, t: Floats, voxels: Voxels, k: int
+) -> int:
     """See `thinning._costs` and `thinning._squared_distances`."""
+    bounds, sample_t, points = curve
+    voxel_cost, units, far, _ = constants
     least = 0.0
-    if way.t.size:
-        first, last = way.bounds[piece[k]], way.bounds[piece[k] + 1] - 1
+    if sample_t.size:
+        first, last = bounds[piece[k]], bounds[piece[k] + 1] - 1
         low, high = first, last + 1
         while low < high:
             middle = (low + high) // 2
-            if way.t[middle] < t[k]:
+            if sample_t[middle] < t[k]:
                 low = middle + 1
             else:
                 high = middle
         high = low
-        while high <= last and way.t[high] <= t[k]:
+        while high <= last and sample_t[high] <= t[k]:
             high += 1
         least = np.inf
         x, y, z = voxels[0, k] + 0.5, voxels[1, k] + 0.5, voxels[2, k] + 0.5
@@ -289,13 +286,13 @@ def _cost(way: Way, prices: Prices, piece: Pieces, t: Floats, voxels: Voxels, k:
             begin = min(max(low - 2 + shift, first), last)
             end = min(begin + 1, high + 1, last)
             from_x, from_y, from_z = (
-                way.points[0, begin],
-                way.points[1, begin],
-                way.points[2, begin],
+                points[0, begin],
+                points[1, begin],
+                points[2, begin],
             )
-            along_x = way.points[0, end] - from_x
-            along_y = way.points[1, end] - from_y
-            along_z = way.points[2, end] - from_z
+            along_x = points[0, end] - from_x
+            along_y = points[1, end] - from_y
+            along_z = points[2, end] - from_z
             off_x, off_y, off_z = x - from_x, y - from_y, z - from_z
             length = max(along_x * along_x + along_y * along_y + along_z * along_z, TINY)
             share = (off_x * along_x + off_y * along_y + off_z * along_z) / length
@@ -306,7 +303,7 @@ def _cost(way: Way, prices: Prices, piece: Pieces, t: Floats, voxels: Voxels, k:
                 off_z - share * along_z,
             )
             least = min(least, off_x * off_x + off_y * off_y + off_z * off_z)
-    scaled = (min(least, prices.far) + prices.voxel) * prices.units
+    scaled = (min(least, far) + voxel_cost) * units
     return int(np.floor(scaled + 0.5))
 
 
@@ -321,7 +318,7 @@ def _same(voxels: Voxels, i: int, j: int) -> bool:
 
 @jit
 def _lesser(voxels: Voxels, i: int, j: int) -> bool:
-    """Tell whether voxel i comes before voxel j, by x, then y, then z."""
+    """Return whether voxel i comes before voxel j, by x, then y, then z."""
     for row in range(3):
         if voxels[row, i] != voxels[row, j]:
             return bool(voxels[row, i] < voxels[row, j])
@@ -330,7 +327,7 @@ def _lesser(voxels: Voxels, i: int, j: int) -> bool:
 
 @jit
 def _take_cheapest(voxels: Voxels, costs: Ints, low: int, links: Ints, skipped: Bools) -> None:
-    """Mark what the cheapest path skips: see `thinning._cheapest_path`.
+    """Mark the events that the cheapest path skips: see `thinning._cheapest_path`.
 
     ``links``, (2, n), are the starts and stops of shortcuts, ascending; ``costs`` those of the
     events from ``low`` on.
@@ -376,24 +373,24 @@ def _take_cheapest(voxels: Voxels, costs: Ints, low: int, links: Ints, skipped: 
 
 
 @jit
-def _settle(
+def _thin_group(
     voxels: Voxels,
     piece: Pieces,
     t: Floats,
-    way: Way,
-    prices: Prices,
+    curve: CurvePoints,
+    constants: CostConstants,
     low: int,
     high: int,
     links: Ints,
     skipped: Bools,
 ) -> None:
-    """Mark what a group of shortcuts that overlap, from ``low`` to ``high``, skips."""
+    """Mark the events that a group of overlapping shortcuts, ``low`` to ``high``, skips."""
     if links.shape[1] == 1:
         skipped[links[0, 0] + 1 : links[1, 0]] = True
     elif links.shape[1]:
         costs = np.empty(high - low + 1, dtype=np.int64)
         for k in range(low, high + 1):
-            costs[k - low] = _cost(way, prices, piece, t, voxels, k)
+            costs[k - low] = _cost(curve, constants, piece, t, voxels, k)
         _take_cheapest(voxels, costs, low, links, skipped)
 
 
@@ -403,11 +400,13 @@ def _thin_events(
     full_t: Floats,
     full_voxels: Voxels,
     full_heading: Bytes,
-    way: Way,
-    prices: Prices,
+    curve: CurvePoints,
+    constants: CostConstants,
     keep_tips: bool,
     window: int,
 ) -> tuple[Pieces, Floats, Voxels, Bytes]:
+    bounds, sample_t, _ = curve
+    farthest = constants[3]
     whole = full_t.size
     number = np.empty(whole, dtype=np.int64)
     size = 0
@@ -443,14 +442,16 @@ def _thin_events(
                 continue
             if keep_tips and _skips_tip(piece, voxels, i, j):
                 continue
-            if way.t.size:
-                p = max(p, way.bounds[piece[i]])
-                while p < way.bounds[piece[i] + 1] and way.t[p] < t[i]:
+            if sample_t.size:
+                p = max(p, bounds[piece[i]])
+                while p < bounds[piece[i] + 1] and sample_t[p] < t[i]:
                     p += 1
-                if _uncovers(way, t, voxels, i, j, p, prices.farthest):
+                if _uncovers(curve, t, voxels, i, j, p, farthest):
                     continue
             if i >= high:
-                _settle(voxels, piece, t, way, prices, low, high, links[:, :count], skipped)
+                _thin_group(
+                    voxels, piece, t, curve, constants, low, high, links[:, :count], skipped
+                )
                 count, low = 0, i
             high = max(high, j)
             if count == links.shape[1]:
@@ -459,7 +460,7 @@ def _thin_events(
                 links = longer
             links[0, count], links[1, count] = i, j
             count += 1
-    _settle(voxels, piece, t, way, prices, low, high, links[:, :count], skipped)
+    _thin_group(voxels, piece, t, curve, constants, low, high, links[:, :count], skipped)
 
     kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
     count = 0
