@@ -270,11 +270,11 @@ ENDS_ITSELF = """
 import os, signal, sys
 from firmware_sim import command_line
 from firmware_sim.__main__ import main
-announce = program._announce
+announce = command_line._announce
 def announce_and_end(place):
     announce(place)
     os.kill(os.getpid(), signal.SIGTERM)
-program._announce = announce_and_end
+command_line._announce = announce_and_end
 sys.exit(main())
 """
 
