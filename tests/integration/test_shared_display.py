@@ -17,7 +17,11 @@ from pluggable_pty import noise_frame
 import voxdisplay as vd
 from voxdisplay.transport import open_transport
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="threads and forks of POSIX")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="threads and forks of POSIX"),
+    # Python 3.12 and later; the device on the pty is a thread.
+    pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning"),
+]
 
 
 def run_threads(*targets):
