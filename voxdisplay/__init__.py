@@ -255,4 +255,4 @@ if not TYPE_CHECKING:  # a type checker would take any name of a module that has
 
     def __dir__() -> list[str]:
         """Return the names of the package, imported or not."""
-        return sorted({*globals(), *_PUBLIC, "__version__"})
+        return sorted({*globals(), *_PUBLIC, "__version__"} - {"TYPE_CHECKING"})

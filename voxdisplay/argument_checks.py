@@ -20,7 +20,7 @@ def described(value: object) -> str:
 
 def wrong_kind(name: str, wanted: str, value: object) -> TypeError:
     """Return the error of an argument that is of another kind than wanted."""
-    return TypeError(f"{name}: {wanted} is wanted, not {described(value)}")
+    return TypeError(f"{name}: expected {wanted}, found {described(value)}")
 
 
 def number(name: str, value: Any) -> float:
@@ -43,7 +43,7 @@ def duration(name: str, value: Any) -> float:
     """Return a finite number of seconds, 0 or more; raise `TypeError` or `ValueError` otherwise."""
     seconds = number(name, value)
     if not 0 <= seconds < float("inf"):
-        raise ValueError(f"{name}: seconds are 0 or more, and finite, not {seconds:g}")
+        raise ValueError(f"{name}: expected 0 or more seconds, found {seconds:g}")
     return seconds
 
 
@@ -53,7 +53,7 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
         raise wrong_kind(name, "a whole number", value)
     result = int(value)
     if not least <= result <= most:
-        raise ValueError(f"{name}: {least} to {most} is wanted, not {_SHORT.repr(result)}")
+        raise ValueError(f"{name}: expected {least} to {most}, found {_SHORT.repr(result)}")
     return result
 
 
@@ -71,7 +71,7 @@ def choice(name: str, value: Any, known: tuple[Any, ...]) -> None:
     if type(value) not in {type(each) for each in known}:
         raise wrong_kind(name, f"one of {names}", value)
     if value not in known:
-        raise ValueError(f"{name}: one of {names} is wanted, not {_SHORT.repr(value)}")
+        raise ValueError(f"{name}: expected one of {names}, found {_SHORT.repr(value)}")
 
 
 def instance(name: str, value: object, kind: type, wanted: str) -> None:

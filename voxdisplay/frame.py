@@ -449,7 +449,7 @@ class Frame:
         instance("base", base, Frame, "a frame")
         if (base.grid, base.format) != (self.grid, self.format):
             raise ValueError(
-                f"base: a frame of {self.grid} {self.format.value} is wanted, not {base}"
+                f"base: expected a frame of {self.grid} {self.format.value}, found {base}"
             )
         mine, other = self._raster, base._raster
         if mine is other:

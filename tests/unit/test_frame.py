@@ -178,7 +178,7 @@ def test_the_default_colour_is_white():
 )  # fmt: skip
 def test_draw_names_what_it_takes(what):
     with pytest.raises(
-        TypeError, match=r"drawable: a curve, a sequence, an .* or a scene is wanted, not"
+        TypeError, match=r"drawable: expected a curve, a sequence, an .* or a scene, found"
     ):
         Frame((3, 5, 7)).draw(what)
 
@@ -217,7 +217,7 @@ def test_a_scene_of_another_size_is_fitted_or_kept():
     scene, fitted, kept = read_scene(TWO), Frame((20, 20, 5)), Frame((20, 20, 5))
     assert fitted.draw(scene).clipped == 0
     assert kept.draw(scene, fit="none").clipped > 0
-    with pytest.raises(ValueError, match="fit: one of 'contain', 'none'"):
+    with pytest.raises(ValueError, match="fit: expected one of 'contain', 'none'"):
         kept.draw(scene, fit="cover")
 
 
@@ -284,7 +284,7 @@ def test_repr_names_grid_format_and_voxels():
 
 @pytest.mark.parametrize("grid", [(3, 5), (3, 5, 7, 9), "3x5x7", 3, None, (3, 5, 7.0), ("3", 5, 7)])
 def test_what_is_no_grid(grid):
-    with pytest.raises(TypeError, match=r"grid: three whole numbers \(nx, ny, nz\)"):
+    with pytest.raises(TypeError, match=r"grid: expected three whole numbers \(nx, ny, nz\)"):
         Frame(grid)
 
 
@@ -297,5 +297,7 @@ def test_a_grid_that_no_display_has(grid):
 @pytest.mark.parametrize("format_", ["rgb", "", None, 3, b"mono1"])
 def test_what_is_no_format(format_):
     kind = ValueError if isinstance(format_, str) else TypeError
-    with pytest.raises(kind, match=r"format: one of .*mono1.*index8.*rgb565.*rgb888.* is wanted"):
+    with pytest.raises(
+        kind, match=r"format: expected one of .*mono1.*index8.*rgb565.*rgb888, found"
+    ):
         Frame((3, 5, 7), format_)

@@ -14,6 +14,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import described, wrong_kind
 from voxdisplay.errors import did_you_mean
 
 Color: TypeAlias = str | Sequence[str | int | Sequence[int]] | NDArray[np.integer]
@@ -69,9 +70,10 @@ def as_colors(color: Color) -> NDArray[np.uint8]:
     if isinstance(color, str):
         return np.array([parse_color(color)], dtype=np.uint8)
     if isinstance(color, np.ndarray):
-        return _from_array(color)
+        names = color.ndim == 1 and color.dtype.kind in "UO"
+        return as_colors(color.tolist()) if names else _from_array(color)
     if not isinstance(color, Sequence) or isinstance(color, bytes | bytearray):
-        raise TypeError(f"a colour is {_KINDS}; this is {_described(color)}")
+        raise wrong_kind("color", _KINDS, color)
     if not len(color):
         raise ValueError("a list of colours needs at least one")
     if all(isinstance(part, Real | np.generic) for part in color):
@@ -85,9 +87,7 @@ def _one_color(color: object) -> tuple[int, int, int]:
     if isinstance(color, Sequence | np.ndarray) and not isinstance(color, bytes | bytearray):
         red, green, blue = _from_array(np.array([_channels(color)]))[0].tolist()
         return red, green, blue
-    raise TypeError(
-        f"a colour in a list is a name, '#rrggbb' or (r, g, b); not {_described(color)}"
-    )
+    raise TypeError(f"a colour in a list is a name, '#rrggbb' or (r, g, b); not {described(color)}")
 
 
 def _channels(color: Sequence[Any] | NDArray[Any]) -> list[Any]:
@@ -114,10 +114,6 @@ def _from_array(colors: NDArray[Any]) -> NDArray[np.uint8]:
     if rows.min() < 0 or rows.max() > 255:
         raise ValueError(f"colours are 0 to 255; here they are {rows.min()} to {rows.max()}")
     return rows.astype(np.uint8)
-
-
-def _described(value: object) -> str:
-    return f"{type(value).__name__} {reprlib.repr(value)}"
 
 
 def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:

@@ -38,7 +38,7 @@ class PixelFormat(enum.Enum):
     @classmethod
     def _missing_(cls, value: object) -> None:
         names = ", ".join(format_.value for format_ in cls)
-        raise ValueError(f"format: one of {names} is wanted, not {reprlib.repr(value)}")
+        raise ValueError(f"format: expected one of {names}, found {reprlib.repr(value)}")
 
     @classmethod
     def from_wire(cls, number: int) -> PixelFormat | None:

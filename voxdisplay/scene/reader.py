@@ -100,7 +100,7 @@ def read_scene(data: bytes | str, *, folder: str | os.PathLike[str] | None = Non
 
     """
     if not isinstance(data, str | bytes):
-        raise wrong_kind("data", "the text of a scene, str or bytes,", data)
+        raise wrong_kind("data", "the text of a scene, str or bytes", data)
     if folder is not None and not isinstance(folder, str | os.PathLike):
         raise wrong_kind("folder", "a path or None", folder)
     return _read(data, None if folder is None else Path(folder), None)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.errors import MissingExtra, VoxDisplayError, did_you_mean
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
@@ -111,7 +112,7 @@ def save_page(
     from voxdisplay.view.save import WRITERS, ExportJob, save  # noqa: PLC0415 - needs an extra
 
     if not isinstance(path, str | os.PathLike):
-        raise TypeError(f"path: a str or path is wanted, not {type(path).__name__}")
+        raise wrong_kind("path", "a str or path", path)
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITERS:

@@ -70,6 +70,7 @@ def test_one_color_and_several() -> None:
         (tuple(np.uint8([1, 2, 3])), [[1, 2, 3]]),
         ([(255, 0, 0), "lime", [0, 0, 255], np.array([1, 2, 3])],
          [[255, 0, 0], [0, 255, 0], [0, 0, 255], [1, 2, 3]]),
+        (np.array(["red", "lime"]), [[255, 0, 0], [0, 255, 0]]),
         (((1, 2, 3), (4, 5, 6)), [[1, 2, 3], [4, 5, 6]]),
         (np.array([[1, 2, 3], [4, 5, 6]]), [[1, 2, 3], [4, 5, 6]]),
     ],
@@ -95,7 +96,8 @@ def test_triples(color: object, rows: list[list[int]]) -> None:
         (["red", "nocolour"], "unknown colour 'nocolour'"),
         (np.zeros((2, 4), int), r"\(k, 3\) array"),
         (np.zeros((0, 3), int), r"\(k, 3\) array"),
-        (np.array(["a", "b", "c"]), "whole numbers"),
+        (np.array(["red", "a"]), "unknown colour 'a'"),
+        (np.array([["red", "a", "b"]]), "whole numbers"),
         ((), "at least one"),
     ],
 )
@@ -109,5 +111,5 @@ def test_what_is_no_triple(color: object, message: str) -> None:
     [None, 7, 1.5, b"red", {"red": 1}, {1, 2, 3}, object(), ["red", 3], [None], [b"red"]],
 )
 def test_what_is_of_another_kind(color: object) -> None:
-    with pytest.raises(TypeError, match="a colour"):
+    with pytest.raises(TypeError, match=r"colou?r"):
         as_colors(color)

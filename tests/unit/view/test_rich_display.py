@@ -85,7 +85,7 @@ def test_save_writes_what_the_suffix_says(frame, tmp_path):
 def test_save_names_the_suffixes_that_there_are(frame, tmp_path):
     with pytest.raises(ValueError, match=r"'a\.jpg'.* \.png, \.gif, \.mp4, \.html"):
         frame.save(tmp_path / "a.jpg")
-    with pytest.raises(TypeError, match="path: a str or path is wanted, not int"):
+    with pytest.raises(TypeError, match="path: expected a str or path, found int"):
         frame.save(3)
     with pytest.raises(OSError, match="nowhere"):
         frame.save(tmp_path / "nowhere" / "a.png")

@@ -324,7 +324,7 @@ def test_voxelize_is_a_public_function() -> None:
     assert np.array_equal(vd.voxelize(curve).voxels, voxelize(curve).voxels)
     assert vd.voxelize is voxelize
     with pytest.raises(
-        ValueError, match="method: one of 'grid-plane', 'march' is wanted, not 'magic'"
+        ValueError, match="method: expected one of 'grid-plane', 'march', found 'magic'"
     ):
         voxelize(curve, method="magic")
 

@@ -125,7 +125,7 @@ def test_a_march_that_loses_its_way() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"variant": 4}, "variant: one of 1, 2, 3"),
+        ({"variant": 4}, "variant: expected one of 1, 2, 3"),
         ({"tangent": "guessed"}, "no tangent 'guessed'"),
         ({"tangent": "analytic"}, "no derivative"),
         ({"pitch": 0}, "pitch must be positive and finite, not 0"),
