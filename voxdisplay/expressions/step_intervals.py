@@ -47,13 +47,11 @@ def mod(a: Interval, b: Interval) -> Interval:
     """Return a - b floor(a / b), of the sign of b; nothing is known where b has 0 inside."""
     quotient = divide(a, b)
     low, high = np.floor(quotient.lo), np.floor(quotient.hi)
-    # Without a step inside, the remainder is linear; with one, it is anything from 0 to b.
+    # Without a step inside, this is the remainder itself; with one, it reaches from 0 to b and on.
     inside = a - b * Interval(low, high)
-    step = ~(low == high)
-    least, most = np.minimum(b.lo, 0.0), np.maximum(b.hi, 0.0)
     unknown = np.isnan(low + high)
-    lo = np.where(step, least, np.maximum(inside.lo, least))
-    hi = np.where(step, most, np.minimum(inside.hi, most))
+    lo = np.maximum(inside.lo, np.minimum(b.lo, 0.0))
+    hi = np.minimum(inside.hi, np.maximum(b.hi, 0.0))
     undefined = a.may_be_undefined | b.may_be_undefined
     return Interval(np.where(unknown, np.nan, lo), np.where(unknown, np.nan, hi), undefined)
 

@@ -357,7 +357,9 @@ def _polyline(
         settled[index + np.arange(1, index.size + 1)] = fine
         if t.size > unchecked:
             unchecked = MAX_SEGMENTS
-            if t.size > MAX_SEGMENTS or estimated_min_length(curve)[0] > MAX_SEGMENTS * SEGMENT:
+            total, chord = estimated_min_length(curve)
+            endless = total > MAX_SEGMENTS * SEGMENT and chord > SEGMENT
+            if endless or t.size > MAX_SEGMENTS:
                 raise CurveError(
                     "the curve is too long or too rough to measure distances from it",
                     hint="measure a shorter range of t, or a smoother curve",

@@ -45,6 +45,7 @@ def test_limits_are_found(function: Function, value: float) -> None:
         lambda h: 1 / h,
         lambda h: -1e-3 / h**2,
         lambda h: 5 + 1e-7 / h,
+        lambda h: 30 * np.sin(h) / h + 1e-7 / h,
         lambda h: 1 / np.sqrt(h),
         lambda h: np.exp(1 / h),
     ],
