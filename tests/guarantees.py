@@ -1,4 +1,4 @@
-"""What every sequence promises of its curve, and random curves of many kinds to hold it to."""
+"""Guarantees of every sequence, and random curves of many kinds to check them with."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def _fourier(kind: str, *, closed: bool) -> Callable[[int], Curve]:
 
 
 def _bezier(seed: int) -> Curve:
-    """Give a cubic that is short and likely to turn back on itself."""
+    """Return a cubic that is short and likely to turn back on itself."""
     rng = np.random.default_rng(seed)
     start = rng.uniform(40, 216, 3)
     return Bezier(start + np.cumsum(rng.uniform(-1, 1, (4, 3)) * rng.uniform(2, 15), axis=0))
 
 
 def _hairpin(seed: int) -> Curve:
-    """Give legs that lie within two voxels of each other."""
+    """Return legs that lie within two voxels of each other."""
     rng = np.random.default_rng(seed)
     there = rng.normal(size=3) * 20
     middle = there + rng.normal(size=(2, 3)) * 2
@@ -68,7 +68,7 @@ def _hairpin(seed: int) -> Curve:
 
 
 def _cusp(seed: int) -> Curve:
-    """Give powers of t, in any direction: cusps, corners, and infinite slopes at t = 0."""
+    """Return powers of t, in any direction: cusps, corners, and infinite slopes at t = 0."""
     rng = np.random.default_rng(seed)
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0] * rng.uniform(0.5, 25, 3)
     even, odd = rng.choice([0.5, 2 / 3, 1, 2, 3]), rng.choice([1 / 3, 1, 2, 3, 5])
@@ -84,7 +84,7 @@ def _cusp(seed: int) -> Curve:
 
 
 def _crossing(seed: int) -> Curve:
-    """Give a curve that crosses itself, or all but does."""
+    """Return a curve that crosses itself, or all but does."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(60, 70, 3)
     if seed % 2:
@@ -94,7 +94,7 @@ def _crossing(seed: int) -> Curve:
 
 
 def _curls(seed: int) -> Curve:
-    """Give a line with many loops, from smaller than a voxel to a few voxels wide."""
+    """Return a line with many loops, from smaller than a voxel to a few voxels wide."""
     rng = np.random.default_rng(seed)
     size, turns = rng.uniform(0.2, 4), rng.uniform(20, 300)
     along, start = rng.normal(size=3) * 25, rng.uniform(0, 100, 3)
@@ -106,14 +106,14 @@ def _curls(seed: int) -> Curve:
     return Function(function)
 
 
-def _leaving(seed: int) -> Curve:
-    """Give a curve that leaves a volume of 256 voxels on all sides."""
+def _crossing_borders(seed: int) -> Curve:
+    """Return a curve that leaves a volume of 256 voxels on all sides."""
     rng = np.random.default_rng(seed)
     return Bezier(rng.uniform(-300, 556, (5, 3)))
 
 
 def _polyline(seed: int) -> Curve:
-    """Give straight lines between corners, faces and centres of voxels: every tie there is."""
+    """Return straight lines between corners, faces and centres of voxels: every tie there is."""
     rng = np.random.default_rng(seed)
     return chain(rng.integers(-20, 20, (rng.integers(2, 7), 3)) / 2)
 
@@ -130,11 +130,11 @@ KINDS: dict[str, Callable[[int], Curve]] = {
     "cusp": _cusp,
     "crossing": _crossing,
     "curls": _curls,
-    "leaving": _leaving,
+    "crossing borders": _crossing_borders,
     "polyline": _polyline,
 }
 
 
 def profile(kind: str, count: int) -> Sequence[Curve]:
-    """Give the first so many curves of a kind, the same ones always."""
+    """Return the first so many curves of a kind, the same ones always."""
     return [KINDS[kind](seed) for seed in range(count)]

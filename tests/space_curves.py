@@ -67,7 +67,7 @@ def fourier_curve(seed: int, kind: str, *, closed: bool) -> Function:
 
 
 def chain(vertices: Floats) -> Function:
-    """Give the polyline through points, (n, 3)."""
+    """Return the polyline through points, (n, 3)."""
     nodes = np.arange(len(vertices), dtype=float)
     return Function(
         lambda t: (
@@ -81,16 +81,16 @@ def chain(vertices: Floats) -> Function:
 
 
 def moved(curve: Curve, shift: tuple[int, int, int]) -> Function:
-    """Give the curve moved by whole voxels."""
+    """Return the curve moved by whole voxels."""
     return Function(lambda t: tuple(curve.position(t) + np.array(shift)[:, None]), *curve.t_range)
 
 
 def turned(curve: Curve, axes: tuple[int, ...]) -> Function:
-    """Give the curve with its axes in another order."""
+    """Return the curve with its axes in another order."""
     return Function(lambda t: tuple(curve.position(t)[list(axes)]), *curve.t_range)
 
 
 def backwards(curve: Curve) -> Function:
-    """Give the curve from its end to its beginning."""
+    """Return the curve from its end to its beginning."""
     first, last = curve.t_range
     return Function(lambda t: tuple(curve.position(first + last - t)), first, last)

@@ -1,4 +1,4 @@
-"""The compiled twins give what numpy gives, to the last bit; they are taken where it pays."""
+"""Equality of kernels and numpy functions to the last bit, and the choice between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds for sequences along all curves: connectivity, ends, distance, symmetries, batches."""
+"""Properties of sequences along all curves: connectivity, ends, distance, symmetries, batches."""
 
 import numpy as np
 from guarantees import check

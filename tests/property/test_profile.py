@@ -1,4 +1,4 @@
-"""The guarantees, held to fixed random curves of many kinds."""
+"""Guarantees for fixed random curves of many kinds."""
 
 import pytest
 from guarantees import KINDS, check, profile

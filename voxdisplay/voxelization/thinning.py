@@ -177,7 +177,7 @@ def _cheapest_path(
 ) -> list[tuple[int, int]]:
     """Return the shortcuts of the cheapest path over n events, from the first to the last."""
     size = len(costs)
-    backwards = voxels[-1] < voxels[0]
+    backwards = voxels[::-1] < voxels  # the order of equal costs knows no direction either
     if backwards:
         costs, voxels = costs[::-1], voxels[::-1]
         links = [(size - 1 - j, size - 1 - i) for i, j in links]

@@ -1,4 +1,4 @@
-"""How closely curves are looked at first, and that nothing hides between the looks."""
+"""Initial and adaptive sampling: density by degree, limits, no missed turns."""
 
 from bisect import bisect_left
 from collections.abc import Callable
@@ -106,7 +106,7 @@ def test_one_more_look_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _control(t: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Give the control points of the Bezier curve that goes through points at t."""
+    """Return the control points of the Bezier curve that goes through points at t."""
     degree = len(t) - 1
     unit = [Bezier(np.eye(degree + 1)[:, [j, j, j]]).position(t)[0] for j in range(degree + 1)]
     return np.linalg.solve(np.stack(unit, axis=1), points)

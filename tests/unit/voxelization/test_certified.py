@@ -1,4 +1,4 @@
-"""Certified voxels: nothing is missed, and there is a certificate only where there is a proof."""
+"""Certified sequences: nothing missed, and no certificate without a proof."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Grid-plane digitisation: the paper's curves, hard cases by name, and what must be refused."""
+"""Grid-plane digitisation: the paper's curves, named hard cases, refused curves."""
 
 import numpy as np
 import pytest

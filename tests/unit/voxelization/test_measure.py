@@ -1,4 +1,4 @@
-"""The judge, judged by brute force and by distances known in closed form."""
+"""Measurements against brute force and distances known in closed form."""
 
 from itertools import combinations
 

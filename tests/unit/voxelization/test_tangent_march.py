@@ -1,4 +1,4 @@
-"""The paper's tables II to IV, by the paper's own method, and where that method ends."""
+"""Tangent march: the paper's tables II to IV, and the limits of the method."""
 
 import numpy as np
 import pytest

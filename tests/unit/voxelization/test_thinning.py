@@ -1,8 +1,9 @@
-"""Thinning and closing, on voxels written out by hand."""
+"""Thinning of voxels written out by hand, and of random walks."""
 
 import numpy as np
 import pytest
 
+from voxdisplay.voxelization.curve_batch import Samples
 from voxdisplay.voxelization.thinning import WINDOW, thin_events
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents
 
@@ -78,3 +79,21 @@ def test_random_walks(seed: int) -> None:
     assert set(step.tolist()) == {1}
     known = {tuple(voxel) for voxel in walk.tolist()}
     assert {tuple(voxel) for voxel in thin.tolist()} <= known
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_walk_and_its_reverse_are_thinned_alike(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    walk = np.cumsum(rng.integers(-1, 2, (200, 3)) * [1, 1, seed % 2], axis=0).tolist()
+    there = [tuple(voxel) for voxel in walk]
+    assert thinned(there[::-1]) == thinned(there)[::-1]
+
+
+def test_of_two_paths_the_one_nearer_to_the_curve_is_taken() -> None:
+    # From (0, 0, 0) to (2, 1, 0) either voxel between leads; the curve is nearer to one of them.
+    walk = events([(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)])
+    for height, between in ((0.6, (1, 0, 0)), (1.4, (1, 1, 0))):
+        points = np.array([[0.5, 0.5, 0.5], [1.5, height, 0.5], [2.5, 1.5, 0.5]]).T
+        samples = Samples(np.zeros(3, int), np.array([0.0, 1.5, 3.0]), points, np.zeros(1, int))
+        thin = thin_events(walk, samples).voxels.T.tolist()
+        assert [tuple(voxel) for voxel in thin] == [(0, 0, 0), between, (2, 1, 0)]

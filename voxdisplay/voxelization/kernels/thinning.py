@@ -317,11 +317,13 @@ def _same(voxels: Voxels, i: int, j: int) -> bool:
 
 
 @jit
-def _lesser(voxels: Voxels, i: int, j: int) -> bool:
-    """Return whether voxel i comes before voxel j, by x, then y, then z."""
-    for row in range(3):
-        if voxels[row, i] != voxels[row, j]:
-            return bool(voxels[row, i] < voxels[row, j])
+def _lesser_backwards(voxels: Voxels, low: int, high: int) -> bool:
+    """Return whether voxels from ``high`` to ``low`` come before those from ``low`` to ``high``."""
+    for k in range((high - low + 1) // 2):
+        for row in range(3):
+            back, there = voxels[row, high - k], voxels[row, low + k]
+            if back != there:
+                return bool(back < there)
     return False
 
 
@@ -334,7 +336,7 @@ def _take_cheapest(voxels: Voxels, costs: Ints, low: int, links: Ints, skipped: 
     """
     size, count = costs.size, links.shape[1]
     total, other = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    if _lesser(voxels, low + size - 1, low):
+    if _lesser_backwards(voxels, low, low + size - 1):
         total[size - 1] = 0
         nth = count - 1
         for i in range(size - 2, -1, -1):
