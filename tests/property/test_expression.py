@@ -1,4 +1,4 @@
-"""Expressions against numpy, derivatives against differences, and text against the parser."""
+"""Random expressions: values against numpy, derivatives against differences, any text."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ REPEATABLE = 1e-6
 _FIRST_INTERVALS, _PARTS, _MOST_INTERVALS = 16, 16, 512
 # Parts of the range whose ends are among the customary parameters.
 _EVEN_PARTS = 64
-# Most singular parameters of one curve.
+# Most singular parameters of one curve, in each coordinate.
 _MOST = 256
 # More finite candidates beyond `MAX_COORDINATE` are no poles, but a curve that is far out.
 _MOST_FAR = 8
@@ -209,7 +209,14 @@ def complete(curve: Curve, also: Iterable[float] = ()) -> Curve:
     found: list[SingularPoint] = []
     sides: list[_Side] = []
     singular = candidates[far]
-    for index in np.flatnonzero(far)[:_MOST].tolist():
+    for index in np.flatnonzero(far).tolist():
+        if len(found) > 3 * _MOST:
+            raise CurveError(
+                f"{found[0].axis} has no value at more than {_MOST} parameters, the first at "
+                f"t = {found[0].t!r}",
+                axis=found[0].axis,
+                hint="shorten the range of t, or write a formula that has values there",
+            )
         some, beside = _analyse(curve, float(candidates[index]), points[:, index], singular)
         found += some
         sides += beside

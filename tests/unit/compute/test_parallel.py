@@ -1,4 +1,4 @@
-"""Work on several processors: in order, at once where it may be, and with the same voxels."""
+"""Parallel map: order, errors, interrupts, and voxels independent of the processors."""
 
 import gc
 import subprocess

@@ -1,4 +1,4 @@
-"""Curves evaluated at once are where they are alone, to the last bit."""
+"""Batch evaluation of curves: to the last bit what each curve returns alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Knots and weights as CAD programs write them."""
+"""Knot vectors and weights of B-splines as CAD programs write them."""
 
 from __future__ import annotations
 

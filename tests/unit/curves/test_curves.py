@@ -1,4 +1,4 @@
-"""Curves: where they are, how fast they go, and what they cannot be made from."""
+"""Positions, derivatives and argument errors of every curve type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Callables that work in place, or return other values for the same t."""
+"""Impure callables: work in place, or other values for the same t."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lower bounds of lengths, and curves without end that are refused by them before sampling."""
+"""Lower bounds of curve lengths, and refusal of endless curves before sampling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits of values at halving distances: exact where there is one, none where there is none."""
+"""Numerical one-sided limits: limits, poles, oscillations, rounding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curves without a value at single parameters: drawn with their limits, split, or refused."""
+"""Isolated singular parameters: removable ones, jumps, poles."""
 
 from __future__ import annotations
 
@@ -198,6 +198,27 @@ def test_a_curve_that_has_all_its_points_stays_the_same_object(curve: Curve) -> 
     assert complete(curve) is curve
     assert vd.voxelize(curve).curve is curve
     assert vd.voxelize(curve).undefined == ()
+
+
+def test_very_many_singular_parameters_are_refused() -> None:
+    text = "10.5 + 5*mod(t, 1)/mod(t, 1)"
+    assert len(vd.voxelize(expression(text, (0, 99))).undefined) == 100
+    with pytest.raises(
+        CurveError, match="no value at more than 256 parameters, the first"
+    ) as caught:
+        vd.voxelize(vd.Parametric(*[text] * 3, t=(0, 400)))
+    assert caught.value.hint
+
+
+def test_a_drawing_reports_what_its_curve_lacks() -> None:
+    frame = vd.Frame((64, 64, 64))
+    drawing = frame.draw(expression("20 + 9*sin(t)/t", (0, 3)))
+    assert [(point.axis, point.t) for point in drawing.undefined] == [("y", 0.0)]
+    assert drawing.jumps == ()
+    split = frame.draw(expression("20.5 + 9*sign(t - 1)", (0, 3)))
+    assert split.undefined == ()
+    assert split.jumps == (pytest.approx(1),)
+    assert frame.draw(vd.Circle((20, 20, 20), 9)).undefined == ()
 
 
 def test_bounds_know_nothing_at_a_singular_parameter() -> None:

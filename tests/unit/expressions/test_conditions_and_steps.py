@@ -1,4 +1,4 @@
-"""Functions with steps, conditions, and the functions that scenes of other programs use."""
+"""Conditions, functions with steps, and hints for functions of other languages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The language of expressions: what parses, to what, and how the rest is refused."""
+"""Expression language: values, derivatives, limits and syntax errors."""
 
 from __future__ import annotations
 

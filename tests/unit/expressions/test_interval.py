@@ -1,4 +1,4 @@
-"""Intervals against multiple precision: bounds hold what they claim, in every special case."""
+"""Interval enclosures against multiple precision, special cases included."""
 
 import math
 
