@@ -108,7 +108,10 @@ def test_files_that_cannot_be_read(run, tmp_path):
     [
         (["push"], ["SCENE"]),
         (["psuh", "x"], ["psuh", "push"]),
-        (["push", "x", "--fitt", "none"], ["--fit"]),
+        (
+            ["push", "x", "--fitt", "none"],
+            ["no such option: '--fitt'; did you mean '--fit'?", "push --help"],
+        ),
         (["push", "x", "--fit", "cover"], ["contain"]),
         (["push", "x", "--timeout", "0"], ["--timeout"]),
         (["push", "x", "--timeout", "nan"], ["--timeout", "is not a number of seconds"]),

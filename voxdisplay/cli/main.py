@@ -23,6 +23,7 @@ from voxdisplay.errors import (
     SceneError,
     TransportError,
     VoxDisplayError,
+    did_you_mean,
 )
 
 EXIT_REFUSED: Final = 1
@@ -53,7 +54,7 @@ def _print_version(context: click.Context, _parameter: click.Parameter, value: b
     cls=LazyGroup,
     invoke_without_command=True,
     subcommand_metavar="COMMAND [ARGS]...",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings={"help_option_names": ["--help", "-h"], "max_content_width": 100},
     epilog="""Exit codes: 0 done; 1 the device refused, or shows something else; 2 usage or scene;
     3 the port; 4 the device broke the protocol; 70 a fault of this program; 130 interrupted;
     143 ended by SIGTERM; 129 the terminal was closed.
@@ -103,9 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
             # A command that ends by click's Exit returns its code; all others return None.
             ended = cli.main(arguments, prog_name="voxdisplay", standalone_mode=False)
     except click.ClickException as usage_error:
-        text = io.StringIO()
-        usage_error.show(text)
-        print_stderr(text.getvalue().removesuffix("\n"))
+        _print_usage_error(usage_error)
         return EXIT_USAGE
     except (click.Abort, KeyboardInterrupt, TerminationSignal) as cause:
         return report_termination(cause)
@@ -118,6 +117,16 @@ def main(arguments: list[str] | None = None) -> int:
             traceback.print_exc()
         return _report_error(failure)
     return ended if isinstance(ended, int) else 0
+
+
+def _print_usage_error(failure: click.ClickException) -> None:
+    if isinstance(failure, click.NoSuchOption):  # whose text differs from release to release
+        hint = did_you_mean(failure.option_name, failure.possibilities or ())
+        text = f"no such option: {failure.option_name!r}" + (f"; {hint}" if hint else "")
+        failure = click.UsageError(text, failure.ctx)
+    shown = io.StringIO()
+    failure.show(shown)
+    print_stderr(shown.getvalue().removesuffix("\n"))
 
 
 def _report_error(failure: Exception) -> int:
