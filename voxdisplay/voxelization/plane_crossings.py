@@ -326,9 +326,12 @@ def rank_corners(
     nearest.reshape(-1)[at] = plane
     apart = nearest + 0.5 - on_plane
     project = (apart * along).sum(axis=0)
-    square = (apart * apart).sum(axis=0) + off_plane * (off_plane - 2.0 * project)
-    far = (square > MAX_SQUARE).nonzero()[0]
+    # Offsets from the plane's point are at most sqrt(1/2): few can be too long from the other one.
+    more = off_plane * (off_plane - 2.0 * project)
+    far = (more > MAX_SQUARE - 0.500001).nonzero()[0]
     if far.size:
+        square = (apart[:, far] * apart[:, far]).sum(axis=0) + more[far]
+        far = far[square > MAX_SQUARE]
         nearest[:, far] = np.floor(points[:, far] + TIE_TOLERANCE)
         nearest[axis[far], far] = plane[far]
         apart[:, far] = nearest[:, far] + 0.5 - points[:, far]

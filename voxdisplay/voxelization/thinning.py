@@ -122,6 +122,8 @@ def _shortcuts(
     stretch = near_turns - np.arange(near_turns.size) + events.piece[near_turns]
     first, second = find_shortcuts(events.voxels.take(near_turns, axis=1), stretch)
     starts, stops = near_turns[first], near_turns[second]
+    if not starts.size:
+        return starts, stops
     if keep_tips:
         keep = ~_skips_tip(events, starts, stops)
         starts, stops = starts[keep], stops[keep]
@@ -283,9 +285,10 @@ def find_shortcuts(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return all shortcuts between n voxels, (3, n), within stretches, (n,): starts, stops."""
     touch = _adjacency_in_window(np.concatenate((voxels, 2 * stretch[None].astype(np.int32))))
-    start, w = touch[1:].T.nonzero()
+    w, start = touch[1:].nonzero()
     if start.size:
-        w += 2
+        order = np.argsort(start, kind="stable")  # by start, then by stop
+        w, start = w[order] + 2, start[order]
         stop, steps = start + w, np.arange(WINDOW)[:, None]
         before = touch[steps, np.maximum(stop - 1 - steps, 0)]  # it is enough to look until start
         ahead, behind = (
