@@ -5,7 +5,6 @@ The first line on stdout is a JSON object with the device's port; everything els
 
 import contextlib
 import json
-import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable
@@ -147,15 +146,6 @@ def _announce(place: dict[str, str]) -> None:
         sys.stdout.flush()
     except (OSError, ValueError) as error:
         _note(f"stdout: {error}; this is the port: {line}")
-        _discard_stdout()
-
-
-def _discard_stdout() -> None:
-    """Send what stdout still holds nowhere, so that it cannot fail again at exit."""
-    with contextlib.suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
 
 
 def _note(text: str) -> None:

@@ -42,10 +42,16 @@ ROOT = Path(__file__).parents[3]
 
 
 def exit_code(arguments: list[str]) -> int:
+    """Run the program with a signal to stop that has come already; return its exit code."""
+    stop, stopper = os.pipe()
+    os.write(stopper, b"\0")
     try:
-        return main(arguments)
+        return program.run(arguments, stop)
     except SystemExit as end:
         return end.code
+    finally:
+        os.close(stop)
+        os.close(stopper)
 
 
 @contextlib.contextmanager
