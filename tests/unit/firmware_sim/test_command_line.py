@@ -46,7 +46,7 @@ def exit_code(arguments: list[str]) -> int:
     stop, stopper = os.pipe()
     os.write(stopper, b"\0")
     try:
-        return program.run(arguments, stop)
+        return command_line.run(arguments, stop)
     except SystemExit as end:
         return end.code
     finally:
