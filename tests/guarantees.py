@@ -16,8 +16,6 @@ Floats = NDArray[np.float64]
 
 # Interior voxels; the first and the last, which hold the curve's ends; the curve from the voxels.
 ERROR, END_ERROR, COVERAGE = 0.7072, 0.8661, 2.5
-# The centre of a loop's first voxel from the curve's first point, in max norm.
-START_NEAR = 1.5
 
 
 def check(sequence: voxelization.Sequence, curve: Curve) -> None:
@@ -26,7 +24,7 @@ def check(sequence: voxelization.Sequence, curve: Curve) -> None:
     start, end = curve.position(np.array(curve.t_range)).T
     ends = np.floor((start, end))
     if sequence.closed:  # a loop is the same from every beginning, and begins near it
-        assert np.abs(voxels[0] + 0.5 - start).max() <= START_NEAR
+        assert np.abs(voxels[0] + 0.5 - start).max() <= COVERAGE
     else:
         assert np.array_equal(voxels[0], ends[0])
     ends_there = np.array_equal(voxels[-1], ends[1])
