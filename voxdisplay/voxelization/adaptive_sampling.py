@@ -20,6 +20,10 @@ from voxdisplay.voxelization.length_estimate import estimated_min_length
 # A longer curve is a mistake, not a picture: 256^3 has 17 million voxels in all.
 MAX_VOXELS = 10_000_000
 MAX_SAMPLES = 4_000_000
+# Each jump takes some 200 samples to be found.
+MAX_JUMPS = 1 << 14
+# A step is still beside a jump if it is shorter than this share of the longest that need no split.
+JUMP_CONTRAST = 1e-2
 # From so many samples of a curve on, its length is estimated before it gets more.
 MANY_SAMPLES = 1 << 13
 # A step between samples may be this long (voxels, along its longest axis) and bend this far off its
@@ -96,6 +100,7 @@ def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
             return samples
         if parts.sum() > MANY_SAMPLES:
             _check_estimates(batch, samples, parts, estimated)
+            _check_jumps(batch, samples, chord)
         _check_limits(batch, samples, parts, chord)
         samples = batch.subdivide(samples, parts)
 
@@ -196,6 +201,20 @@ def check_estimate(batch: CurveBatch, index: int) -> None:
         raise _roughness_error(batch, index)
     if length > MAX_VOXELS:
         raise _length_error(batch, index, length)
+
+
+def _check_jumps(batch: CurveBatch, samples: Samples, chord: Floats) -> None:
+    """Stop at curves that jump all along: at long steps whose neighbours hardly move."""
+    still = chord < JUMP_CONTRAST * MAX_CHORD
+    leaps = (chord[1:-1] > MAX_CHORD) & still[:-2] & still[2:]
+    count = np.bincount(samples.piece[1:-2][leaps], minlength=len(batch.curves))
+    if (count > MAX_JUMPS).any():
+        index = int(np.argmax(count > MAX_JUMPS))
+        raise CurveError(
+            f"{batch.message_prefix(index)}the curve jumps at {count[index]} parameters or more, "
+            f"and {MAX_JUMPS} is the limit",
+            hint="shorten the range of t, or have it jump less often",
+        )
 
 
 def check_lengths(batch: CurveBatch) -> None:

@@ -102,6 +102,25 @@ def test_an_estimate_is_the_same_every_time() -> None:
     assert estimated_min_length(curve) == estimated_min_length(curve)
 
 
+@pytest.mark.parametrize("text", ["20*sign(sin(1e6*t))", "if(mod(1e5*t, 2) < 1, 0, 9)"])
+def test_a_curve_that_jumps_all_along_is_refused_early(text: str) -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(CurveError, match=r"jumps at \d+ parameters or more") as caught:
+            vd.voxelize(vd.Parametric(text, "t", "t", t=(0, 1)))
+        assert caught.value.hint
+        assert tracemalloc.get_traced_memory()[1] < 200_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_many_jumps_are_drawn() -> None:
+    sequence = vd.voxelize(
+        vd.Parametric("20*if(mod(500*t, 2) < 1, 0, 1)+.5", "t", "t", t=(0, 0.999))
+    )
+    assert len(sequence.jumps) == 499
+
+
 def test_a_long_curve_that_can_be_drawn_is_drawn() -> None:
     sequence = vd.voxelize(vd.Helix((100, 100, 0), 90, 0.5, 600))
     assert 250_000 < len(sequence) < 400_000
