@@ -196,7 +196,8 @@ class Frame:
             If a curve cannot be evaluated or drawn.
 
         """
-        if isinstance(drawable, Drawable) and not isinstance(drawable, type):
+        is_other = not isinstance(drawable, Curve | voxelization.Sequence | type)
+        if is_other and isinstance(drawable, Drawable):
             if color is not None:
                 raise TypeError("color: a scene has colours of its own; leave it out")
             return drawable.draw_on(self, fit=fit)
