@@ -25,6 +25,7 @@ WRONG = {
     "whole number": 7,
     "negative": -3,
     "huge": 1 << 80,
+    "larger than any float": 10**400,
     "fraction": 1.5,
     "nan": math.nan,
     "infinity": -math.inf,

@@ -252,6 +252,13 @@ def test_frames_of_other_formats_or_palettes_differ():
     assert Frame((3, 5, 7), "index8", palette=palette) != same
 
 
+def test_a_difference_is_that_to_a_frame_of_the_same_kind():
+    frame = Frame((3, 5, 7))
+    for base in (Frame((3, 5, 8)), Frame((3, 5, 7), "mono1")):
+        with pytest.raises(ValueError, match="base: expected a frame of 3x5x7 rgb888, found"):
+            frame.difference(base, 64)
+
+
 def test_a_frame_is_not_hashable():
     with pytest.raises(TypeError, match="unhashable"):
         hash(Frame((3, 5, 7)))

@@ -74,7 +74,7 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
         if isinstance(value, np.ndarray) and value.dtype.kind == "c":
             raise TypeError  # noqa: TRY301 - as of a list of complex numbers
         numbers = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise ArgumentError(name, "is not an array of numbers") from None
     fits = len(numbers.shape) == len(shape) and all(
         want in (None, got) for got, want in zip(numbers.shape, shape, strict=True)
