@@ -20,7 +20,10 @@ def short_repr(value: object) -> str:
     if isinstance(value, bool | np.bool_):
         return str(bool(value))
     if isinstance(value, float | int | np.number):
-        return f"{float(value):.6g}"
+        try:
+            return f"{float(value):.6g}"
+        except OverflowError:
+            return _TEXTS.repr(value)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         return short_repr(value[()])
     if isinstance(value, tuple | list | np.ndarray):
