@@ -109,7 +109,7 @@ def vectors(kind: str) -> list[Vector]:
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """Section 3, said once more and as simply as it goes."""
+    """COBS-encode as section 3 says, in the simplest form."""
     out = bytearray()
     groups = data.split(b"\0")
     for group in groups:
@@ -135,12 +135,12 @@ def cobs_decode(segment: bytes) -> bytes:
 
 
 def on_wire(body: bytes) -> bytes:
-    """Header and payload -> what goes on the wire."""
+    """Return the wire form of header and payload."""
     return cobs_encode(body + zlib.crc32(body).to_bytes(4, "little")) + b"\0"
 
 
 def off_wire(data: bytes) -> list[bytes]:
-    """What came from the wire -> header and payload of each packet; checks delimiting and CRC."""
+    """Return header and payload of each packet on the wire; check delimiting and CRC."""
     segments = data.split(b"\0")
     assert segments.pop() == b""
     packets = [cobs_decode(segment) for segment in segments]

@@ -105,10 +105,10 @@ class Probe(Dialogue):
                 return answer
         until_s = self.clock() + self.response_timeout_s
         while self.clock() < until_s:
-            hear_until_s = self.clock() + max(1.2 * self.device.period_s, 0.02)
-            while heard := self.receive(hear_until_s):
-                if heard.kind == spec.TYPE_ACK and _is_shown(heard, frame):
-                    return heard
+            receive_until_s = self.clock() + max(1.2 * self.device.period_s, 0.02)
+            while response := self.receive(receive_until_s):
+                if response.kind == spec.TYPE_ACK and _is_shown(response, frame):
+                    return response
             self.poll_status()
             if self.state.kind == spec.TYPE_ACK and _is_shown(self.state, frame):
                 return self.state

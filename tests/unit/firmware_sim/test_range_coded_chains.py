@@ -22,7 +22,7 @@ Step = tuple[int, int, int]
 
 
 class Coder:
-    """What a host does, word for word."""
+    """Range encoder of a host, as section 7.7 describes it."""
 
     def __init__(self) -> None:
         self.low = 0

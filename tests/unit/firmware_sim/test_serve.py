@@ -165,7 +165,7 @@ def test_tcp_serves_again_after_an_unplug() -> None:
 
 
 def test_a_host_that_never_reads_is_not_read(pair: tuple[socket.socket, socket.socket]) -> None:
-    """What the host does not read must not make the output grow, nor stop the pump."""
+    """A host that does not read makes neither the output grow nor the event loop stop."""
     ours, theirs = pair
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)

@@ -247,7 +247,7 @@ def test_a_bell_without_a_swap_is_no_harm() -> None:
 
 
 def install(monkeypatch: pytest.MonkeyPatch, folder: Path, text: str | None) -> None:
-    """Let a module of our own be the only viewer; None for no viewer at all."""
+    """Install a module as the only viewer; None for no viewer at all."""
     entries = []
     if text is not None:
         (folder / "a_viewer.py").write_text(textwrap.dedent(text))
