@@ -5,6 +5,7 @@ import pytest
 from space_curves import Function, chain, fourier_curve, paper_curve
 
 import voxdisplay as vd
+from voxdisplay.curves import Circle
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization import Sequence, clip, measure, voxelize, voxelize_many
 
@@ -375,3 +376,19 @@ def test_clip_separates_pieces() -> None:
     sequence = voxelize(Function(lambda t: (10 * t, 2.0 + 4 * (t > 0.5), 3.0)))
     start = sequence.starts[1]
     assert clip(sequence, (20, 20, 20)).tolist() == [[0, start], [start, len(sequence)]]
+
+
+# -------------------------------------------------------------------------------- symmetries
+
+
+@pytest.mark.parametrize("middle", [64.0, 64.5])
+def test_circles_are_symmetric(middle: float) -> None:
+    for radius in np.arange(2, 20, 0.5):
+        circle = Circle(center=(middle, middle, 7.5), radius=float(radius))
+        voxels = voxelize(circle).voxels
+        mirrored = int(2 * middle) - 1 - voxels
+        x, y, z = voxels.T
+        images = [(mirrored[:, 0], y), (x, mirrored[:, 1]), (y, x)]
+        lit = set(map(tuple, voxels.tolist()))
+        for image in images:
+            assert set(map(tuple, np.stack((*image, z), axis=1).tolist())) == lit
