@@ -181,18 +181,18 @@ def sample_overlooked(batch: CurveBatch, samples: Samples, boxes: Boxes) -> Samp
 
     """
     before, after = boxes.step, boxes.step + 1
-    begin, way = samples.points[:, before], np.diff(samples.points, axis=1)[:, before]
+    begin, chord = samples.points[:, before], np.diff(samples.points, axis=1)[:, before]
     t, h = samples.t[before], samples.t[after] - samples.t[before]
-    ends = [begin + way * ((each - t) / h) for each in (boxes.t_lo, boxes.t_hi)]
+    ends = [begin + chord * ((each - t) / h) for each in (boxes.t_lo, boxes.t_hi)]
     under = np.minimum(*ends) - boxes.low
     over = boxes.high - np.maximum(*ends)
-    aside = np.maximum(under, over).max(axis=0) > MAX_DEVIATION
-    wild = np.zeros(samples.t.size, dtype=bool)
-    wild[before[aside]] = True
-    fresh = np.flatnonzero(wild[before] & (boxes.t_lo > t))
-    if not fresh.size:
+    deviates = np.maximum(under, over).max(axis=0) > MAX_DEVIATION
+    resampled = np.zeros(samples.t.size, dtype=bool)
+    resampled[before[deviates]] = True
+    inserted = np.flatnonzero(resampled[before] & (boxes.t_lo > t))
+    if not inserted.size:
         return samples
-    at, t_fresh, curve = after[fresh], boxes.t_lo[fresh], boxes.curve[fresh]
+    at, t_fresh, curve = after[inserted], boxes.t_lo[inserted], boxes.curve[inserted]
     return Samples(
         np.insert(samples.piece, at, curve),
         np.insert(samples.t, at, t_fresh),

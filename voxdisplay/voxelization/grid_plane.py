@@ -116,20 +116,20 @@ def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
         back = np.unique(back)
         gain[back] = np.inf
         voxels[:, back] = nearest[:, back]
-        look = np.unique(np.concatenate((back - 1, back)))
-        look = look[(look >= 0) & (look < events.t.size - 1)]
-        look = look[events.piece[look] == events.piece[look + 1]]
-        torn = look[~adjacent(voxels[:, look], voxels[:, look + 1])]
+        recheck = np.unique(np.concatenate((back - 1, back)))
+        recheck = recheck[(recheck >= 0) & (recheck < events.t.size - 1)]
+        recheck = recheck[events.piece[recheck] == events.piece[recheck + 1]]
+        torn = recheck[~adjacent(voxels[:, recheck], voxels[:, recheck + 1])]
     return events.with_voxels(voxels)
 
 
 def _bridge_gaps(batch: CurveBatch, events: VoxelEvents, curve: Ints) -> VoxelEvents:
     """Insert the crossings of all planes where consecutive voxels are not adjacent."""
-    for look in STEP_LIMITS:
+    for longest in STEP_LIMITS:
         gaps = events.gaps()
         if not gaps.size:
             return events
-        samples = _samples_between(batch, events, gaps, curve, look)
+        samples = _samples_between(batch, events, gaps, curve, longest)
         gap, t, voxels = _all_crossings(batch, samples)
         events = _insert_voxels(events, gaps, gap, t, voxels)
     gaps = events.gaps()

@@ -39,23 +39,23 @@ def restore_coverage(
         return full
     centres = thin.voxels.astype(np.float64) + 0.5
     far = box_distances(box_ends, boxes, centres, thin.t, closed=False)
-    bad = far > COVERAGE - ROUNDING
-    middle = (box_ends[0][bad] + box_ends[1][bad]) / 2
+    uncovered_boxes = far > COVERAGE - ROUNDING
+    middle = (box_ends[0][uncovered_boxes] + box_ends[1][uncovered_boxes]) / 2
     at = np.searchsorted(thin.t, middle)
-    bare = np.zeros(thin.t.size - 1, dtype=bool)  # the steps of ``thin`` around those boxes
+    uncovered = np.zeros(thin.t.size - 1, dtype=bool)  # the steps of ``thin`` around those boxes
     for shift in (-2, -1, 0):
-        bare[np.clip(at + shift, 0, bare.size - 1)] = True
-    begin, end = thin.t[:-1][bare], thin.t[1:][bare]
-    place = np.searchsorted(begin, full.t, side="right") - 1
-    back = place >= 0
-    back[back] = full.t[back] < end[place[back]]
-    kept = ~np.append(bare, False)
-    t = np.concatenate((thin.t[kept], full.t[back]))
+        uncovered[np.clip(at + shift, 0, uncovered.size - 1)] = True
+    begin, end = thin.t[:-1][uncovered], thin.t[1:][uncovered]
+    interval = np.searchsorted(begin, full.t, side="right") - 1
+    restored = interval >= 0
+    restored[restored] = full.t[restored] < end[interval[restored]]
+    kept = ~np.append(uncovered, False)
+    t = np.concatenate((thin.t[kept], full.t[restored]))
     order = np.argsort(t, kind="stable")
-    voxels = np.concatenate((thin.voxels[:, kept], full.voxels[:, back]), axis=1)[:, order]
-    heading = np.concatenate((thin.heading[kept], full.heading[back]))[order]
+    voxels = np.concatenate((thin.voxels[:, kept], full.voxels[:, restored]), axis=1)[:, order]
+    heading = np.concatenate((thin.heading[kept], full.heading[restored]))[order]
     piece = np.full(t.size, thin.piece[0])
-    whole = drop_repeats(VoxelEvents(piece, t[order], voxels, heading))
-    if closed and whole.t.size > 1 and (whole.voxels[:, 0] == whole.voxels[:, -1]).all():
-        return whole.take(np.arange(whole.t.size - 1))
-    return whole
+    merged = drop_repeats(VoxelEvents(piece, t[order], voxels, heading))
+    if closed and merged.t.size > 1 and (merged.voxels[:, 0] == merged.voxels[:, -1]).all():
+        return merged.take(np.arange(merged.t.size - 1))
+    return merged

@@ -41,7 +41,7 @@ MOST_TESTS = 1000
 
 # The matrix M of the paper without the signs: one step along one, two or three axes.
 MOVES = np.array(sorted(product((0, 1), repeat=3), key=sum)[1:]).T
-# A march this many times as long as its curve does not arrive.
+# A march this many times as long as its curve has left it.
 MAX_LENGTH_RATIO = 4
 
 
@@ -54,7 +54,7 @@ class MarchTrace:
     voxels : (N, 3) int32 array
         Columns x, y, z.
     t : (N,) float64 array
-        The parameter guessed for each voxel; where the march loses its way, not ascending.
+        The parameter guessed for each voxel; not ascending where the march leaves the curve.
     distances : (N,) float64 array
         The variant's own estimate of the distance from the curve, in voxels.
 
@@ -130,39 +130,39 @@ def follow(
     Raises
     ------
     CurveError
-        If the march does not arrive, or the curve cannot be evaluated.
+        If the march does not reach the curve's end, or the curve cannot be evaluated.
     ValueError
         If there is no such variant or tangent, or no search of such a pitch and reach.
 
     """
     pitch, reach = search_steps(variant, pitch, reach)
     curve = complete(curve)
-    walk = _MarchingCurve(curve, variant, tangent, (pitch, reach), guess)
+    marching = _MarchingCurve(curve, variant, tangent, (pitch, reach), guess)
     first, last = curve.t_range
-    ends = np.floor(walk.position(np.array([first, last])))
+    ends = np.floor(marching.position(np.array([first, last])))
     target = ends[:, 1]
     middle = (first + last) / 2
 
     voxel, t = ends[:, 0], first
     voxels, parameters = [voxel], [t]
-    distances = [float(walk.distances(voxel[:, None], np.array([t]))[0])]
-    for _ in range(walk.longest):
+    distances = [float(marching.distances(voxel[:, None], np.array([t]))[0])]
+    for _ in range(marching.longest):
         # A closed curve begins in its last voxel, and a short one need not leave it.
-        if t >= last or ((t > middle or walk.still) and bool((voxel == target).all())):
+        if t >= last or ((t > middle or marching.still) and bool((voxel == target).all())):
             return MarchTrace(
                 np.array(voxels).astype(np.int32), np.array(parameters), np.array(distances)
             )
-        sign = np.where(walk.tangent(t) < 0, -1.0, 1.0)
+        sign = np.where(marching.tangent(t) < 0, -1.0, 1.0)
         trials = voxel[:, None] + sign[:, None] * MOVES
-        guesses = walk.guess(trials + 0.5, t)
-        apart = walk.distances(trials, guesses)
-        best = int(np.argmin(apart))
+        guesses = marching.guess(trials + 0.5, t)
+        distance = marching.distances(trials, guesses)
+        best = int(np.argmin(distance))
         voxel, t = trials[:, best], float(guesses[best])
         voxels.append(voxel)
         parameters.append(t)
-        distances.append(float(apart[best]))
+        distances.append(float(distance[best]))
     raise CurveError(
-        f"the march does not arrive: it has lost its way near t = {t:.6g}",
+        f"the march does not reach the end of the curve: it left it near t = {t:.6g}",
         hint="use the method 'grid-plane', or a finer variant",
     )
 
@@ -250,19 +250,19 @@ class _MarchingCurve:
         if not self._cylinder:
             tests = np.clip(tests, *self._curve.t_range)
         points = self.position(tests.ravel()).reshape(3, *tests.shape)
-        apart = np.sqrt(((points - (voxels + 0.5)[:, :, None]) ** 2).sum(axis=0))
-        least = np.argmin(apart, axis=1)
+        distance = np.sqrt(((points - (voxels + 0.5)[:, :, None]) ** 2).sum(axis=0))
+        least = np.argmin(distance, axis=1)
         row = np.arange(t.size)
         if not self._parabola:
-            return np.asarray(apart[row, least])
+            return np.asarray(distance[row, least])
         middle = np.clip(least, 1, self._steps.size - 2)
-        before, at, after = (apart[row, middle + k] for k in (-1, 0, 1))
+        before, at, after = (distance[row, middle + k] for k in (-1, 0, 1))
         # The vertex of the parabola through three equidistant values, and its value.
         bend = before - 2 * at + after
         with np.errstate(all="ignore"):
             vertex = at - (after - before) ** 2 / (8 * bend)
         inside = (least == middle) & (bend > 0)
-        return np.asarray(np.where(inside, vertex, apart[row, least]))
+        return np.asarray(np.where(inside, vertex, distance[row, least]))
 
 
 def azimuth_estimate(t: Floats, points: Floats) -> ParameterEstimate | None:

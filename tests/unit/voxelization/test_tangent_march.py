@@ -118,7 +118,7 @@ def test_a_curve_within_a_voxel(variant: int) -> None:
 def test_a_march_that_loses_its_way() -> None:
     # A guess that never advances: the march goes to and fro.
     line = Function(lambda t: (100 * t, 0.5, 0.5))
-    with pytest.raises(CurveError, match="does not arrive"):
+    with pytest.raises(CurveError, match="does not reach the end"):
         follow(line, 1, guess=lambda points, _: np.zeros(points.shape[1]))
 
 
