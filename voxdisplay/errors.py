@@ -24,13 +24,18 @@ This module must not know what raises them.
 
 from __future__ import annotations
 
-import difflib
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from voxdisplay.printable_text import printable_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+_MAX_WORD = 64  # as much of a word is compared
+_MAX_SLIPS = 2
+_SHORT, _LONG = 3, 10  # letters of a word that may have one slip, and two
+_MARKS = str.maketrans("", "", " -_")
 
 
 class VoxDisplayError(Exception):
@@ -207,6 +212,68 @@ class MissingExtra(VoxDisplayError, ImportError):  # noqa: N818 - a state, and t
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
-    """Return a hint that names the known word nearest to a mistyped one; None if none is near."""
-    near = difflib.get_close_matches(word[:64], known, n=1)
-    return f"did you mean {near[0]!r}?" if near else None
+    """Return a hint that names the known word that was mistyped; None if there is not one.
+
+    Mistyped is a word with one slip, a long one with two: a letter missed, added, replaced, or
+    exchanged with the next; or one without its end from a ``_`` on. Words that merely resemble
+    each other, such as plane and bspline, are not offered.
+    """
+    near = _mistyped(word, list(known))
+    return f"did you mean {near!r}?" if near else None
+
+
+def similar_file(name: str, names: Iterable[str]) -> str | None:
+    """Return a hint that names the file that was meant: mistyped, or with another suffix.
+
+    Parameters
+    ----------
+    name : str
+        Of a file that is not there.
+    names : iterable of str
+        Of those that are in its folder.
+
+    """
+    path, others = PurePath(name), [PurePath(each) for each in names]
+    alike = {each.stem: each for each in others if each.suffix.lower() == path.suffix.lower()}
+    near = _mistyped(path.stem, list(alike))
+    meant = [alike[near]] if near else [each for each in others if each.stem == path.stem]
+    return f"did you mean {str(meant[0])!r}?" if len(meant) == 1 else None
+
+
+def _mistyped(word: str, known: list[str]) -> str | None:
+    plain = _without_marks(word)
+    for slips in range(_MAX_SLIPS + 1):
+        near = [each for each in known if _is_mistyped(plain, _without_marks(each), slips)]
+        near = near or [each for each in known if word and each.startswith(f"{word}_")]
+        if near:
+            return near[0] if len(near) == 1 else None
+    return None
+
+
+def _without_marks(word: str) -> str:
+    return word[:_MAX_WORD].lower().translate(_MARKS)
+
+
+def _is_mistyped(word: str, other: str, slips: int) -> bool:
+    shorter = min(len(word), len(other))
+    if slips > (0 if shorter < _SHORT else 1 if shorter < _LONG else _MAX_SLIPS):
+        return False
+    if len(word) == len(other) <= _SHORT + 1 and sorted(word) != sorted(other):
+        return False  # both may be meant: fill, file
+    return _is_near(word, other, slips)
+
+
+def _is_near(word: str, other: str, slips: int) -> bool:
+    """Return whether at most so many slips make one word of the other."""
+    while word and other and word[0] == other[0]:
+        word, other = word[1:], other[1:]
+    if abs(len(word) - len(other)) > slips:
+        return False
+    if not word or not other:
+        return True
+    if not slips:
+        return False
+    if word[1::-1] == other[:2] and _is_near(word[2:], other[2:], slips - 1):
+        return True
+    rests = ((word[1:], other), (word, other[1:]), (word[1:], other[1:]))
+    return any(_is_near(*rest, slips - 1) for rest in rests)

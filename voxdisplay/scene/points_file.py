@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.errors import CurveError, did_you_mean
+from voxdisplay.errors import CurveError, similar_file
 from voxdisplay.expressions.parse import excerpt
 from voxdisplay.scene.point_table import GAPS_HINT, FilePoints, read_table, split_strands
 
@@ -58,7 +58,7 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
     try:
         data = _read_file(folder, name)
     except FileNotFoundError:
-        hint = did_you_mean(name, _names_in(folder))
+        hint = similar_file(name, _names_in(folder))
         raise CurveError(f"there is no file {excerpt(name)} beside the scene", hint=hint) from None
     except CurveError:
         raise

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.argument_checks import wrong_kind
-from voxdisplay.errors import SceneError, did_you_mean
+from voxdisplay.errors import SceneError, did_you_mean, similar_file
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
 from voxdisplay.raster.color import Color, as_colors
@@ -79,7 +79,7 @@ def _similar_file_hint(path: Path) -> str | None:
             names = [entry.name for entry, _ in zip(entries, range(1000), strict=False)]
     except OSError:
         return f"there is no folder {excerpt(str(path.parent))}"
-    return did_you_mean(path.name, names)
+    return similar_file(path.name, names)
 
 
 def read_scene(data: bytes | str, *, folder: str | os.PathLike[str] | None = None) -> Scene:
