@@ -40,7 +40,7 @@ from voxdisplay.expressions.operations import (
     Operation,
 )
 from voxdisplay.expressions.program import Expression, Step
-from voxdisplay.expressions.suggestions import suggest
+from voxdisplay.expressions.suggestions import SYNONYMS, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -171,6 +171,18 @@ _INFIX = {
 }
 _SIGN = 30
 _PRODUCT_HINT = "a product is written with *"
+_NUMBER_HINT = "a number is written like 1000 or 0.5, without gaps; a product with *"
+_NUMBER_BEFORE = re.compile(r"(?:^|[^\w.])[0-9.]+\s*$")
+_INFIX_WORDS = {
+    "and": SYNONYMS["and"],
+    "or": SYNONYMS["or"],
+    "mod": "write mod(a, b)",
+    "div": "write floor(a / b) for the whole quotient",
+    "if": "write if(condition, a, b)",
+    "else": "write if(condition, a, b)",
+}
+"""What words between two operands, as in other languages, are here."""
+
 _ARGUMENT_HINTS = {
     ("log", 2): "write log(x) / log(base)",
     ("ln", 2): "write log(x) / log(base)",
@@ -200,12 +212,23 @@ class _Parser:
             self.fail("the expression is empty")
         self.expression(0, 0)
         if self.token.kind != "end":
-            another = self.token.kind in {"name", "number"} or self.token.text == "("
-            hint = _PRODUCT_HINT if another else None
+            hint = self.hint_for_operand()
             if self.token.text in COMPARISONS:
                 hint = "a comparison belongs into the condition of if(condition, a, b)"
             self.unexpected("an operator or the end", hint=hint)
         return Expression(self.source, tuple(self.program))
+
+    def hint_for_operand(self) -> str | None:
+        """Return a hint for an operand that follows another one without an operator."""
+        word, kind = self.token.text, self.token.kind
+        begin = self.token.column - 1
+        called = self.source.startswith("(", begin + len(word))
+        if word in _INFIX_WORDS and word not in self.names and not called:
+            return _INFIX_WORDS[word]
+        goes_on = kind == "number" or word.strip("0123456789") == "_"
+        if goes_on and _NUMBER_BEFORE.search(self.source[:begin]):
+            return _NUMBER_HINT
+        return _PRODUCT_HINT if kind in {"name", "number"} or word == "(" else None
 
     def expression(self, binding: int, depth: int) -> None:
         if depth > MAX_DEPTH:

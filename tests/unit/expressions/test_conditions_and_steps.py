@@ -169,6 +169,14 @@ def test_nothing_is_known_where_a_divisor_may_be_0(text: str) -> None:
         ("if(t < 1, 1, 2, 3)", r"expected '\)', found ','", r"if\(condition, a, b\)"),
         ("log(8, 2)", "log takes 1 argument, not 2", r"log\(x\) / log\(base\)"),
         ("t\N{SUPERSCRIPT TWO}", "found", r"\*\*2"),
+        ("t and 1", "found 'and'", r"if\(a, if\(b, x, y\), y\)"),
+        ("t mod 2", "found 'mod'", r"write mod\(a, b\)"),
+        ("t if 1 else 2", "found 'if'", r"write if\(condition, a, b\)"),
+        ("2 if(t < 1, 1, 2)", "found 'if'", "a product is written"),
+        ("1 000", "found '000'", "without gaps"),
+        ("1_000", "found '_000'", "without gaps"),
+        ("1.2.3 + t", "found '.3'", "without gaps"),
+        ("t 2", "found '2'", "a product is written"),
     ],
 )
 def test_hints_name_what_is_meant(text: str, message: str, hint: str) -> None:
