@@ -17,7 +17,9 @@ class FairLock:
     def __init__(self) -> None:
         # Re-entrant itself, so that an interrupt in `acquire` never locks its own thread out.
         self._lock = threading.RLock()
-        self._next = threading.Lock()  # held by the thread whose turn is next
+        # Held by the thread whose turn is next. Re-entrant for a signal handler or a finaliser that
+        # runs while that thread waits, and uses the display.
+        self._next = threading.RLock()
         self._owner: int | None = None
         self._depth = 0
 

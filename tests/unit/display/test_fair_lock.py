@@ -1,5 +1,6 @@
 """Fair re-entrant lock: order of the threads that wait for it."""
 
+import signal
 import threading
 
 import pytest
@@ -14,6 +15,14 @@ def start(target):
     return thread
 
 
+def is_waited_for(lock):
+    """Return whether another thread waits for its turn."""
+    free = lock._next.acquire(blocking=False)
+    if free:
+        lock._next.release()
+    return not free
+
+
 def test_who_releases_it_does_not_overtake_who_waits():
     lock, order = FairLock(), []
 
@@ -25,7 +34,7 @@ def test_who_releases_it_does_not_overtake_who_waits():
         order.clear()
         lock.acquire()
         waiter = start(wait)
-        eventually(lock._next.locked, "a thread that waits")
+        eventually(lambda: is_waited_for(lock), "a thread that waits")
         lock.release()
         with lock:
             order.append("again")
@@ -37,7 +46,7 @@ def test_a_thread_that_has_it_gets_it_again_while_another_waits():
     lock = FairLock()
     with lock:
         waiter = start(lambda: lock.acquire() and lock.release())
-        eventually(lock._next.locked, "a thread that waits")
+        eventually(lambda: is_waited_for(lock), "a thread that waits")
         with lock:
             assert lock.acquire(0.0)
             lock.release()
@@ -64,3 +73,39 @@ def test_an_error_inside_releases_it():
     results = []
     start(lambda: results.append(lock.acquire(0.0))).join(WAIT_S)
     assert results == [True]
+
+
+def test_a_signal_handler_takes_it_while_its_own_thread_waits():
+    lock, in_handler, released = FairLock(), [], threading.Event()
+    has_it = threading.Event()
+
+    def hold():
+        with lock:
+            has_it.set()
+            released.wait(WAIT_S)
+
+    def handle(*_):
+        in_handler.append(lock.acquire(0.0))
+        released.set()
+        with lock:
+            in_handler.append("had it")
+
+    holder = start(hold)
+    has_it.wait(WAIT_S)
+    before = signal.signal(signal.SIGUSR1, handle)
+    main = threading.main_thread().ident
+    try:
+        killer = start(
+            lambda: (
+                eventually(lambda: is_waited_for(lock), "a thread that waits"),
+                signal.pthread_kill(main, signal.SIGUSR1),
+            )
+        )
+        assert lock.acquire(WAIT_S)
+        lock.release()
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    killer.join(WAIT_S)
+    holder.join(WAIT_S)
+    assert in_handler == [False, "had it"]
+    assert lock.acquire(0.0), "it is free again"
