@@ -59,8 +59,9 @@ def fourier_curve(seed: int, kind: str, *, closed: bool) -> Function:
     speed = order if closed else order * rng.uniform(0.5, 0.99)
 
     def function(t: Floats) -> tuple[Floats, Floats, Floats]:
-        wave = np.cos(speed[:, None] * t + phase[:, :, None])
-        rows = middle[:, None] + drift[:, None] * t + (weight[:, :, None] * wave).sum(axis=1)
+        rows = middle[:, None] + drift[:, None] * t
+        for k in range(harmonics):  # sum() would add in an order that depends on how many t
+            rows += weight[:, k, None] * np.cos(speed[k] * t + phase[:, k, None])
         return rows[0], rows[1], rows[2]
 
     return Function(function, 0.0, 2 * np.pi)

@@ -59,6 +59,8 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 
 def flag(name: str, value: Any) -> bool:
     """Return the truth of a value; raise `TypeError` if it has none, as an array has not."""
+    if _dimensions(value):  # even an empty one, whose truth older numpy tells with a warning
+        raise wrong_kind(name, "True or False", value)
     try:
         return bool(value)
     except (TypeError, ValueError):

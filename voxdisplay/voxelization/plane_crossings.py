@@ -314,7 +314,7 @@ def rank_corners(
     length = np.maximum(np.sqrt((tangent * tangent).sum(axis=0)), np.finfo(float).tiny)
     along = tangent / length
     # The curve is found near the plane, and followed to the plane itself along its tangent.
-    at = axis * np.int64(axis.size) + np.arange(axis.size)  # of flat rows
+    at = np.multiply(axis, axis.size, dtype=np.int64) + np.arange(axis.size)  # of flat rows
     off_plane = (points.take(at) - guesses.level) / along.take(at)
     lost = ~(np.abs(off_plane) < MAX_PROJECTION)
     if lost.any():
