@@ -72,7 +72,7 @@ def test_turning_the_axes_turns_the_voxels(
     assert np.array_equal(here.voxels[:, list(axes)], there.voxels)
 
 
-@given(curves)
+@given(fouriers | polylines)  # at a cusp, only rounding tells one side from the other
 @settings(max_examples=80, deadline=None)
 def test_reversing_a_curve_reverses_the_voxels(curve: Curve) -> None:
     here, there = voxelize(curve), voxelize(backwards(curve))

@@ -240,6 +240,8 @@ class CurveBatch:
         last = samples.bounds[1:] - 1
         gap = samples.points.take(first, axis=1) - samples.points.take(last, axis=1)
         is_open = np.abs(gap).max(axis=0) > CLOSURE_TOLERANCE
+        is_open |= (high - low).max(axis=0) <= CLOSURE_TOLERANCE  # a point, and no loop
+        is_open |= np.array([curve.closed is False for curve in self.curves])
         ends = np.concatenate((first[is_open], last[is_open]))
         fixed = np.concatenate((ends, self.corners(samples)))
         points = samples.points.take(fixed, axis=1)
