@@ -54,6 +54,17 @@ def test_a_frame_may_be_dropped(how):
     assert_shows(pipe, first)
 
 
+@pytest.mark.parametrize("error", [GeneratorExit(), SystemExit(0), SystemExit("done")])
+def test_the_end_of_a_generator_or_program_shows_the_last_frame(error):
+    display, pipe = open_display()
+    display.present(random_frame(display, 1))
+    last = random_frame(display, 2)
+    display.present(last, wait=False)
+    display.__exit__(type(error), error, None)
+    assert pipe.closed == 1
+    assert_shows(pipe, last)
+
+
 def test_closing_without_frames_sends_nothing():
     display, pipe = open_display()
     display.present(random_frame(display))

@@ -393,4 +393,5 @@ class Display:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self.close(flush=error is None)
+        # A generator that is closed, and sys.exit, end a program as it is meant to end.
+        self.close(flush=error is None or isinstance(error, GeneratorExit | SystemExit))
