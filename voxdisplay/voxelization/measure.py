@@ -187,6 +187,7 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
 
     """
     curve = complete(curve)
+    voxels, index = _distinct(voxels)
     centres = np.asarray(voxels, dtype=float).T + 0.5
     t, begin, solid = _polyline(curve, _sag_budget(voxels), hints)
     after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
@@ -209,7 +210,18 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
         # Whatever was not looked at is further off than a cell, less half a box.
         todo = todo[best[todo] > size - boxes.largest - SLACK]
         size *= 4
-    return best
+    return np.asarray(best[index])
+
+
+def _distinct(voxels: Voxels) -> tuple[Voxels, Ints]:
+    """Return the distinct voxels, (m, 3), and the index among them of each voxel, (N,)."""
+    order = np.lexsort(voxels.T)
+    ascending = voxels[order]
+    first = np.ones(len(voxels), dtype=bool)
+    first[1:] = (ascending[1:] != ascending[:-1]).any(axis=1)
+    index = np.empty(len(voxels), dtype=np.int64)
+    index[order] = np.cumsum(first) - 1
+    return ascending[first], index
 
 
 class _Boxes:

@@ -164,3 +164,23 @@ def test_work_grows_with_the_points_of_a_dense_curve_and_no_faster() -> None:
         return sum(asked_for)
 
     assert asked(40_000) < 5 * asked(10_000)
+
+
+def test_a_voxel_that_is_visited_often_is_measured_once() -> None:
+    asked_for = []
+
+    def counted(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        asked_for.append(t.size)
+        return (5 + 4 * np.cos(t), 5 + 4 * np.sin(t), 0.3 * t)
+
+    def measured(voxels: np.ndarray) -> tuple[list[float], int]:
+        asked_for.clear()
+        found = measure.distances(voxels, Function(counted, 0, 9))
+        return found.tolist(), sum(asked_for)
+
+    voxels = np.random.default_rng(2).integers(0, 10, (40, 3))
+    once, work = measured(voxels)
+    again, same_work = measured(np.tile(voxels, (300, 1)))
+    assert again == 300 * once
+    assert same_work == work
+    assert measured(voxels[:0])[0] == []
