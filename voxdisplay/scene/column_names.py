@@ -13,11 +13,12 @@ _LONGEST = 64  # as much of a name is looked at
 
 _UNIT = re.compile(r"\s*(?:[\[(].*|/.*|\bin\b.*)")
 _WORDS = re.compile(r"[a-z]+|\d+")
-_AFFIXES = re.compile(r"(?:pos|coord|point|p)?([xyz])(?:pos|coord)?")
+_AFFIXES = re.compile(r"(?:pos|coord|point|p|t)?([xyz])(?:pos|coord)?")
 # Words that only say that a column is a coordinate.
 _FILLERS = frozenset(
-    ["pos", "position", "coord", "coordinate", "coords", "coordinates", "point", "points"]
-)
+    ["pos", "position", "coord", "coordinate", "coords", "coordinates", "point", "points",
+     "pose", "field", "translation", "location"]
+)  # fmt: skip
 _UNITS = frozenset(["m", "cm", "mm", "um", "px", "axis"])
 _ARRAYS = frozenset(["points", "point", "position", "coordinates", "coords"])
 

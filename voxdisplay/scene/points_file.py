@@ -68,7 +68,9 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
     read = _read_array if kind == ".npy" else read_table
     found = read(name, data, split=split)
     if not len(found.points):
-        raise CurveError(f"{excerpt(name)} holds no points")
+        comments = kind != ".npy" and re.search(rb"^\s*[#%]", data, re.MULTILINE)
+        hint = "lines that begin with # or % are comments" if comments else None
+        raise CurveError(f"{excerpt(name)} holds no points", hint=hint)
     if len(found.starts) > MAX_STRANDS:
         strands = f"{len(found.starts)} strands, more than {MAX_STRANDS}"
         raise CurveError(f"{excerpt(name)} holds {strands}")
@@ -130,9 +132,8 @@ def _parse_npy(name: str, data: bytes) -> NDArray[np.float64]:
         raise CurveError(f"{excerpt(name)} is not an array of real numbers", hint=hint)
     sides = [int(side) for side in shape[1].split(b",") if side.strip()]
     if len(sides) != 2 or sides[1] != 3:
-        transposed = len(sides) == 2 and sides[0] == 3
         problem = f"{excerpt(name)} has shape ({shape[1].decode()}), not (n, 3)"
-        raise CurveError(problem, hint=f"save array{'.T' if transposed else '[:, :3]'}")
+        raise CurveError(problem, hint=_reshaping_hint(sides))
     try:
         numbers = np.frombuffer(data, dtype=descr[1].decode(), offset=end)
     except (TypeError, ValueError):  # TypeError: f1
@@ -141,3 +142,14 @@ def _parse_npy(name: str, data: bytes) -> NDArray[np.float64]:
         raise CurveError(f"{excerpt(name)} does not hold the {sides[0]} points that it claims")
     points = numbers.reshape(3, -1).T if order[1] == b"True" else numbers.reshape(-1, 3)
     return points.astype(np.float64)
+
+
+def _reshaping_hint(sides: list[int]) -> str | None:
+    """Return what makes points of an array of another shape; None if that is not known."""
+    if len(sides) == 2 and sides[0] == 3:
+        return "save array.T"
+    if len(sides) == 2 and sides[1] > 3:
+        return "save array[:, :3]"
+    if len(sides) == 2 and sides[1] == 2:
+        return "save numpy.insert(array, 2, 0, axis=1) for z = 0"
+    return "save array.reshape(-1, 3)" if len(sides) > 2 and sides[-1] == 3 else None

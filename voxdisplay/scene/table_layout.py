@@ -6,22 +6,31 @@ Found from the first lines. What is ambiguous is an error that names the ways ou
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from voxdisplay.expressions.parse import excerpt
 from voxdisplay.scene.column_names import AXES, axis_columns
 from voxdisplay.scene.table_text import (
+    MAX_LINE,
     ROWS_HINT,
     SEPARATORS,
     TableText,
+    number,
     without_last_empty,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 NAMES_HINT = "name the columns that are x, y and z in a first line"
 
 _MAX_HEADER = 2  # names and units
+_MAX_COMMENTS = 20  # so many above the first row may name the columns
+_MAX_INCOMPLETE = 1 << 12  # so many rows at the beginning may lack numbers
 # Either two numbers with a point each, or one with a comma: 1,5, 2,5, 3,5
 _COMMA_PAIRS = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?:,\s+[+-]?[0-9]+,[0-9]+)+,?\s*")
+_LABEL = re.compile(r"[A-Za-z ]{1,40}:\s+")  # columns: t x y z
+_NUMBERED = re.compile(r"(?:^|(?<=[\s,;]))[0-9]{1,3}[:.)]\s*")  # 1:t 2:x
 _SEPARATOR_LINE = re.compile(r'"?sep=.?"?', re.IGNORECASE)
 _IN_BRACKETS = re.compile(r"\[[^\[\]]{0,40}\]|\([^()]{0,40}\)")
 
@@ -64,13 +73,17 @@ def find_layout(table: TableText) -> Layout | None:
         ways.
 
     """
-    texts = (i for i, line in enumerate(table.lines) if line.strip() and not table.is_comment(i))
+    incomplete: list[int] = []
+    texts = (i for i in _texts(table) if not _is_incomplete(table, i, incomplete))
     head = [i for i, _ in zip(texts, range(_MAX_HEADER + 3), strict=False)]
     head = head[_counting_lines(table, head) :]
     for position, line in enumerate(head[: _MAX_HEADER + 1]):
         found, separator = _find_separator(table, line)
         if found:
-            return _layout_from(table, line, separator, head[:position])
+            header = head[:position]
+            layout = _layout_from(table, line, separator, header)
+            begin = header[-1] if header else -1
+            return layout._replace(first=min([i for i in incomplete if begin < i < line] or [line]))
     if not head:
         return None
     # Behind a line of names, the next one is to blame.
@@ -79,6 +92,32 @@ def find_layout(table: TableText) -> Layout | None:
         return None
     wrong = head[1] if named else head[0]
     raise table.error(wrong, f"{excerpt(table.lines[wrong])} is not three numbers", ROWS_HINT)
+
+
+def _texts(table: TableText) -> Iterator[int]:
+    return (i for i, line in enumerate(table.lines) if line.strip() and not table.is_comment(i))
+
+
+def _is_incomplete(table: TableText, line: int, found: list[int]) -> bool:
+    """Return whether a line is a row without some of its numbers, and add it to those found.
+
+    A marker that is not seen yet makes such rows at the beginning.
+    """
+    if len(found) == _MAX_INCOMPLETE:
+        return False
+    for separator in SEPARATORS:
+        if separator and separator in table.lines[line]:
+            numbers = [number(field) for field in table.fields(line, separator)]
+            if (
+                None in numbers
+                or len(numbers) < 3
+                or len(table.numeric_columns(line, separator)) > 2
+            ):
+                continue
+            if table.numeric_columns(line, separator):
+                found.append(line)
+                return True
+    return False
 
 
 def listed(names: list[str]) -> str:
@@ -126,12 +165,12 @@ def _layout_from(table: TableText, first: int, separator: str | None, header: li
             raise table.error(line, problem, ROWS_HINT)
     row = table.fields(first, separator)
     numeric = table.numeric_columns(first, separator)
-    names = _column_names(table, first, separator, header)
-    axes = _named_axes(table, header[0] if header else first - 1, names) if names else None
+    line, names = _column_names(table, first, separator, header)
+    axes = _named_axes(table, line, names) if names else None
     if axes is None:
         if names and len(numeric) > 3:
             problem = f"which of the columns {listed(names)} are x, y and z?"
-            raise table.error(header[0], problem, NAMES_HINT)
+            raise table.error(line, problem, NAMES_HINT)
         axes = numeric[:3]
     columns = max(len(without_last_empty(row)), len(without_last_empty(names)))
     return Layout(first, separator, columns, axes, names, len(numeric))
@@ -139,26 +178,65 @@ def _layout_from(table: TableText, first: int, separator: str | None, header: li
 
 def _column_names(
     table: TableText, first: int, separator: str | None, header: list[int]
-) -> list[str]:
-    """Return the names of the columns; none if the table does not name them."""
-    line = header[0] if header else first - 1
-    if line < 0 or not (header or table.is_comment(line)):
-        return []
-    text = table.lines[line].strip().lstrip("#%").strip() if not header else table.lines[line]
-    row = table.fields(first, separator)
-    width = len(without_last_empty(row))
-    for plain in (text, _IN_BRACKETS.sub("", text)):  # units may have blanks before them
-        for each in (separator, *SEPARATORS):
-            names = [name.rstrip(",;") for name in table.fields(line, each, plain)]
-            if len(names) == len(row) or len(without_last_empty(names)) == width:
-                return names if header or all(axis_columns(names)) else []
-            # R leaves out the name of the column that has the names of the rows.
-            if header and separator in {None, "\t"} and len(names) == width - 1 >= 3:
-                return ["", *names]
-    if not header:
-        return []
+) -> tuple[int, list[str]]:
+    """Return the line that names the columns, and the names; none if the table does not."""
+    if header:
+        return header[0], _header_names(table, first, separator, header[0])
+    above = range(first - 1, max(0, first - _MAX_COMMENTS) - 1, -1)
+    comments = [
+        line for line in above if table.is_comment(line) and len(table.lines[line]) <= MAX_LINE
+    ]
+    for line in comments:
+        text = table.lines[line].strip().lstrip("#%").strip()
+        for names in _possible_names(table, first, separator, line, text):
+            if all(axis_columns(names)):
+                return line, names
+    # Without blanks between them, as many words as columns are names, whatever they mean.
+    for line in comments if separator else ():
+        names = table.fields(line, separator, table.lines[line].strip().lstrip("#%"))
+        if len(names) == len(table.fields(first, separator)) and not any(map(number, names)):
+            return line, names
+    return -1, []
+
+
+def _header_names(table: TableText, first: int, separator: str | None, line: int) -> list[str]:
+    """Return the names in a line that is no comment."""
+    text = table.lines[line]
+    for names in _possible_names(table, first, separator, line, text):
+        return names
+    width = len(without_last_empty(table.fields(first, separator)))
+    # R leaves out the name of the column that has the names of the rows.
+    if separator in {None, "\t"}:
+        for plain in _without_units(text):
+            for each in (separator, *SEPARATORS):
+                names = _names_of(table, line, each, plain)
+                if len(names) == width - 1 >= 3:
+                    return ["", *names]
     problem = f"{len(table.fields(line, separator))} columns have names"
     raise table.error(line, f"{problem}, but line {first + 1} has {width}", NAMES_HINT)
+
+
+def _possible_names(
+    table: TableText, first: int, separator: str | None, line: int, text: str
+) -> Iterator[list[str]]:
+    """Yield the readings of a line that have as many names as a row has columns."""
+    row = table.fields(first, separator)
+    width = len(without_last_empty(row))
+    for plain in _without_units(text):
+        for each in (separator, *SEPARATORS):
+            names = _names_of(table, line, each, plain)
+            if len(names) == len(row) or len(without_last_empty(names)) == width:
+                yield names
+
+
+def _without_units(text: str) -> tuple[str, ...]:
+    """Return a text, and it without units, which may have blanks before them, and labels."""
+    plain = _IN_BRACKETS.sub("", text)
+    return text, plain, _LABEL.sub("", plain), _NUMBERED.sub(" ", plain).strip()
+
+
+def _names_of(table: TableText, line: int, separator: str | None, text: str) -> list[str]:
+    return [name.rstrip(",;") for name in table.fields(line, separator, text)]
 
 
 def _named_axes(table: TableText, line: int, names: list[str]) -> list[int] | None:

@@ -23,8 +23,13 @@ ROWS_HINT = (
     "a first line may name the columns"
 )
 
-_MISSING = frozenset(["", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "null", "none", "nil", "-"])
-_INFINITE = frozenset(["inf", "+inf", "-inf", "infinity", "+infinity", "-infinity"])
+_MISSING_WORDS = "nan +nan -nan na n/a #n/a <na> null none nil -"
+_MISSING_OF_MICROSOFT = "nan(ind) -nan(ind) 1.#ind -1.#ind 1.#qnan -1.#qnan"
+_MISSING = frozenset(["", *_MISSING_WORDS.split(), *_MISSING_OF_MICROSOFT.split()])
+_INFINITE = frozenset(
+    ["inf", "+inf", "-inf", "infinity", "+infinity", "-infinity", "1.#inf", "-1.#inf"]
+)
+_COMMENT = re.compile(r"#(?!(?:IND|QNAN|INF)\b)", re.IGNORECASE)
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+(?:e[+-]?[0-9]+)?")
 _DIGITS = re.compile(r"[0-9.]+")
@@ -141,12 +146,12 @@ def number(field: str) -> float | None:
 def _plain(field: str) -> str:
     """Return a field as numbers are written here; Fortran has exponents with a d."""
     text = field.strip("\"' \t").lower().replace("\N{MINUS SIGN}", "-")
-    return text.replace("d", "e") if text[:1] in "+-.0123456789" else text
+    return text.replace("d", "e") if text[:1] in "+-.0123456789" and "n" not in text else text
 
 
 def _without_comment(line: str) -> str:
     """Return a line without a comment behind its numbers; a name may have a # in it."""
-    before = line.partition("#")[0]
+    before = _COMMENT.split(line, maxsplit=1)[0]
     return before if len(_DIGITS.findall(before)) >= 3 else line
 
 

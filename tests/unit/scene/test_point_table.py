@@ -107,6 +107,21 @@ def test_columns_x_y_z_need_no_note(tmp_path: Path, text: str) -> None:
             "columns 2, 3, 4 ('Points:0', 'Points:1', 'Points:2') of 4",
         ),
         ("a.csv", "Points_2,Points_1,Points_0\n3,2,1\n6.5,5,4\n", "columns 3, 2, 1"),
+        # comments that name columns, as of numpy.savetxt, robots and simulations
+        ("a.csv", "# z,y,x\n# mm,mm,mm\n3,2,1\n6.5,5,4\n", "columns 3, 2, 1"),
+        ("a.txt", "# t x y z\n# [s] [m] [m] [m]\n0 1 2 3\n1 4 5 6.5\n", "columns 2, 3, 4"),
+        ("a.txt", "# by hand\n# t x y z\n# -------\n\n0 1 2 3\n1 4 5 6.5\n", "columns 2, 3, 4"),
+        ("a.txt", "# columns: t x y z\n0 1 2 3\n1 4 5 6.5\n", "columns 2, 3, 4"),
+        ("a.txt", "# 1:t 2:x 3:y 4:z\n0 1 2 3\n1 4 5 6.5\n", "columns 2, 3, 4"),
+        ("a.txt", "# timestamp tx ty tz qw\n0 1 2 3 1\n1 4 5 6.5 1\n", "columns 2, 3, 4"),
+        (
+            "a.csv",
+            (
+                "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z\n"
+                "0,1,2,3\n1,4,5,6.5\n"
+            ),
+            "columns 2, 3, 4",
+        ),
         # decimal commas
         ("a.csv", "1,0;2;3\n4;5;6,5\n", "separated by semicolons with decimal commas"),
         ("a.csv", "1;2;3\n4;5;6,5\n", "separated by semicolons with decimal commas"),
@@ -182,6 +197,11 @@ def test_names_in_another_encoding(tmp_path: Path) -> None:
         (b"PK\x03\x04\xff", "is a ZIP archive", "CSV"),
         ("\u00ff" * 9999, "line 1", ""),
         # hostile
+        ("# time,lon,lat,alt\n0,1,2,3\n", "which of the columns 'time', 'lon'", "first line"),
+        ("1,2,3\n4,5,-1.#IND\n", "line 2: the point 4, 5, nan is not finite", "gaps"),
+        ("1,2,3\n4,5,1.#QNAN\n", "line 2: the point 4, 5, nan is not finite", "gaps"),
+        ("1,2,3\n<NA>,1.#INF,-nan(ind)\n", "the point nan, inf, nan is not finite", "gaps"),
+        ("t,x,y,z\n0,,,\n1,1,2,3\n", "line 2: the point nan, nan, nan is not finite", "gaps"),
         ("1,2,3\n" + "1," * 8_000_000, "line 2: 16000000 characters are more than 65536", ""),
         ("1" * 10**6 + ",2,3\n", "line 1: 1000004 characters are more than 65536", ""),
         ("1,2,3\n" + "9" * 60000 + ",2,3\n", "line 2: the point inf, 2, 3 is not finite", ""),
@@ -205,6 +225,7 @@ def test_what_is_refused(tmp_path: Path, text: str | bytes, message: str, hint: 
         ("1 2 3\n4 5 6\nNaN 1 2\n7 8 9\n1 1 1\n", 3),
         ("1;2;3\n4;5;6\n;;\n\n7;8;9\n1;1;1\n", 3),
         ("1,2,3\n4,5,6\n1,2,inf\n7,8,9\n1,1,1\n", 3),
+        ("t,x,y,z\n" + "0,,,\n" * 9 + "1,1,2,3\n2,4,5,6\n3,,,\n4,7,8,9\n5,1,1,1\n", 2),
         ("1\t2\t3\n4\t5\t6\nNA\tNA\tNA\n7\t8\t9\n1\t1\t1\n\nnan\tnan\tnan\n", 3),
     ],
 )
@@ -214,6 +235,11 @@ def test_strands(tmp_path: Path, text: str, line: int) -> None:
     assert '"gaps": "split"' in (error.hint or "")
     scene = scene_of(tmp_path, text, gaps="split")
     assert strands(scene) == [[[1, 2, 3], [4, 5, 6]], [[7, 8, 9], [1, 1, 1]]]
+
+
+def test_a_long_comment_is_no_row(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, f"# {'x' * 100_000}\n# z,y,x\n3,2,1\n6.5,5,4\n")
+    assert strands(scene) == [POINTS]
 
 
 def test_lines_that_all_end_twice_are_no_strands(tmp_path: Path) -> None:
@@ -241,6 +267,7 @@ def test_gaps_belong_to_files(tmp_path: Path) -> None:
         (["px", "py", "pz"], [[0], [1], [2]]),
         (["coordinates.x", "coordinates.y", "coordinates.z"], [[0], [1], [2]]),
         (["coord[0]", "coords[0]", "coords[1]", "coords[2]"], [[1], [2], [3]]),
+        (["tx", "ty", "tz", "qx"], [[0], [1], [2]]),
         (["vx", "vy", "vz"], [[], [], []]),
         (["velocity x", "normal:0", "xy", "axyz", "max"], [[], [], []]),
         (["index", "time", "zone"], [[], [], []]),

@@ -93,7 +93,15 @@ def test_what_is_no_npy(folder: Path, data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "hint"), [((3, 5), "array.T"), ((4, 4), "array[:, :3]"), ((2, 3, 4), "array[:, :3]")]
+    ("shape", "hint"),
+    [
+        ((3, 5), "(save array.T)"),
+        ((4, 4), "(save array[:, :3])"),
+        ((4, 2), "(save numpy.insert(array, 2, 0, axis=1) for z = 0)"),
+        ((4, 1, 3), "(save array.reshape(-1, 3))"),
+        ((2, 3, 4), "(None)"),
+        ((4, 1), "(None)"),
+    ],
 )
 def test_arrays_of_another_shape(folder: Path, shape: tuple[int, ...], hint: str) -> None:
     np.save(folder / "data.npy", np.zeros(shape))
@@ -171,6 +179,11 @@ def test_missing_and_unreadable_files(folder: Path) -> None:
     assert "'dat.csv' beside the scene (did you mean 'data.csv'?)" in refused(folder, "dat.csv")
     for name in ("", ".csv", "a\0.csv", "x" * 5000 + ".csv", "data.txt"):
         refused(folder, name)
+
+
+def test_rows_that_are_all_comments(folder: Path) -> None:
+    (folder / "data.csv").write_text("color,x,y,z\n#ff0000,1,2,3\n#00ff00,2,3,4\n")
+    assert "holds no points (lines that begin with # or %" in refused(folder, "data.csv")
 
 
 def test_large_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
