@@ -106,7 +106,11 @@ def _serve(
 ) -> None:
     from voxdisplay.view.live.run import run  # noqa: PLC0415 - an extra
 
+    listening = False
+
     def announce(url: str) -> None:
+        nonlocal listening
+        listening = True
         print_stdout(url)
         if open_browser and "SSH_CONNECTION" not in os.environ:
             import webbrowser  # noqa: PLC0415 - it takes longer than pushing a frame
@@ -116,8 +120,8 @@ def _serve(
     try:
         run(source, *listen, announce, allow_origins)
     except OSError as error:
-        if isinstance(error, vd.VoxDisplayError):
-            raise
+        if listening or isinstance(error, vd.VoxDisplayError):
+            raise  # of a port, or of stdout
         where = "{}:{}".format(*listen)
         raise click.BadParameter(
             f"cannot listen at {where}: {error}", param_hint="--listen"
