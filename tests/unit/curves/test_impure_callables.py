@@ -93,6 +93,25 @@ def test_a_counter_of_calls_is_named() -> None:
         vd.voxelize(curve)
 
 
+@pytest.mark.parametrize(
+    "height",
+    [
+        lambda t: 9 * t / t.max(),
+        lambda t: t - t[0],
+        lambda t: t - t.mean(),
+        lambda t: np.linspace(0, 9, t.size),
+        lambda t: np.cumsum(np.cos(t)),
+    ],
+    ids=["largest", "first", "mean", "number", "sum"],
+)
+@pytest.mark.parametrize("t_range", [(0, 6), (-3, 3), (0.5, 700)])
+def test_a_callable_that_depends_on_the_other_parameters_is_named(height, t_range) -> None:
+    curve = vd.Parametric(lambda t: (20 + 9 * np.cos(t), 20 + t, height(t)), t=t_range)
+    with pytest.raises(CurveError, match=r"other values for the same t: .* z = ") as caught:
+        vd.voxelize(curve)
+    assert "by itself" in str(caught.value.hint)
+
+
 @pytest.mark.parametrize("amplitude", [0.02, 0.3, 3.0])
 def test_measuring_does_no_more_work_than_is_drawn(amplitude: float) -> None:
     asked = []
