@@ -98,12 +98,12 @@ def check_wheel(steps: Steps, python: str, work: Path, *, smoke: bool) -> None:
     (outside,) = (work / "unpacked").iterdir()
     for package in PACKAGES:
         shutil.rmtree(outside / package)
-    tests = "tests/unit" if smoke else "tests"
-    steps.run(f"tests: {wheel.name}", _tests(interpreter, tests), cwd=outside)
+    tests = ["tests/cli/test_help.py", "tests/cli/test_documents.py"] if smoke else ["tests"]
+    steps.run(f"tests: {wheel.name}", _tests(interpreter, *tests), cwd=outside)
 
 
-def _tests(interpreter: Path, tests: str) -> list[str | Path]:
-    return [interpreter, "-m", "pytest", "-q", *SHARED, *USUAL, tests]
+def _tests(interpreter: Path, *tests: str) -> list[str | Path]:
+    return [interpreter, "-m", "pytest", "-q", *SHARED, *USUAL, *tests]
 
 
 def _describe(python: Path) -> str:
