@@ -308,3 +308,22 @@ def test_what_is_no_format(format_):
         kind, match=r"format: expected one of .*mono1.*index8.*rgb565.*rgb888, found"
     ):
         Frame((3, 5, 7), format_)
+
+
+def test_masked_arrays_are_refused():
+    mask = np.zeros((7, 5, 3, 3), dtype=bool)
+    pixels = np.ma.masked_array(np.ones((7, 5, 3, 3), dtype=np.uint8), mask=mask)
+    frame = Frame((3, 5, 7))
+    frame.set(pixels)
+    assert frame.array().all()
+    pixels[1, 2, 1] = np.ma.masked
+    voxels = np.ma.masked_array([(1, 1, 1), (2, 2, 2)], mask=[(0, 0, 0), (1, 1, 1)])
+    for call in (
+        lambda: frame.set(pixels),
+        lambda: frame.draw(voxels),
+        lambda: frame.draw([(1, 1, 1)], voxels),
+        lambda: Frame((3, 5, 7), "index8", palette=np.ma.masked_all((256, 3), np.uint8)),
+    ):
+        with pytest.raises(ValueError, match=r"^\w+: some of it is masked: .*filled"):
+            call()
+    assert frame.array().all()

@@ -59,15 +59,15 @@ def print_stdout(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print a line to stderr, unless the command is quiet; what it quotes is made printable."""
+    """Print a line to stderr, unless the command is quiet."""
     if not is_quiet():
-        print_stderr(printable_lines(text))
+        print_stderr(text)
 
 
 def print_stderr(text: str) -> None:
-    """Print lines to stderr, if stderr can still be written."""
+    """Print lines to stderr, if it can still be written; what they quote is made printable."""
     try:
-        _write(sys.stderr, text)
+        _write(sys.stderr, printable_lines(text))
     except OSError as failure:
         # What Python flushes at its end then goes to the null device, without a complaint: of a
         # closed terminal all, of a full disk only what was to be printed here.

@@ -13,6 +13,7 @@ from typing import Final, TypeVar
 
 from voxdisplay.display.handshake import closed_meanwhile, request_info
 from voxdisplay.errors import OpenError, TransportClosed, TransportError
+from voxdisplay.printable_text import printable
 from voxdisplay.transport import Transport, open_transport
 from voxdisplay.transport.discovery import find_port, serial_ports
 
@@ -142,7 +143,7 @@ class Reconnector:
         why : TransportError
             How it was lost.
         serial : str
-            The serial number of its INFO; empty if it has none.
+            The serial number of its INFO, made printable; empty if it has none.
         cancelled : callable
             Returns True when the device is not wanted any more.
 
@@ -194,7 +195,8 @@ class Reconnector:
     ) -> Transport:
         transport = open_transport(port, baud=self._baud, reset=self._reset)
         try:
-            _check_serial(port, request_info(transport, timeout_s, cancelled).serial, serial)
+            found = printable(request_info(transport, timeout_s, cancelled).serial)
+            _check_serial(port, found, serial)
         except BaseException:
             transport.close()
             raise

@@ -103,3 +103,22 @@ def test_breaks_can_be_assigned_and_are_none_by_default() -> None:
     assert curve.breaks.size == 0
     curve.breaks = np.array([1.0])
     assert curve.breaks.tolist() == [1.0]
+
+
+MASKED = np.ma.masked_array([[1, 2, 3], [4, 5, 6]], mask=[[0, 0, 0], [0, 1, 0]])
+
+
+def test_masked_points_are_named() -> None:
+    with pytest.raises(vd.CurveError, match=r"points\[1\]\[1\] is not finite: nan"):
+        vd.Polyline(MASKED)
+    assert vd.Polyline(MASKED[:1].repeat(2, axis=0)).position(np.zeros(1))[:, 0].tolist() == [
+        1,
+        2,
+        3,
+    ]
+
+
+@pytest.mark.parametrize("kind", ["datetime64[D]", "timedelta64[s]", "complex", [("a", float)]])
+def test_arrays_of_what_is_no_number_are_refused(kind: object) -> None:
+    with pytest.raises(vd.CurveError, match="start is not an array of numbers"):
+        vd.Segment(np.zeros(3, dtype=kind), (1, 2, 3))

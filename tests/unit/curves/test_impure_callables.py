@@ -153,3 +153,17 @@ def test_rounding_is_no_noise() -> None:
     flip = itertools.cycle((1.0, 1.0 + 1e-12))
     curve = vd.Parametric(lambda t: circle(t) * next(flip), t=(0, 2 * np.pi))
     assert len(vd.voxelize(curve)) == len(vd.voxelize(vd.Parametric(circle, t=(0, 2 * np.pi))))
+
+
+@pytest.mark.parametrize("kind", ["array", "rows", "number"])
+def test_a_masked_value_is_none(kind: str) -> None:
+    def curve(t: np.ndarray) -> object:
+        if kind == "number":
+            return (float("nan") if 2.9 < float(t) < 3 else float(t), 5.0, 6.0)
+        x = np.ma.masked_where((t > 2.9) & (t < 3), t)
+        return np.ma.stack((x, 0 * t, 0 * t)) if kind == "array" else (x, 5, 6)
+
+    masked = vd.Parametric(curve, t=(0, 6))
+    assert np.isnan(masked.position(np.array([1.0, 2.95, 3.0]))[0]).tolist() == [False, True, False]
+    with pytest.raises(CurveError, match=r"x = nan at t = 2\.9\d* is not finite"):
+        vd.voxelize(masked)
