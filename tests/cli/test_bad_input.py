@@ -142,3 +142,20 @@ def test_a_display_that_is_too_large_for_this_machine(monkeypatch, capsys):
     assert printed.startswith("voxdisplay: there is not enough memory: Unable to allocate 24.0 GiB")
     assert main(["--debug", "plan", PAPER]) == 2
     assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["annotate", "{}"],
+        ["preview", PAPER, "-o", "/none{}/x.png"],
+        ["push", PAPER, "{}"],
+        ["push", "{}.json"],
+        ["push", PAPER, "--port", "{}"],
+        ["{}"],
+    ],
+)
+def test_names_do_not_steer_the_terminal(arguments, run):
+    done = run(*(word.format("a\x1b]0;b\x07\x9b31m\u202e") for word in arguments))
+    assert done.returncode in {2, 3}
+    assert done.stderr.replace("\n", "").isprintable(), repr(done.stderr)
