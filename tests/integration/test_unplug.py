@@ -114,6 +114,17 @@ def test_a_device_that_comes_back_goes_on(plug):
     assert any_has(notes, "is back after")
 
 
+def test_a_serial_number_that_is_not_printable_is_known_again(plug):
+    plug.plug(Device(Config((17, 9, 5), "index8", 0, serial="A1\x1b[31m\n")))
+    with vd.open(str(plug.path), reconnect_s=20) as display:
+        assert display.info.serial == "A1\N{REPLACEMENT CHARACTER}[31m\N{REPLACEMENT CHARACTER}"
+        plug.unplug()
+        threading.Timer(0.1, plug.plug).start()
+        frame = noise_frame(display)
+        assert display.present(frame).digest == frame.digest()
+        assert plug.shows(frame)
+
+
 def test_a_device_that_lost_its_memory_gets_its_picture_before_it_is_read(plug):
     plug.plug(serial="A1")
     with vd.open(str(plug.path), reconnect_s=20) as display:
