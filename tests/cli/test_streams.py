@@ -49,6 +49,9 @@ def test_a_disk_that_is_full():
         assert done.returncode == 2
         assert FULL in done.stderr
         assert "Traceback" not in done.stderr
+    done = shell("> /dev/full", "view --no-open examples/paper-curve.json")
+    assert (done.returncode, FULL in done.stderr) == (2, True)
+    assert "listen" not in done.stderr, "the address is not to blame"
     done = shell("--capture /dev/full")
     assert (done.returncode, done.stdout) == (2, "")
     assert FULL in done.stderr
