@@ -20,6 +20,10 @@ MAX_MAGNITUDE = 1e100
 """Largest accepted magnitude: products of a few such numbers do not overflow."""
 
 
+_NO_NUMBERS = "cMmV"
+"""Kinds of arrays that numpy would convert: complex numbers, dates, durations, records."""
+
+
 class ArgumentError(CurveError):
     """A wrong argument of a curve.
 
@@ -71,9 +75,9 @@ def whole(name: str, value: SupportsFloat) -> int:
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
     """Return a finite float64 array of a shape, None for any length, or raise ArgumentError."""
     try:
-        if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+        if isinstance(value, np.ndarray) and value.dtype.kind in _NO_NUMBERS:
             raise TypeError  # noqa: TRY301 - as of a list of complex numbers
-        numbers = np.array(value, dtype=np.float64)
+        numbers = unmasked(value)
     except (OverflowError, TypeError, ValueError):
         raise ArgumentError(name, "is not an array of numbers") from None
     fits = len(numbers.shape) == len(shape) and all(
@@ -88,6 +92,13 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
         first = tuple(np.argwhere(~(np.abs(numbers) <= MAX_MAGNITUDE))[0])
         finite(name + "".join(f"[{i}]" for i in first), numbers[first])
     return numbers
+
+
+def unmasked(value: ArrayLike) -> Floats:
+    """Return a copy of an array as float64, nan where it is masked."""
+    if isinstance(value, np.ma.MaskedArray):
+        value = np.ma.filled(value.astype(np.float64), np.nan)
+    return np.array(value, dtype=np.float64)
 
 
 def vector(name: str, value: ArrayLike) -> Floats:

@@ -296,7 +296,8 @@ def _point(what: str, function: Function, t: float) -> Floats:
 def _rows(what: str, result: Any, n: int) -> Floats:
     """Return a checked copy of what a callable returned: (3, n), or rows that broadcast to that."""
     if isinstance(result, tuple | list) and len(result) == 3:
-        result = np.stack(np.broadcast_arrays(*result, np.empty(n))[:3])
+        rows = [arguments.unmasked(row) if np.ma.isMaskedArray(row) else row for row in result]
+        result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[:3])
     points = _real(what, result)
     if points.shape != (3, n):
         raise CurveError(
@@ -313,4 +314,4 @@ def _real(what: str, result: Any) -> Floats:
         raise CurveError(
             f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
         )
-    return np.array(numbers, dtype=np.float64)
+    return arguments.unmasked(result if isinstance(result, np.ma.MaskedArray) else numbers)

@@ -24,6 +24,8 @@ def short_repr(value: object) -> str:
             return f"{float(value):.6g}"
         except OverflowError:
             return _TEXTS.repr(value)
+    if value is np.ma.masked:
+        return "masked"
     if isinstance(value, np.ndarray) and value.ndim == 0:
         return short_repr(value[()])
     if isinstance(value, tuple | list | np.ndarray):

@@ -18,7 +18,11 @@ def is_array_like(value: object) -> bool:
 
 
 def as_array(name: str, value: object) -> NDArray[Any]:
-    """Return a value as an array; raise `ValueError` for rows of different lengths."""
+    """Return a value as an array; raise `ValueError` for uneven rows, or if any is masked."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(
+            f"{name}: some of it is masked: fill it first, as with array.filled(0), or leave it out"
+        )
     try:
         return np.asarray(value)
     except ValueError:

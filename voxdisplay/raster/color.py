@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.argument_checks import described, wrong_kind
 from voxdisplay.errors import did_you_mean
+from voxdisplay.raster.array_arguments import as_array
 
 Color: TypeAlias = str | Sequence[str | int | Sequence[int]] | NDArray[np.integer]
 
@@ -70,6 +71,7 @@ def as_colors(color: Color) -> NDArray[np.uint8]:
     if isinstance(color, str):
         return np.array([parse_color(color)], dtype=np.uint8)
     if isinstance(color, np.ndarray):
+        color = as_array("color", color)
         names = color.ndim == 1 and color.dtype.kind in "UO"
         return as_colors(color.tolist()) if names else _from_array(color)
     if not isinstance(color, Sequence) or isinstance(color, bytes | bytearray):

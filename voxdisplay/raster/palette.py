@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.raster.array_arguments import as_array
 from voxdisplay.raster.pixel_format import PixelFormat, Values
 
 Colors = NDArray[np.uint8]
@@ -110,10 +111,7 @@ def _unpacked_rgb(codes: NDArray[np.int64]) -> Colors:
 
 
 def _validated(colors: Colors) -> Colors:
-    try:
-        colors = np.asarray(colors)
-    except ValueError:  # rows of different lengths
-        colors = np.empty(0, dtype=object)
+    colors = as_array("palette", colors)
     if colors.shape != DEFAULT.shape or colors.dtype != np.uint8:
         raise ValueError(
             f"palette: it is a (256, 3) array of uint8, red, green and blue of each pixel value; "
