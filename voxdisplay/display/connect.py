@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import time
 from collections.abc import Callable
@@ -76,7 +77,10 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     no_reset = flag("no_reset", no_reset)
     function("note", note)
     note_or_not = _ignore if note is None else note  # a callable may be falsy
-    if capture is not None and not callable(getattr(capture, "write", None)):
+    if not callable(clock):
+        raise wrong_kind("clock", "a callable", clock)
+    binary = isinstance(capture, io.RawIOBase | io.BufferedIOBase)
+    if capture is not None and (binary or not callable(getattr(capture, "write", None))):
         raise wrong_kind("capture", "a text file or None", capture)
 
     def attempt() -> Display:

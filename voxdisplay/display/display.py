@@ -16,7 +16,7 @@ from typing import Literal, NoReturn, Self, TextIO, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.argument_checks import flag
+from voxdisplay.argument_checks import duration, flag, function
 from voxdisplay.display.connection import Clock, Connection
 from voxdisplay.display.device_info import DeviceInfo
 from voxdisplay.display.display_operations import DisplayOperations, Progress
@@ -196,6 +196,7 @@ class Display:
 
         """
         wait = flag("wait", wait)
+        function("progress", progress)
         with self._turn() as operations:
             self._check_frame(frame)
             if not wait:
@@ -274,6 +275,7 @@ class Display:
 
         """
         back = flag("back", back)
+        function("progress", progress)
         with self._turn() as operations:
             if not operations.can("read"):
                 raise IncompatibleDevice(
@@ -355,7 +357,9 @@ class Display:
         if self._connection.is_inherited:
             self._connection.close()
             return
-        flush = flush and not blank
+        blank = flag("blank", blank)
+        flush = flag("flush", flush) and not blank
+        flush_timeout_s = duration("flush_timeout_s", flush_timeout_s)
         if not self._lock.acquire(flush_timeout_s if flush else 0.0):
             self._connection.cancel()
             self._lock.acquire()

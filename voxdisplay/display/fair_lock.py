@@ -68,4 +68,6 @@ class FairLock:
 
 
 def _left_s(deadline_s: float | None) -> float:
-    return -1 if deadline_s is None else max(0.0, deadline_s - time.monotonic())
+    if deadline_s is None:
+        return -1
+    return min(max(0.0, deadline_s - time.monotonic()), threading.TIMEOUT_MAX)

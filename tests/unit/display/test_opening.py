@@ -1,5 +1,6 @@
 """Arguments of `vd.open`, and the `repr` of displays and receipts."""
 
+import io
 import pathlib
 import re
 import types
@@ -121,3 +122,10 @@ def test_a_receipt_prints_what_went_wrong():
         "<Receipt of frame 3: 1 voxel, 30 bytes in 1 packet, 500.0 ms, 2 retransmitted, "
         "digest 00000001, repaired>"
     )
+
+
+@pytest.mark.parametrize("argument", [{"clock": 3}, {"capture": io.BytesIO()}])
+def test_arguments_that_would_fail_later_are_refused_at_once(argument):
+    (name,) = argument
+    with pytest.raises(TypeError, match=f"^{name}: expected a "):
+        vd.open("sim:?size=8x8x8", **argument)
