@@ -26,6 +26,7 @@ ROOT = Path(__file__).parents[3]
         ("http://[::1]:8080", "http://[::1]:8080"),
         ("cube.example.com", "cube.example.com"),
         ("cube.example.com:8443", "cube.example.com:8443"),
+        ("https://Würfel.example:8443", "https://xn--wrfel-kva.example:8443"),
         ("*", "*"),
     ],
 )
@@ -39,7 +40,7 @@ def test_origins(text, origin):
         "", " ", "https://", "https://cube.example.com/page", "https://cube example", "ftp://x",
         "//x",
         "https://a:b@c", "https://x:port", "https://x:99999", "https://[::1", "?", "https://*/x#",
-        "null\x1b[2J /",
+        "null\x1b[2J /", "*.example.com", "https://*.example.com", "a,b", "ü..example",
     ],
 )  # fmt: skip
 def test_what_is_no_origin(text):

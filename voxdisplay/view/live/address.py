@@ -14,7 +14,7 @@ def parse_address(text: str) -> tuple[str, int]:
         If it is no such address.
 
     """
-    match = re.fullmatch(r"\[?([^\[\]]+?)\]?:(\d{1,5})", text)
+    match = re.fullmatch(r"\[?([^\[\]\s/?#@*]+?)\]?:([0-9]{1,5})", text)
     if not match or int(match[2]) > 0xFFFF or not _may_be_host(match[1]):
         raise ValueError(f"{text!r} is no address: write HOST:PORT like 127.0.0.1:8000")
     return match[1], int(match[2])

@@ -20,6 +20,8 @@ _ANY = "*"
 def parse_origin(text: str) -> str:
     """Return an origin as a browser sends it: SCHEME://HOST[:PORT], HOST[:PORT], or ``*``.
 
+    There are no patterns and no lists: ``*`` is all origins, and nothing else.
+
     Raises
     ------
     ValueError
@@ -29,10 +31,12 @@ def parse_origin(text: str) -> str:
     origin = text.strip().rstrip("/").lower()
     if origin == _ANY:
         return origin
-    match = re.fullmatch(r"(?:(https?)://)?([^\s/?#@]*[^\s/?#@:])", origin)
+    match = re.fullmatch(r"(?:(https?)://)?([^\s/?#@,*]*[^\s/?#@,*:])", origin)
     try:
         url = urlsplit(f"//{match[2]}") if match else None
         host, port = (url.hostname, url.port) if url else (None, None)
+        if host and not host.isascii():  # browsers send xn--...
+            host = host.encode("idna").decode()
     except ValueError:
         host = None
     if not match or not host:
