@@ -140,7 +140,7 @@ class Frame:
     def copy(self) -> Frame:
         """Return another frame of the same picture; quick, until one of the two is drawn on."""
         self._visible(dark=True)  # so that it is found once for both
-        twin = Frame.__new__(Frame)
+        twin = type(self).__new__(type(self))
         twin.__dict__.update(self.__dict__)
         twin._drawn = self._drawn.copy()  # noqa: SLF001 - of its own kind
         if len(self._drawn) > _OVERDRAW_LIMIT * len(self.lit()[0]):

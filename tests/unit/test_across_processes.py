@@ -153,6 +153,29 @@ def test_drawing_on_a_copy_leaves_the_frame(how):
     assert twin.array()[2, 2, 2].tolist() == [0, 0, 0]
 
 
+class NamedFrame(vd.Frame):
+    def __init__(self, name):
+        super().__init__((3, 5, 7))
+        self.name = name
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_a_copy_of_a_users_frame_is_of_its_class(how):
+    twin = COPIES[how](NamedFrame("one"))
+    assert type(twin) is NamedFrame
+    assert twin.name == "one"
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_what_a_sequence_has_measured_stays_read_only(how):
+    sequence = vd.voxelize(vd.Circle((5, 5, 5), 3))
+    assert len(sequence.contact_pairs) == sequence.report.contacts
+    for each in (sequence, COPIES[how](sequence)):
+        for array in (each.distances, each.contact_pairs):
+            with pytest.raises(ValueError, match="read-only"):
+                array[:1] = 0
+
+
 def test_errors_of_the_curves_arguments():
     error = ArgumentError("radius", "must be positive")
     for how in COPIES.values():

@@ -130,8 +130,9 @@ class Sequence:
         self._freeze()
 
     def _freeze(self) -> None:
-        for array in (self.voxels, self.starts, self.t):
-            if array.flags.writeable:  # to look costs less than to set
+        cached = (vars(self).get("distances"), vars(self).get("contact_pairs"))
+        for array in (self.voxels, self.starts, self.t, *cached):
+            if array is not None and array.flags.writeable:  # to look costs less than to set
                 array.flags.writeable = False
 
     def __len__(self) -> int:
@@ -162,12 +163,13 @@ class Sequence:
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
-        """Distance of every voxel's centre from the curve, in voxels: (N,)."""
+        """Distance of every voxel's centre from the curve, in voxels: (N,); read-only."""
         apart = measure.distances(self.voxels, self.curve)
         lost = apart > END_ERROR
         if lost.any():  # at features that are too narrow to be found without a hint
             hints = self.t[lost]
             apart[lost] = measure.distances(self.voxels[lost], self.curve, hints=hints)
+        apart.flags.writeable = False  # `report` is made from them
         return apart
 
     @property
@@ -183,7 +185,9 @@ class Sequence:
     @cached_property
     def contact_pairs(self) -> NDArray[np.int64]:
         """Index pairs at which the sequence touches itself: see `measure.contacts`."""
-        return measure.contacts(self.voxels, closed=self.closed)
+        pairs = measure.contacts(self.voxels, closed=self.closed)
+        pairs.flags.writeable = False
+        return pairs
 
     @cached_property
     def report(self) -> Report:
