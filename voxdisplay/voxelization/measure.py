@@ -6,20 +6,23 @@ the methods it judges: curves are sampled here anew, by bisection.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.curve import Curve
-from voxdisplay.curves.singular_points import complete
+from voxdisplay.curves.singular_points import complete, singular_points
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges
 from voxdisplay.voxelization.length_estimate import estimated_min_length
 from voxdisplay.voxelization.spatial_hash import COLUMNS, PAIRS_PER_BLOCK, SpatialHash
 
 Voxels = NDArray[np.integer]
+Value = TypeVar("Value")
 
 # The polyline in place of the curve: segments at most this long, with the curve's middle this
 # close to theirs (voxels). Distances do not depend on it; the search for candidates does.
@@ -186,10 +189,14 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
         of a fine polyline, then a golden-section search on the curve itself.
 
     """
-    curve = complete(curve)
     voxels, index = _distinct(voxels)
     centres = np.asarray(voxels, dtype=float).T + 0.5
-    t, begin, solid = _polyline(curve, _sag_budget(voxels), hints)
+    found = _with_completed(curve, partial(_distances, centres, _sag_budget(voxels), hints))
+    return np.asarray(found[index])
+
+
+def _distances(centres: Floats, budget: int, hints: Floats | None, curve: Curve) -> Floats:
+    t, begin, solid = _polyline(curve, budget, hints)
     after = np.arange(t.size) + np.append(solid, False)  # a segment of length 0 before a jump
     t_end, end = t[after], begin[:, after]
     boxes = _Boxes(begin, end)
@@ -210,7 +217,7 @@ def distances(voxels: Voxels, curve: Curve, *, hints: Floats | None = None) -> F
         # Whatever was not looked at is further off than a cell, less half a box.
         todo = todo[best[todo] > size - boxes.largest - SLACK]
         size *= 4
-    return np.asarray(best[index])
+    return best
 
 
 def _distinct(voxels: Voxels) -> tuple[Voxels, Ints]:
@@ -301,9 +308,9 @@ def coverage(voxels: Voxels, curve: Curve) -> float:
     """
     if not len(voxels):
         return float("inf")
-    curve = complete(curve)
     centres = np.asarray(voxels, dtype=float).T + 0.5
-    _, points, _ = _polyline(curve, _sag_budget(voxels))
+    budget = _sag_budget(voxels)
+    _, points, _ = _with_completed(curve, lambda completed: _polyline(completed, budget))
     best = np.full(points.shape[1], np.inf)
     todo = np.arange(best.size)
     size = 1.5
@@ -385,8 +392,26 @@ def _position(curve: Curve, t: Floats) -> Floats:
         points = np.asarray(curve.position(t), dtype=float)
     good = np.isfinite(points).all(axis=0)
     if not good.all():
-        raise ValueError(f"the curve has no point at t = {float(t[np.argmin(good)])!r}")
+        raise _UndefinedError(float(t[np.argmin(good)]))
     return points
+
+
+class _UndefinedError(Exception):
+    """The curve has no point at a parameter, the only argument."""
+
+
+def _with_completed(curve: Curve, measured: Callable[[Curve], Value]) -> Value:
+    """Return a measurement of a curve, completed by its limits where it has no point."""
+    curve = complete(curve)
+    while True:
+        try:
+            return measured(curve)
+        except _UndefinedError as error:
+            (t,) = error.args
+            known = len(singular_points(curve))
+            curve = complete(curve, (t,))
+            if len(singular_points(curve)) <= known:
+                raise CurveError(f"the curve has no point at t = {t!r}") from None
 
 
 def _segment_distances(point: Floats, begin: Floats, end: Floats) -> Floats:

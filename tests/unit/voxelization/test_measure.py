@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from space_curves import Function, chain, paper_curve
 
+import voxdisplay as vd
 from voxdisplay.curves import Polyline
 from voxdisplay.voxelization import measure
 
@@ -184,3 +185,19 @@ def test_a_voxel_that_is_visited_often_is_measured_once() -> None:
     assert again == 300 * once
     assert same_work == work
     assert measured(voxels[:0])[0] == []
+
+
+@pytest.mark.parametrize("part", [3 / 257, 5 / 257, 0.2509765625])
+@pytest.mark.parametrize("jump", [False, True])
+def test_a_callable_without_a_point_where_only_the_measure_looks(
+    part: float, *, jump: bool
+) -> None:
+    def position(t: np.ndarray) -> np.ndarray:
+        apart = t - part
+        x = apart / np.abs(apart) if jump else np.sin(apart) / apart
+        return np.stack((20 + 9 * x, 20 + 30 * t, 5 + 0 * t))
+
+    sequence = vd.voxelize(vd.Parametric(position, t=(0, 1)))
+    assert len(sequence.starts) == 1 + jump
+    assert sequence.report.e_max < 0.8661
+    assert measure.coverage(sequence.voxels, sequence.curve) < 1
