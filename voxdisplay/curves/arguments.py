@@ -121,3 +121,24 @@ def parameter_range(name: str, low: float, high: float) -> tuple[float, float]:
     if a >= b:
         raise ArgumentError(name, f"{'is empty' if a == b else 'runs backwards'}: {a:g} to {b:g}")
     return a, b
+
+
+def curve_points(what: str, result: object, n: int) -> Floats:
+    """Return a checked copy of the points, (3, n), of somebody else's function, or raise."""
+    points = real_numbers(what, result)
+    if points.shape != (3, n):
+        raise CurveError(
+            f"{what} returned shape {points.shape}, not (3, {n}), for {n} parameters",
+            hint="rows are x, y, z: np.stack((x, y, z)), or .T if they are columns",
+        )
+    return points
+
+
+def real_numbers(what: str, result: object) -> Floats:
+    """Return a copy of what a callable returned as float64, or raise CurveError."""
+    numbers = np.asarray(result)
+    if np.iscomplexobj(numbers):
+        raise CurveError(
+            f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
+        )
+    return unmasked(result if isinstance(result, np.ma.MaskedArray) else numbers)

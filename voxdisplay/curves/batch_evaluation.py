@@ -17,6 +17,7 @@ import numpy as np
 
 from voxdisplay.compute import parallel
 from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 
 Value = TypeVar("Value")
@@ -116,5 +117,9 @@ def _group_by_family(curves: Sequence[Curve]) -> list[tuple[Curve, Sequence[int]
 def _evaluate_block(curve: Curve, t: Floats, points: Floats, low: int) -> None:
     high = low + BLOCK_SIZE
     block = t[low:high]
+    if curve.thread_safe:
+        points[:, low:high] = curve.position(block)
+        return
     # A curve of somebody else's may work in place: it gets an array of its own.
-    points[:, low:high] = curve.position(block if curve.thread_safe else block.copy())
+    found = curve.position(block.copy())
+    points[:, low:high] = arguments.curve_points(curve.position.__qualname__, found, block.size)

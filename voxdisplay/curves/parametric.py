@@ -287,7 +287,7 @@ def _point(what: str, function: Function, t: float) -> Floats:
         result = function(t)
     except (ArithmeticError, ValueError):  # as of 1 / 0 and math.log(0)
         return np.full(3, np.nan)
-    point = _real(what, result)
+    point = arguments.real_numbers(what, result)
     if point.shape != (3,):
         raise CurveError(f"{what} returned shape {point.shape}, not (3,), for one parameter")
     return point
@@ -298,20 +298,4 @@ def _rows(what: str, result: Any, n: int) -> Floats:
     if isinstance(result, tuple | list) and len(result) == 3:
         rows = [arguments.unmasked(row) if np.ma.isMaskedArray(row) else row for row in result]
         result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[:3])
-    points = _real(what, result)
-    if points.shape != (3, n):
-        raise CurveError(
-            f"{what} returned shape {points.shape}, not (3, {n}), for {n} parameters",
-            hint="rows are x, y, z: np.stack((x, y, z)), or .T if they are columns",
-        )
-    return points
-
-
-def _real(what: str, result: Any) -> Floats:
-    """Return a copy of what a callable returned as float64, or raise CurveError."""
-    numbers = np.asarray(result)
-    if np.iscomplexobj(numbers):
-        raise CurveError(
-            f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
-        )
-    return arguments.unmasked(result if isinstance(result, np.ma.MaskedArray) else numbers)
+    return arguments.curve_points(what, result, n)

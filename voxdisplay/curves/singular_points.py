@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.one_sided_limits import Limit, limit
 from voxdisplay.errors import CurveError
@@ -227,7 +228,10 @@ def complete(curve: Curve, also: Iterable[float] = ()) -> Curve:
 
 def _evaluate(curve: Curve, t: Floats) -> Floats:
     with np.errstate(all="ignore"):
-        return np.asarray(curve.position(t.copy()), dtype=float)
+        points = curve.position(t.copy())
+    if curve.thread_safe:  # of this package
+        return np.asarray(points, dtype=float)
+    return arguments.curve_points(curve.position.__qualname__, points, t.size)
 
 
 def _check_repeatable(curve: Curve, t: Floats, points: Floats) -> None:

@@ -389,7 +389,8 @@ def _polyline(
 
 def _position(curve: Curve, t: Floats) -> Floats:
     with np.errstate(all="ignore"):
-        points = np.asarray(curve.position(t), dtype=float)
+        # A curve of somebody else's may work in place: it gets an array of its own.
+        points = np.asarray(curve.position(t if curve.thread_safe else t.copy()), dtype=float)
     good = np.isfinite(points).all(axis=0)
     if not good.all():
         raise _UndefinedError(float(t[np.argmin(good)]))

@@ -167,3 +167,49 @@ def test_a_masked_value_is_none(kind: str) -> None:
     assert np.isnan(masked.position(np.array([1.0, 2.95, 3.0]))[0]).tolist() == [False, True, False]
     with pytest.raises(CurveError, match=r"x = nan at t = 2\.9\d* is not finite"):
         vd.voxelize(masked)
+
+
+class OfAUser(Curve):
+    t_range = (0.0, 6.0)
+
+    def __init__(self, change) -> None:
+        self.change = change
+
+    def position(self, t: np.ndarray) -> np.ndarray:
+        return self.change(np.stack((20 + t, 20 + np.sin(t), t)))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (np.transpose, r"returned shape \(\d+, 3\), not \(3, \d+\)"),
+        (lambda _: None, r"returned shape \(\), not \(3, \d+\)"),
+        (lambda points: points[:, :1], r"returned shape \(3, 1\), not \(3, \d+\)"),
+        (lambda points: points[:2], r"returned shape \(2, \d+\), not \(3, \d+\)"),
+        (lambda points: points + 1j, "returned complex numbers"),
+        (lambda points: np.ma.masked_where(points > 25, points), "is not finite"),
+    ],
+    ids=["columns", "None", "one point", "two rows", "complex", "masked"],
+)
+def test_what_a_users_curve_returns_is_checked(change, message) -> None:
+    for call in (
+        lambda: vd.voxelize(OfAUser(change)),
+        lambda: vd.voxelize_many([OfAUser(change), OfAUser(change)]),
+        lambda: vd.voxelize(OfAUser(change), method="march"),
+    ):
+        with pytest.raises(CurveError, match=message) as caught:
+            call()
+        if "returned" in message:
+            assert "OfAUser.position" in str(caught.value)
+
+
+def test_measuring_a_users_curve_that_works_in_place() -> None:
+    class Shifted(Curve):
+        t_range = (0.0, 6.0)
+
+        def position(self, t: np.ndarray) -> np.ndarray:
+            t -= 1.0
+            return np.stack((20 + t, 20 + np.sin(t), t))
+
+    sequence = vd.voxelize(Shifted())
+    assert sequence.report.e_max < 0.8661
