@@ -42,6 +42,8 @@ LIBRARY_ERRORS: Final[tuple[type[Exception], ...]] = (
     # A backend whose library is damaged or missing.
     ImportError,
     EOFError,
+    # libusb 0.1, of a device that does not answer which configuration is active.
+    AssertionError,
     *_SYSTEM,
 )
 

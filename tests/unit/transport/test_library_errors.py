@@ -41,6 +41,7 @@ UNDOCUMENTED = [
     struct.error("unpack requires a buffer of 4 bytes"),
     re.error("unterminated character set"),
     ImportError("libudev.so.1: cannot open shared object file"),
+    AssertionError(),  # pyusb's libusb0: assert ret == 1
 ]
 each_error = pytest.mark.parametrize("error", UNDOCUMENTED, ids=lambda e: type(e).__name__)
 
@@ -54,7 +55,7 @@ def raising(error):
 
 def test_a_fault_of_ours_is_not_in_the_table():
     """What no library raises for a port still ends in a report."""
-    for error in (AssertionError, NameError, MemoryError, SyntaxError):
+    for error in (NameError, MemoryError, SyntaxError):
         assert not issubclass(error, LIBRARY_ERRORS)
 
 
