@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 MAX_DEGREE = 64
 """Highest degree of a Bezier curve or B-spline; the work grows with its square."""
 
+KNOT_ROUNDING = 1e-6
+"""So far, as a share of their range, knots may descend: they were rounded to 32 bits or to text."""
+
 
 class Bezier(Curve):
     """A Bezier curve of any degree, 0 <= t <= 1, by de Casteljau's algorithm.
@@ -236,8 +239,7 @@ def _checked_knots(knots: ArrayLike, n: int, p: int) -> Floats:
             hint=f"write each knot as often as it counts; {n + p - 1} are taken, too, as of CAD "
             "programs that leave out the first and the last",
         )
-    if (np.diff(values) < 0).any():
-        raise arguments.ArgumentError("knots", "must not descend")
+    values = _ascending(values)
     if values[p] == values[n]:
         raise arguments.ArgumentError(
             "knots",
@@ -255,6 +257,19 @@ def _checked_knots(knots: ArrayLike, n: int, p: int) -> Floats:
             "influence",
         )
     return values
+
+
+def _ascending(knots: Floats) -> Floats:
+    """Return knots whose descents were rounding errors, or raise ArgumentError."""
+    steps = np.diff(knots)
+    worst = int(np.argmin(steps))
+    if steps[worst] >= -KNOT_ROUNDING * np.ptp(knots):
+        return np.maximum.accumulate(knots)
+    raise arguments.ArgumentError(
+        "knots",
+        f"must not descend, as from {knots[worst]:g} to {knots[worst + 1]:g}",
+        hint="for the same curve, negate all of them" if (steps <= 0).all() else None,
+    )
 
 
 def _de_boor(points: Floats, knots: Floats, p: int, t: Floats) -> Floats:

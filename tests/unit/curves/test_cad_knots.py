@@ -36,6 +36,27 @@ def test_the_first_and_the_last_knot_may_be_left_out(
     )
 
 
+def test_knots_that_descend_by_rounding() -> None:
+    rounded = vd.BSpline(POINTS, 2, [0, 0, 0, 1 / 3, 1, 2, 2.0000001, 1.9999999])
+    exact = vd.BSpline(POINTS, 2, [0, 0, 0, 1 / 3, 1, 2, 2, 2])
+    np.testing.assert_allclose(rounded.position(T), exact.position(T), atol=1e-4)
+    for certified in (False, True):
+        drawn = [vd.voxelize(each, certified=certified).voxels for each in (rounded, exact)]
+        assert np.array_equal(*drawn)
+
+
+def test_descending_knots_are_negated() -> None:
+    knots = [2, 2, 2, 1.5, 1, 0, 0, 0]
+    with pytest.raises(CurveError, match="must not descend, as from 1 to 0") as refused:
+        vd.BSpline(POINTS, 2, knots)
+    assert refused.value.hint == "for the same curve, negate all of them"
+    curve = vd.BSpline(POINTS, 2, np.negative(knots))
+    assert curve.position(np.array(curve.t_range)).T.tolist() == [POINTS[0], POINTS[-1]]
+    with pytest.raises(CurveError, match="must not descend, as from 2 to 1") as refused:
+        vd.BSpline(POINTS, 2, [0, 0, 0, 2, 1, 3, 3, 3])
+    assert refused.value.hint is None
+
+
 LEFT = [[0, 0, 0], [10, 9, 0], [20, 5, 0], [30, 0, 0]]
 RIGHT = [[30, 0, 0], [40, 0, 9], [50, 0, 0], [60, 3, 3]]
 FULL = [0] * 4 + [1] * 4 + [2] * 4
