@@ -285,6 +285,29 @@ def test_a_viewer_runs_as_long_as_it_is_wanted(
         os.kill(int(number), 0)
 
 
+def test_a_viewer_is_told_the_origins(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int
+) -> None:
+    install(monkeypatch, tmp_path, 'import json, sys; print(json.dumps({"url": sys.argv[-3:]}))')
+    with (
+        Tap(device()) as tap,
+        viewers.viewer(tap, "127.0.0.1:0", "", never, ["a.example", "b.example"]) as url,
+    ):
+        assert url == "['a.example', '--allow-origin', 'b.example']"
+
+
+def test_a_viewer_is_not_waited_for_when_it_is_time_to_stop(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    install(monkeypatch, tmp_path, "import time; time.sleep(60)")
+    stop, stopper = os.pipe()
+    os.write(stopper, b"\0")
+    with Tap(device()) as tap, viewers.viewer(tap, "127.0.0.1:0", "", stop) as url:
+        assert not url
+    os.close(stop)
+    os.close(stopper)
+
+
 @pytest.mark.parametrize("line", ["", "oops", '["url"]', '{"place": 1}'])
 def test_a_viewer_that_does_not_start(
     line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int

@@ -27,6 +27,15 @@ def test_polls_back_off_and_at_most_four_are_outstanding():
     assert now >= 7.75, "then it begins again with HELLO"
 
 
+def test_a_device_may_be_given_more_time():
+    for extra_s in (0.0, 30.0):
+        link = Link(SESSION, 0.0, timeout_s=5)
+        link.extend_timeout(extra_s)
+        transmit(link, 4.9 + extra_s)
+        with pytest.raises(TransportTimeout):
+            transmit(link, 5.1 + extra_s)
+
+
 def test_a_device_that_answers_nothing_but_hello_is_as_good_as_silent():
     link = open_link()
     link.present([b"\xa0"])
