@@ -28,6 +28,8 @@ Value = TypeVar("Value")
 # close to theirs (voxels). Distances do not depend on it; the search for candidates does.
 SEGMENT = 0.5
 SAG = 0.01
+# No more pairs of voxels than this are listed.
+MAX_CONTACTS = 20_000_000
 # No distance is looked for along a polyline of more segments than this.
 MAX_SEGMENTS = 50_000_000
 # No more samples than this, for a sequence of no voxels and for each voxel, are spent on SAG.
@@ -78,7 +80,19 @@ def contacts(voxels: Voxels, *, closed: bool = False) -> Ints:
     (c, 2) int64 array
         All i < j of 26-adjacent or equal voxels with j - i > 1, cyclically if closed; ascending.
 
+    Raises
+    ------
+    CurveError
+        If they are more than `MAX_CONTACTS`.
+
     """
+    count = count_contacts(voxels, closed=closed)
+    if count > MAX_CONTACTS:
+        raise CurveError(
+            f"the sequence touches itself at {count} pairs of voxels, and {MAX_CONTACTS} is the "
+            "most that are listed",
+            hint="the report counts them; or list those of a shorter range of t",
+        )
     pairs = _adjacent_pairs(voxels)
     distance = pairs[:, 1] - pairs[:, 0]
     far = distance > 1

@@ -201,3 +201,12 @@ def test_a_callable_without_a_point_where_only_the_measure_looks(
     assert len(sequence.starts) == 1 + jump
     assert sequence.report.e_max < 0.8661
     assert measure.coverage(sequence.voxels, sequence.curve) < 1
+
+
+def test_more_contacts_than_memory_holds_are_counted_and_not_listed() -> None:
+    voxels = np.tile([[1, 2, 3], [2, 2, 3]], (20_000, 1))
+    count = measure.count_contacts(voxels)
+    assert count == 40_000 * 39_999 // 2 - 39_999
+    with pytest.raises(ValueError, match=f"at {count} pairs"):
+        measure.contacts(voxels)
+    assert len(measure.contacts(voxels[:200])) == measure.count_contacts(voxels[:200])
