@@ -65,6 +65,14 @@ def test_the_end_of_a_generator_or_program_shows_the_last_frame(error):
     assert_shows(pipe, last)
 
 
+def test_a_frame_that_nobody_waited_for_is_verified_when_it_is_displayed():
+    display, _ = open_display()
+    display.present(random_frame(display, 1))
+    frame = random_frame(display, 2)
+    display.present(frame, wait=False)
+    assert np.array_equal(display.verify(frame), frame.array())
+
+
 def test_closing_without_frames_sends_nothing():
     display, pipe = open_display()
     display.present(random_frame(display))

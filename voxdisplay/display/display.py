@@ -287,6 +287,8 @@ class Display:
     def verify(self, frame: Frame, *, progress: Progress | None = None) -> Pixels:
         """Read the front page back and compare it with a frame, voxel by voxel.
 
+        Frames from ``present(wait=False)`` are displayed first.
+
         Parameters
         ----------
         frame : Frame
@@ -308,7 +310,9 @@ class Display:
 
         """
         self._check_frame(frame)
-        page = self.read(progress=progress)
+        with self._turn() as operations:
+            operations.flush()
+            page = self.read(progress=progress)
         if differs := describe_difference(frame.array(), page):
             raise DesyncError(f"what was read back is not the frame: {differs}")
         return page
