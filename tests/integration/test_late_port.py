@@ -4,6 +4,7 @@ import os
 import socket
 import subprocess
 import sys
+import termios
 import threading
 import tty
 
@@ -57,6 +58,35 @@ def test_a_link_that_points_nowhere_yet(plug, tmp_path):
     link.symlink_to(plug.path)
     with vd.open(str(link), reconnect_s=DEADLINE_S, note=NoteThen(plug.plug)) as display:
         display.clear()
+
+
+def test_a_pattern_that_matches_nothing_yet(plug, monkeypatch):
+    def grep(_regexp):
+        return iter([(str(plug.path), "a display", "USB")] if plug.path.exists() else [])
+
+    monkeypatch.setattr("serial.tools.list_ports.grep", grep)
+    notes = NoteThen(plug.plug)
+    with vd.open("hwgrep://display", reconnect_s=DEADLINE_S, note=notes) as display:
+        display.clear()
+    assert notes[0].startswith("hwgrep://display matches no port; waiting")
+
+
+def test_a_port_that_goes_away_while_it_is_configured(plug, monkeypatch):
+    """A termios.error is no OSError, and pyserial hides it in an error without a number."""
+    get, failures = termios.tcgetattr, [termios.error(5, "Input/output error")]
+
+    def fail_once(descriptor):
+        if failures:
+            raise failures.pop()
+        return get(descriptor)
+
+    plug.plug()
+    monkeypatch.setattr(termios, "tcgetattr", fail_once)
+    notes = []
+    with vd.open(str(plug.path), reconnect_s=DEADLINE_S, note=notes.append) as display:
+        display.clear()
+    assert not failures
+    assert "waiting" in notes[0]
 
 
 def test_a_device_that_does_not_answer_yet(plug):

@@ -26,6 +26,8 @@ _TRANSIENT: Final = {
     errno.EAGAIN, errno.ECONNREFUSED, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH,
     errno.ETIMEDOUT,
 }  # fmt: skip
+# What pyserial says where it hides the cause: on Windows, and of hwgrep://.
+_TRANSIENT_TEXTS: Final = ("FileNotFoundError", "no ports found matching")
 
 
 def open_when_available(
@@ -73,11 +75,13 @@ def _may_pass(error: TransportError) -> bool:
 
 
 def _is_transient(cause: BaseException) -> bool:
-    if isinstance(
-        cause, FileNotFoundError | TimeoutError | socket.gaierror
-    ) or "FileNotFoundError" in str(cause):
-        return True  # the text is pyserial's, on Windows
-    return getattr(cause, "errno", None) in _TRANSIENT
+    if isinstance(cause, FileNotFoundError | TimeoutError | socket.gaierror):
+        return True
+    if any(text in str(cause) for text in _TRANSIENT_TEXTS):
+        return True
+    # termios.error has its number as an argument only.
+    numbers = (getattr(cause, "errno", None), *cause.args[:1])
+    return any(isinstance(number, int) and number in _TRANSIENT for number in numbers)
 
 
 def _causes(error: BaseException) -> Iterator[BaseException]:

@@ -80,6 +80,8 @@ def as_open_error(port: str, error: BaseException) -> OpenError:
 def _url_error(port: str, error: BaseException) -> OpenError:
     """Return the error for a URL of pyserial: with a hint only where the cause is known."""
     text = message_of(error)
+    if "no ports found matching" in text:  # hwgrep://
+        return OpenError(f"{port} matches no port", port=port, hint=_available_ports())
     hint = next((hint for parts, hint in _OF_SERVER if any(part in text for part in parts)), None)
     return OpenError(
         f"{port} cannot be opened: {text}", port=port, hint=hint or network_hint(error)
