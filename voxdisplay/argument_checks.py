@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable
+from numbers import Integral
 from typing import Any
 
 _SHORT = reprlib.Repr()
@@ -70,7 +71,9 @@ def flag(name: str, value: Any) -> bool:
 def choice(name: str, value: Any, known: tuple[Any, ...]) -> None:
     """Raise `ValueError` if a value is none of those known, `TypeError` if of another kind."""
     names = ", ".join(map(repr, known))
-    if type(value) not in {type(each) for each in known}:
+    # Integers and texts of numpy, and those of enumerations, too.
+    kinds = tuple(Integral if isinstance(each, int) else type(each) for each in known)
+    if isinstance(value, bool) or not isinstance(value, kinds):
         raise wrong_kind(name, f"one of {names}", value)
     if value not in known:
         raise ValueError(f"{name}: expected one of {names}, found {_SHORT.repr(value)}")

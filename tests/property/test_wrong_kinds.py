@@ -5,6 +5,7 @@ other kinds. Such a call may succeed; if it raises, then by a ``raise`` statemen
 """
 
 import ast
+import enum
 import inspect
 import itertools
 import math
@@ -220,3 +221,13 @@ def test_closing_a_display():
         with vd.open("sim:?size=3x5x7") as display:
             display.present(display.frame(), wait=False)
             call(f"close({what})", display.close, arguments)
+
+
+def test_numbers_and_texts_of_numpy_and_of_enumerations_choose():
+    names = enum.StrEnum("Names", {"MARCH": "march", "CONTAIN": "contain"})
+    numbers = enum.IntEnum("Numbers", {"ONE": 1})
+    expected = vd.voxelize(WRONG["curve"], method="march", variant=1).voxels.tolist()
+    for method, variant in (np.str_("march"), np.int64(1)), (names.MARCH, numbers.ONE):
+        sequence = vd.voxelize(WRONG["curve"], method=method, variant=variant)
+        assert sequence.voxels.tolist() == expected
+    vd.Frame((3, 5, 7)).draw(vd.read_scene(SCENE), fit=names.CONTAIN)
