@@ -93,7 +93,17 @@ def test_emulators_that_there_are_not(run, port, word):
     assert word in pushed(run, port, code=3)
 
 
-@pytest.mark.parametrize("port", ["tcp://::1:5000", "tcp://x:99999", f"tcp://{'a' * 70}:5000"])
+def test_a_slash_behind_a_tcp_port(run):
+    assert "is the device, or the server" in pushed(run, "tcp://127.0.0.1:1/", code=3)
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        "tcp://::1:5000", "tcp://x:99999", f"tcp://{'a' * 70}:5000", "tcp://127.0.0.1:1/x",
+        "tcp://127.0.0.1:1#x",
+    ],
+)  # fmt: skip
 def test_tcp_ports_that_are_mistyped(run, port):
     assert "write it like tcp://127.0.0.1:5000 or tcp://[::1]:5000" in pushed(run, port, code=3)
 

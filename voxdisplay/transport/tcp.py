@@ -45,7 +45,7 @@ class TcpTransport:
             host, number = url.hostname, url.port
         except ValueError as error:
             raise OpenError(f"{port}: {error}", port=port, hint=_EXAMPLE_HINT) from error
-        if not host or not number or url.path or url.query:
+        if not host or not number or url.path not in {"", "/"} or url.query or url.fragment:
             raise OpenError(f"{port} is not a TCP port", port=port, hint=_EXAMPLE_HINT)
         try:
             self._socket = socket.create_connection((host, number), timeout=_CONNECT_S)
