@@ -66,8 +66,13 @@ def note(text: str) -> None:
 
 def print_stderr(text: str) -> None:
     """Print lines to stderr, if it can still be written; what they quote is made printable."""
+    print_drawing(printable_lines(text))
+
+
+def print_drawing(text: str) -> None:
+    """Print text of our own to stderr, escape sequences included, if it can still be written."""
     try:
-        _write(sys.stderr, printable_lines(text))
+        _write(sys.stderr, text)
     except OSError as failure:
         # What Python flushes at its end then goes to the null device, without a complaint: of a
         # closed terminal all, of a full disk only what was to be printed here.

@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING, Final
 
 import voxdisplay as vd
-from voxdisplay.cli.output import is_quiet, print_stderr
+from voxdisplay.cli.output import is_quiet, print_drawing, print_stderr
 from voxdisplay.display.baud import DEFAULT_BAUD, Baud
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
     shown = frame.array() if page is None else page
     lit = lit_voxels(shown, info.grid, info.format, frame.palette)
     for line in half_blocks(lit, info.grid, columns, rows, full=has_true_color()):
-        print_stderr(line)
+        print_drawing(line)
     print_stderr(caption)
 
 

@@ -296,6 +296,18 @@ def test_a_viewer_is_told_the_origins(
         assert url == "['a.example', '--allow-origin', 'b.example']"
 
 
+def test_a_viewer_that_ends_without_a_word(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, never: int
+) -> None:
+    install(monkeypatch, tmp_path, "")
+    with (
+        Tap(device()) as tap,
+        pytest.raises(viewers.ViewerError, match="a_viewer did not start"),
+        viewers.viewer(tap, "127.0.0.1:0", "", never),
+    ):
+        pass
+
+
 def test_a_viewer_is_not_waited_for_when_it_is_time_to_stop(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
