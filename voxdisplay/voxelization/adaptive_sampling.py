@@ -74,7 +74,7 @@ def sample_adaptively(batch: CurveBatch) -> Samples:
 
     Parameters
     ----------
-    batch : Batch
+    batch : CurveBatch
         The curves.
 
     Returns

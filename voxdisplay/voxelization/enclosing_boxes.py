@@ -70,7 +70,7 @@ def enclose_curves(batch: CurveBatch, samples: Samples) -> Boxes:
 
     Parameters
     ----------
-    batch : Batch
+    batch : CurveBatch
         The curves.
     samples : Samples
         Where to cut first; not yet cut at jumps, so that pieces are curves.
@@ -167,7 +167,7 @@ def sample_overlooked(batch: CurveBatch, samples: Samples, boxes: Boxes) -> Samp
 
     Parameters
     ----------
-    batch : Batch
+    batch : CurveBatch
         The curves.
     samples : Samples
         Those that the boxes were made with.

@@ -46,7 +46,7 @@ def trace_curves(batch: CurveBatch, crossings: Crossings, samples: Samples) -> V
 
     Parameters
     ----------
-    batch : Batch
+    batch : CurveBatch
         The curves.
     crossings : Crossings
         Those of dominant planes.

@@ -32,7 +32,7 @@ def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: flo
 
     Parameters
     ----------
-    loop : Events
+    loop : VoxelEvents
         One thinned piece, first and last voxel equal or adjacent.
     position : callable
         (n,) parameters -> (3, n) points of the curve.

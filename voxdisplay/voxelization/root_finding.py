@@ -27,7 +27,7 @@ def find_roots(
 
     Parameters
     ----------
-    batch : Batch
+    batch : CurveBatch
         The curves.
     curve, axis : (n,) int64 arrays
         Which curve, ascending, and which of its coordinates.
