@@ -212,7 +212,7 @@ class Frame:
         if not is_array_like(drawable) or isinstance(drawable, Frame):
             wanted = "a curve, a sequence, an (N, 3) array of voxels or a scene"
             raise wrong_kind("drawable", wanted, drawable)
-        return self._add(as_voxels("drawable", drawable), colors, _NO_INDICES)
+        return self._add_set(as_voxels("drawable", drawable), colors)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
@@ -227,6 +227,19 @@ class Frame:
             self.draw(sequence, color)
             for sequence, (_, color) in zip(sequences, pairs, strict=True)
         ]
+
+    def _add_set(self, voxels: NDArray[np.integer], colors: NDArray[np.uint8]) -> Drawing:
+        """Draw voxels that have no order, such as those of a body.
+
+        Parameters
+        ----------
+        voxels : (N, 3) integer array
+            Columns x, y, z, in any order; those outside the grid are clipped.
+        colors : (k, 3) uint8 array
+            One colour, or one for each voxel, or several spread along the rows.
+
+        """
+        return self._add(voxels, colors, _NO_INDICES)
 
     def _add(
         self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
