@@ -12,7 +12,8 @@ from graphlib import CycleError, TopologicalSorter
 from voxdisplay.argument_checks import described
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.operations import FUNCTIONS
-from voxdisplay.expressions.parse import CONSTANTS, VARIABLE, constant, excerpt, names_in
+from voxdisplay.expressions.parse import CONSTANTS, constant, excerpt, names_in
+from voxdisplay.expressions.program import VARIABLE
 
 MAX_PARAMS = 1000
 """Most params of one scene or curve."""

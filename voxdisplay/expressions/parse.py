@@ -39,7 +39,7 @@ from voxdisplay.expressions.operations import (
     SUBTRACT,
     Operation,
 )
-from voxdisplay.expressions.program import Expression, Step
+from voxdisplay.expressions.program import VARIABLE, Expression, Step
 from voxdisplay.expressions.suggestions import SYNONYMS, suggest
 
 if TYPE_CHECKING:
@@ -54,11 +54,13 @@ MAX_STEPS = 1024
 """Most numbers, names and operations in one expression."""
 
 CONSTANTS = {"pi": math.pi, "tau": math.tau, "e": math.e, "deg": math.pi / 180}
-VARIABLE = "t"
 
 
 def parse(
-    source: str | float, names: Mapping[str, float] | None = None, *, variable: bool = True
+    source: str | float,
+    names: Mapping[str, float] | None = None,
+    *,
+    variables: tuple[str, ...] = (VARIABLE,),
 ) -> Expression:
     """Parse an expression.
 
@@ -68,19 +70,19 @@ def parse(
         The text, or a number.
     names : mapping of str to float, optional
         The values of params.
-    variable : bool
-        True if t may occur.
+    variables : tuple of str
+        Names of the variables that may occur; they go before params of the same name.
 
     Raises
     ------
     CurveError
         If the text is not an expression, or too long, too deep or of too many steps: the message
-        names the column, counted from 1, and what was found there. If it does not depend on t
-        and its value is inf or nan.
+        names the column, counted from 1, and what was found there. If it depends on no
+        variable and its value is inf or nan.
 
     """
     if isinstance(source, str):
-        expression = _Parser(source, names or {}, variable=variable).parse()
+        expression = _Parser(source, names or {}, variables).parse()
     else:
         try:
             value = number("", source)
@@ -88,15 +90,15 @@ def parse(
             raise CurveError(
                 f"an expression is a text or a finite number, not {described(source)}"
             ) from None
-        expression = Expression(str(source), (value,))
+        expression = Expression(str(source), (value,), variables)
     if expression.constant is not None and not math.isfinite(expression.constant):
         raise CurveError(f"{excerpt(source)} is not finite: {expression.constant}")
     return expression
 
 
 def constant(source: str | float, names: Mapping[str, float] | None = None) -> float:
-    """Return the value of an expression without t; raise CurveError as `parse` does."""
-    (value,) = parse(source, names, variable=False).program
+    """Return the value of an expression without variables; raise CurveError as `parse` does."""
+    (value,) = parse(source, names, variables=()).program
     return cast("float", value)
 
 
@@ -196,10 +198,10 @@ _ARGUMENT_HINTS = {
 class _Parser:
     """Pratt parser that appends to the postfix program as it goes."""
 
-    def __init__(self, source: str, names: Mapping[str, float], *, variable: bool) -> None:
+    def __init__(self, source: str, names: Mapping[str, float], variables: tuple[str, ...]) -> None:
         self.source = source
         self.names = names
-        self.variable = variable
+        self.variables = variables
         self.program: list[Step] = []
         self.steps = 0
         if len(source) > MAX_LENGTH:
@@ -216,7 +218,7 @@ class _Parser:
             if self.token.text in COMPARISONS:
                 hint = "a comparison belongs into the condition of if(condition, a, b)"
             self.unexpected("an operator or the end", hint=hint)
-        return Expression(self.source, tuple(self.program))
+        return Expression(self.source, tuple(self.program), self.variables)
 
     def hint_for_operand(self) -> str | None:
         """Return a hint for an operand that follows another one without an operator."""
@@ -277,8 +279,8 @@ class _Parser:
                 self.call(token, FUNCTIONS[name], depth)
             return
         meaning: Step | None = CONSTANTS.get(name, self.names.get(name))
-        if name == VARIABLE and self.variable:
-            meaning = VARIABLE
+        if name in self.variables:
+            meaning = name
         if meaning is None:
             self.unknown(token, called=called)
         if called:
@@ -290,9 +292,11 @@ class _Parser:
         if name == VARIABLE:
             self.fail(
                 f"'t' {self.place(token)} has no value here",
-                hint="t runs only in x, y, z, dx, dy, dz of a parametric curve",
+                hint=f"the variables here are {' and '.join(self.variables)}"
+                if self.variables
+                else "t runs only in x, y, z, dx, dy, dz of a parametric curve",
             )
-        known = [*CONSTANTS, *self.names, *FUNCTIONS] + [VARIABLE] * self.variable
+        known = [*CONSTANTS, *self.names, *FUNCTIONS, *self.variables]
         what, like = ("function", list(FUNCTIONS)) if called else ("name", known)
         hint = suggest(name, like) or f"known: {shorten(', '.join(like), 300)}"
         self.fail(f"unknown {what} {excerpt(name)} {self.place(token)}", hint=hint)

@@ -22,14 +22,17 @@ if TYPE_CHECKING:
 
 V = TypeVar("V")
 Step = float | str | Operation
-"""One step of a postfix program: push a number, push t (its name), or apply an operation."""
+"""One step of a postfix program: push a number or a variable (its name), or apply an operation."""
+
+VARIABLE = "t"
+"""Name of the variable of curves."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
     """A parsed expression: a postfix program, operands before their operation.
 
-    Parts that do not depend on t are computed once, on parsing.
+    Parts that do not depend on a variable are computed once, on parsing.
 
     Attributes
     ----------
@@ -37,11 +40,14 @@ class Expression:
         The text it was parsed from.
     program : tuple of Step
         The steps, for `fold`.
+    variables : tuple of str
+        Names of the variables, in the order in which their values are passed.
 
     """
 
     source: str
     program: tuple[Step, ...]
+    variables: tuple[str, ...] = (VARIABLE,)
 
     @property
     def template(self) -> tuple[Step | None, ...]:
@@ -64,13 +70,13 @@ class Expression:
 
     @property
     def constant(self) -> float | None:
-        """The value if it does not depend on t, else None."""
+        """The value if it does not depend on a variable, else None."""
         (first, *rest) = self.program
         return first if not rest and isinstance(first, float) else None
 
     def fold(
         self,
-        variable: V,
+        variables: Sequence[V],
         constant: Callable[[float], V],
         apply: Callable[[Operation, tuple[V, ...]], V],
     ) -> V:
@@ -78,14 +84,15 @@ class Expression:
 
         Parameters
         ----------
-        variable : V
-            The value of t.
+        variables : sequence
+            The values of the variables.
         constant : callable
             Makes a value of a number.
         apply : callable
             Applies an operation to a tuple of its operands' values.
 
         """
+        value_of = dict(zip(self.variables, variables, strict=True))
         stack: list[V] = []
         for step in self.program:
             if isinstance(step, Operation):
@@ -93,13 +100,23 @@ class Expression:
                 del stack[-step.arity :]
                 stack.append(apply(step, operands))
             else:
-                stack.append(variable if isinstance(step, str) else constant(step))
+                stack.append(value_of[step] if isinstance(step, str) else constant(step))
         (result,) = stack
         return result
 
-    def value(self, t: Floats) -> Floats:
-        """Evaluate at t, (n,) float64, to (n,) float64; not finite where there is no value."""
-        return compile_rows([self])(t).ravel()
+    def value(self, *variables: Floats) -> Floats:
+        """Evaluate at arrays that broadcast; not finite where there is no value.
+
+        Returns
+        -------
+        float64 array
+            Of the shape to which the variables broadcast.
+
+        """
+        out = np.empty(np.broadcast_shapes(*(each.shape for each in variables)))
+        with np.errstate(all="ignore"):
+            out[...] = _run(_flatten(self), variables)
+        return out
 
     def derivative(self, t: Floats) -> Floats:
         """Return the derivative at t, (n,) float64; not finite where the rules find none.
@@ -110,35 +127,43 @@ class Expression:
         out = np.empty_like(t, dtype=np.float64)
         variable: _Dual = (t, np.float64(1))
         with np.errstate(all="ignore"):
-            _, slope = self.fold(variable, lambda value: (np.float64(value), None), _chain_rule)
+            _, slope = self.fold([variable], lambda value: (np.float64(value), None), _chain_rule)
         out[...] = 0.0 if slope is None else slope
         return out
 
-    def enclosure(self, t: Interval) -> Interval:
-        """Return bounds of the exact values of the program for all real t in intervals.
+    def enclosure(self, *variables: Interval) -> Interval:
+        """Return bounds of the exact values of the program for all real variables in intervals.
 
         Its numbers, float64, are taken as they are.
         """
         with np.errstate(all="ignore"):
-            return self.fold(t, interval, lambda operation, x: operation.enclosure(*x))
+            return self.fold(variables, interval, lambda operation, x: operation.enclosure(*x))
 
 
-def compile_rows(expressions: Sequence[Expression]) -> Callable[[Floats], Floats]:
-    """Return an evaluator of k expressions: t, (n,) float64, to (k, n), as `Expression.value`."""
-    programs = [_flatten(each.program) for each in expressions]
+def compile_rows(expressions: Sequence[Expression]) -> Callable[..., Floats]:
+    """Return an evaluator of k expressions of the same variables.
+
+    Returns
+    -------
+    callable
+        Takes the variables, (n,) float64 each, and returns the values, (k, n), as
+        `Expression.value`.
+
+    """
+    programs = [_flatten(each) for each in expressions]
 
     @np.errstate(all="ignore")
-    def evaluate(t: Floats) -> Floats:
-        out = np.empty((len(programs), t.size))
+    def evaluate(*variables: Floats) -> Floats:
+        out = np.empty((len(programs), variables[0].size))
         for row, program in zip(out, programs, strict=True):
-            row[:] = _run(program, t)
+            row[:] = _run(program, variables)
         return out
 
     return evaluate
 
 
 def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
-    """Return an evaluator of expressions of one template.
+    """Return an evaluator of expressions of one template in one variable.
 
     Returns
     -------
@@ -155,32 +180,35 @@ def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
         column[0] if same else column
         for column, same in zip(numbers.T, (bits == bits[0]).all(axis=0), strict=True)
     ]
-    plain = _flatten(programs[0])
+    plain = _flatten(expressions[0])
 
     @np.errstate(all="ignore")
     def evaluate(which: Ints, t: Floats) -> Floats:
         values = iter([column[which] if column.ndim else column for column in columns])
         program = [(0, next(values)) if arity == 0 else (arity, step) for arity, step in plain]
         out = np.empty_like(t, dtype=np.float64)
-        out[...] = _run(program, t)
+        out[...] = _run(program, (t,))
         return out
 
     return evaluate
 
 
-def _flatten(program: tuple[Step, ...]) -> list[tuple[int, Any]]:
-    """Return the steps of a program as `_run` takes them: arity and function, or 0 and a number."""
+def _flatten(expression: Expression) -> list[tuple[int, Any]]:
+    """Return the steps of a program as `_run` takes them.
+
+    Arity and function of operations; -1 and the index of variables; 0 and the value of numbers.
+    """
     return [
         (step.arity, step.value)
         if isinstance(step, Operation)
-        else (-1, None)
+        else (-1, expression.variables.index(step))
         if isinstance(step, str)
         else (0, np.array(step))  # which numpy takes in half the time of a float
-        for step in program
+        for step in expression.program
     ]
 
 
-def _run(program: list[tuple[int, Any]], t: Floats) -> Any:
+def _run(program: list[tuple[int, Any]], variables: Sequence[Floats]) -> Any:
     """Run a program over arrays, as `Expression.fold` does but with less overhead per step."""
     stack: list[Any] = []
     for arity, step in program:
@@ -193,7 +221,7 @@ def _run(program: list[tuple[int, Any]], t: Floats) -> Any:
             last, middle = stack.pop(), stack.pop()
             stack[-1] = step(stack[-1], middle, last)
         else:
-            stack.append(t if arity else step)
+            stack.append(variables[step] if arity else step)
     (result,) = stack
     return result
 

@@ -10,6 +10,7 @@ import pytest
 from functions_in_numpy import IN_NUMPY
 
 from voxdisplay.errors import CurveError
+from voxdisplay.expressions.interval import Interval
 from voxdisplay.expressions.operations import FUNCTIONS
 from voxdisplay.expressions.params import MAX_PARAMS, param_order, resolve_params
 from voxdisplay.expressions.parse import MAX_DEPTH, MAX_LENGTH, MAX_STEPS, constant, parse
@@ -248,4 +249,22 @@ def test_fold_runs_over_any_kind_of_value() -> None:
         (a, b), (c, d) = x
         return a + c, b + d
 
-    assert parse("t + 1 + t").fold((0.0, 1.0), lambda x: (x, x), enclose) == (1.0, 3.0)
+    assert parse("t + 1 + t").fold([(0.0, 1.0)], lambda x: (x, x), enclose) == (1.0, 3.0)
+
+
+def test_expressions_of_several_variables_broadcast() -> None:
+    expression = parse("u - 10*v + k", {"k": 0.5, "u": 7.0}, variables=("u", "v"))
+    u, v = np.arange(3.0)[:, None], np.arange(2.0)
+    assert np.array_equal(expression.value(u, v), u - 10 * v + 0.5)
+    bounds = expression.enclosure(Interval(u, u + 1), Interval(v, v))
+    assert (bounds.lo <= u - 10 * v + 0.5).all()
+    assert (bounds.hi >= u - 10 * v + 1.5).all()
+    assert parse("3", variables=("u", "v")).value(u, v).shape == (3, 2)
+
+
+def test_other_variables_than_those_named_are_unknown() -> None:
+    with pytest.raises(CurveError, match="unknown name 'w' at column 5"):
+        parse("u + w", variables=("u", "v"))
+    with pytest.raises(CurveError, match="'t' at column 1") as caught:
+        parse("t", variables=("u", "v"))
+    assert caught.value.hint == "the variables here are u and v"
