@@ -33,4 +33,9 @@ IN_NUMPY: dict[str, Callable[..., Any]] = {
     "cot": lambda x: 1 / np.tan(x),
     "min": np.minimum,
     "max": np.maximum,
+    "clamp": lambda x, low, high: np.minimum(high, np.maximum(low, x)),
+    "mix": lambda a, b, x: b * x + a * (1 - x),
+    "smoothstep": lambda low, high, x: np.polyval(
+        [-2, 3, 0, 0], np.minimum(1, np.maximum(0, (x - low) / (high - low)))
+    ),
 }

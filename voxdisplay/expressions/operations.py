@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from voxdisplay.expressions import interval, step_intervals
+from voxdisplay.expressions import blend_intervals, interval, step_intervals
 from voxdisplay.expressions import trigonometric_intervals as trigonometric
 
 if TYPE_CHECKING:
@@ -75,6 +75,28 @@ def _operation(name: str, arity: int) -> Operation:
 
 def _zero(*_: Any) -> float:
     return 0.0
+
+
+def _clamp(x: Any, low: Any, high: Any) -> Any:
+    return np.minimum(np.maximum(x, low), high)
+
+
+def _mix(a: Any, b: Any, x: Any) -> Any:
+    return a * (1 - x) + b * x  # exact at both ends, which a + (b - a)*x is not
+
+
+def _share(low: Any, high: Any, x: Any) -> Any:
+    return _clamp((x - low) / (high - low), 0.0, 1.0)
+
+
+def _smoothstep(low: Any, high: Any, x: Any) -> Any:
+    share = _share(low, high, x)
+    return share * share * (3 - 2 * share)
+
+
+def _smoothstep_slope(low: Any, high: Any, x: Any) -> Any:
+    share = _share(low, high, x)
+    return 6 * share * (1 - share) / (high - low)
 
 
 def _power_by_base(_: Any, a: Any, b: Any) -> Any:
@@ -231,6 +253,33 @@ FUNCTIONS = {
                 lambda _, a, b: np.where(a >= b, 0.0, 1.0),
             ),
             variadic=True,
+        ),
+        Operation(
+            "clamp",
+            _clamp,
+            blend_intervals.clamp,
+            (
+                lambda _, x, low, high: np.where((low <= x) & (x <= high), 1.0, 0.0),
+                lambda _, x, low, high: np.where((x < low) & (low <= high), 1.0, 0.0),
+                lambda _, x, low, high: np.where(np.maximum(x, low) > high, 1.0, 0.0),
+            ),
+        ),
+        Operation(
+            "mix",
+            _mix,
+            blend_intervals.mix,
+            (lambda _r, _a, _b, x: 1 - x, lambda _r, _a, _b, x: x, lambda _r, a, b, _x: b - a),
+        ),
+        Operation(
+            "smoothstep",
+            _smoothstep,
+            blend_intervals.smoothstep,
+            (
+                lambda _, a, b, x: _smoothstep_slope(a, b, x) * (_share(a, b, x) - 1),
+                lambda _, a, b, x: -_smoothstep_slope(a, b, x) * _share(a, b, x),
+                lambda _, a, b, x: _smoothstep_slope(a, b, x),
+            ),
+            singular=True,
         ),
         IF,
     )

@@ -20,7 +20,7 @@ MAX_PARAMS = 1000
 
 # Functions that came later may still name a param: a call is told by its bracket.
 _LATER = {"ln", "log10", "log2", "sign", "floor", "ceil", "round", "mod", "cbrt", "sec", "csc"}
-_LATER |= {"cot", "asinh", "acosh", "atanh"}
+_LATER |= {"cot", "asinh", "acosh", "atanh", "clamp", "mix", "smoothstep"}
 RESERVED = ({*FUNCTIONS} - _LATER) | {*CONSTANTS, VARIABLE}
 """Names that a param cannot have."""
 

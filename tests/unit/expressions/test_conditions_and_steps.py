@@ -71,7 +71,7 @@ def test_the_branch_that_is_not_taken_may_have_no_value() -> None:
 def test_derivatives_are_limits_of_differences(name: str) -> None:
     function, h = FUNCTIONS[name], 1e-6
     inner = "t/8 + 1.3" if name == "acosh" else "t/8 + 0.5"
-    text = f"{name}({', '.join((inner, 'cos(t)/9 + 2')[: function.arity])})"
+    text = f"{name}({', '.join((inner, 'cos(t)/9 + 2', '3 - sin(t)/7')[: function.arity])})"
     expression = parse(text)
     near = (expression.value(T + h) - expression.value(T - h)) / (2 * h)
     smooth = np.isfinite(near) & (np.abs(near) < 1e3)  # not across a step
@@ -100,6 +100,12 @@ BOUNDED = [
     "log10(4 + t)",
     "log2(4 + t)",
     "ln(4 + t)",
+    "clamp(2*t, -1, t/3)",
+    "mix(t, 3 - t, sin(t))",
+    "mix(1, 4, t)",
+    "smoothstep(-1, 1, t)",
+    "smoothstep(1, -1, t)",
+    "smoothstep(sin(t) - 5, 2, t*t)",
 ]
 
 
@@ -132,6 +138,8 @@ def test_values_are_enclosed(text: str) -> None:
         ("if(t == 3, 5, 7)", 3.0, 4.0, (5, 7)),
         ("if(t != 3, 5, 7)", 4.0, 5.0, (5, 5)),
         ("mod(t, 2)", 1.5, 2.5, (0, 2)),
+        ("clamp(t, 1, 2)", 0.5, 1.5, (1, 1.5)),
+        ("clamp(t, 1, 2)", 3.0, 4.0, (2, 2)),
     ],
 )
 def test_bounds_are_as_narrow_as_they_can_be(

@@ -51,10 +51,10 @@ def test_constant_expressions_mean_what_they_mean_in_python(text: str, value: fl
 @pytest.mark.parametrize("name", sorted(FUNCTIONS.keys() - {"if"}))
 def test_every_function_of_t_agrees_with_numpy(name: str) -> None:
     function = IN_NUMPY[name]
-    arguments = (T / 3, 0.3 + 0 * T)[: FUNCTIONS[name].arity]
-    text = f"{name}({', '.join(('t/3', '0.3')[: FUNCTIONS[name].arity])})"
+    arguments = (T / 3, 0.3 + 0 * T, 1.7 + 0 * T)[: FUNCTIONS[name].arity]
+    text = f"{name}({', '.join(('t/3', '0.3', '1.7')[: FUNCTIONS[name].arity])})"
     with np.errstate(all="ignore"):
-        np.testing.assert_array_equal(parse(text).value(T), function(*arguments))
+        np.testing.assert_allclose(parse(text).value(T), function(*arguments), rtol=2e-15)
 
 
 def test_values_have_the_shape_of_t() -> None:

@@ -23,7 +23,15 @@ EXACT = {
     "acosh": mpmath.acosh, "atanh": mpmath.atanh, "sec": mpmath.sec, "csc": mpmath.csc,
     "cot": mpmath.cot, "sign": mpmath.sign, "floor": mpmath.floor, "ceil": mpmath.ceil,
     "round": mpmath.nint, "mod": lambda a, b: a - b * mpmath.floor(a / b),
+    "clamp": lambda x, a, b: min(max(x, a), b), "mix": lambda a, b, x: a * (1 - x) + b * x,
+    "smoothstep": lambda a, b, x: smoothstep(min(max((x - a) / (b - a), 0), 1)),
 }  # fmt: skip
+
+
+def smoothstep(share):
+    return share * share * (3 - 2 * share)
+
+
 RANGES = {"asin": 1, "acos": 1, "exp": 700, "sinh": 700, "cosh": 700, "tan": 1e6, "sin": 1e9}
 RANGES |= {"atanh": 1}
 POSITIVE = {"log", "ln", "log10", "log2", "sqrt", "acosh"}
@@ -69,6 +77,9 @@ def test_numpy_is_as_exact_as_assumed_and_points_are_enclosed(name):
         exact = EXACT[name](*(mpmath.mpf(x[i]) for x in operands))
         # Sines and cosines need not be exact in their own last place, only in that of 1.
         unit = np.spacing(1.0 if name in {"sin", "cos"} else abs(float(exact)))
+        if name == "mix":  # two terms, which may cancel
+            a, b, x = operands[:, i]
+            unit = np.spacing(abs(a * (1 - x)) + abs(b * x))
         assert abs(exact - mpmath.mpf(floats[i])) <= 4 * mpmath.mpf(float(unit))
         assert mpmath.mpf(boxes.lo[i]) <= exact <= mpmath.mpf(boxes.hi[i])
         assert boxes.lo[i] <= floats[i] <= boxes.hi[i]
