@@ -34,15 +34,19 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     BSpline             B-spline; with weights, a NURBS curve.
     CatmullRom          Smooth curve through points.
     Curve               Base class, for curves of one's own.
+    Mesh                Triangles between vertices.
+    Box                 Box along the axes.
+    Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
     read_scene          Read a scene from the text of a scene file.
 
-From curves to voxels.
+From curves and bodies to voxels.
 
-    voxelize            Return the voxels along a curve.
+    voxelize            Return the voxels along a curve, or those of a body.
     voxelize_many       Return the voxels along many curves, faster than one by one.
     Sequence            Ordered, 26-connected voxels along a curve.
+    VoxelSet            Voxels of a body, without an order.
     Report              Distances, gaps and contacts of a sequence.
 
 Errors.
@@ -59,6 +63,7 @@ Errors.
     IncompatibleDevice  The device cannot be served by this driver, or for this frame.
     SceneError          A scene file is wrong: where, and what.
     CurveError          A curve cannot be evaluated or drawn.
+    BodyError           A body cannot be evaluated or drawn.
     DesyncError         The display shows something else, after recovery was tried.
     MissingExtra        An optional library is not installed.
 """
@@ -68,6 +73,7 @@ Errors.
 # modules and __all__ agree.
 TYPE_CHECKING = False  # by its name true for type checkers; typing itself takes long to import
 if TYPE_CHECKING:
+    from voxdisplay.bodies import Body, Box, Mesh
     from voxdisplay.curves import (
         Arc,
         Bezier,
@@ -88,6 +94,7 @@ if TYPE_CHECKING:
     from voxdisplay.display.device_info import DeviceInfo
     from voxdisplay.display.display import Display, Receipt
     from voxdisplay.errors import (
+        BodyError,
         CurveError,
         DesyncError,
         DeviceError,
@@ -107,7 +114,7 @@ if TYPE_CHECKING:
     from voxdisplay.raster.grid import Grid
     from voxdisplay.raster.pixel_format import PixelFormat
     from voxdisplay.scene import Scene, load_scene, read_scene
-    from voxdisplay.voxelization import Report, Sequence, voxelize, voxelize_many
+    from voxdisplay.voxelization import Report, Sequence, VoxelSet, voxelize, voxelize_many
 
     __version__: str
 
@@ -115,6 +122,9 @@ if TYPE_CHECKING:
         "Arc",
         "BSpline",
         "Bezier",
+        "Body",
+        "BodyError",
+        "Box",
         "CatmullRom",
         "Circle",
         "Curve",
@@ -131,6 +141,7 @@ if TYPE_CHECKING:
         "IncompatibleDevice",
         "Lissajous",
         "LocalProtocolError",
+        "Mesh",
         "MissingExtra",
         "OpenError",
         "Parametric",
@@ -150,6 +161,7 @@ if TYPE_CHECKING:
         "TransportError",
         "TransportTimeout",
         "VoxDisplayError",
+        "VoxelSet",
         "load_scene",
         "open",
         "read_scene",
@@ -159,6 +171,11 @@ if TYPE_CHECKING:
 
 # The module of each public name.
 _MODULES = {
+    "voxdisplay.bodies": [
+        "Body",
+        "Box",
+        "Mesh",
+    ],
     "voxdisplay.curves": [
         "Arc",
         "Bezier",
@@ -186,6 +203,7 @@ _MODULES = {
         "Receipt",
     ],
     "voxdisplay.errors": [
+        "BodyError",
         "CurveError",
         "DesyncError",
         "DeviceError",
@@ -219,13 +237,14 @@ _MODULES = {
     "voxdisplay.voxelization": [
         "Report",
         "Sequence",
+        "VoxelSet",
         "voxelize",
         "voxelize_many",
     ],
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 # Modules that are attributes of the package without an import of their own.
-_SUBMODULES = ("curves", "display", "errors", "frame", "raster", "scene", "voxelization")
+_SUBMODULES = ("bodies", "curves", "display", "errors", "frame", "raster", "scene", "voxelization")
 
 _PUBLIC = sorted(_MODULE_OF)
 _FUNCTIONS = [name for name in _PUBLIC if name.islower()]

@@ -14,6 +14,7 @@
     |  `- IncompatibleDevice      a version or a grid that cannot be served
     |- SceneError               the scene is wrong: .path and what; also a ValueError
     |- CurveError               a curve cannot be evaluated or drawn; also a ValueError
+    |- BodyError                a body cannot be evaluated or drawn; also a ValueError
     |- DesyncError              the device's digest still differs from ours after recovery
     `- MissingExtra             an optional library is not installed; also an ImportError
 
@@ -201,6 +202,10 @@ class CurveError(VoxDisplayError, ValueError):
     def __init__(self, message: str, *, axis: str | None = None, hint: str | None = None) -> None:
         super().__init__(message, hint=hint)
         self.axis = axis
+
+
+class BodyError(VoxDisplayError, ValueError):
+    """A surface, solid, mesh or volume cannot be evaluated or drawn."""
 
 
 class DesyncError(VoxDisplayError):

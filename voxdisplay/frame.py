@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
 from voxdisplay.argument_checks import flag, instance, whole_number, wrong_kind
+from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
 from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
@@ -25,6 +26,8 @@ from voxdisplay.raster.display_list import DisplayList, OrderedVoxels
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
+from voxdisplay.voxelization.body_voxelization import voxelize_body
+from voxdisplay.voxelization.voxel_box import VoxelBox
 from voxdisplay.wire import spec
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
 from voxdisplay.wire.encoding_selection import PageUpdate, encode_raw_if_faster, encode_update
@@ -52,6 +55,8 @@ class Drawing:
         Parameters at which a curve has no value and is drawn with the limits of both sides.
     jumps : tuple of float
         Parameters at which a curve jumps: nothing is drawn across.
+    notes : tuple of str
+        What was wrong with a body or left out, for people.
 
     """
 
@@ -60,6 +65,7 @@ class Drawing:
     exact_color: bool
     undefined: tuple[SingularPoint, ...] = ()
     jumps: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @runtime_checkable
@@ -162,21 +168,26 @@ class Frame:
 
     def draw(
         self,
-        drawable: Curve | voxelization.Sequence | Drawable | ArrayLike,
+        drawable: Curve
+        | Body
+        | voxelization.Sequence
+        | voxelization.VoxelSet
+        | Drawable
+        | ArrayLike,
         color: Color | None = None,
         *,
         fit: Fit = "contain",
     ) -> Drawing:
-        """Draw a curve, a sequence, voxels or a scene over what is there.
+        """Draw a curve, a body, a sequence, voxels or a scene over what is there.
 
         Parameters
         ----------
-        drawable : Curve, Sequence, (N, 3) integer array, or Scene
+        drawable : Curve, Body, Sequence, VoxelSet, (N, 3) integer array, or Scene
             Voxels of an array have columns x, y, z. What lies outside the grid is clipped.
         color : str, (r, g, b), list of these, or (k, 3) integer array, optional
             A colour, or several spread along the curve: see `voxdisplay.raster.color.as_colors`.
-            As many as a `Points` curve has points belong to those points. White by default. A
-            scene has colours of its own.
+            As many as a `Points` curve has points belong to those points. White by default, or a
+            body's own colours. A scene has colours of its own.
         fit : {"contain", "none"}
             For a scene that was composed for a grid of another size: scale and centre it, or keep
             its numbers.
@@ -192,16 +203,22 @@ class Frame:
             If `drawable` or `color` is of another kind.
         ValueError
             If an array has another shape or type, or a colour is none.
-        CurveError, SceneError
-            If a curve cannot be evaluated or drawn.
+        CurveError, BodyError, SceneError
+            If a curve or a body cannot be evaluated or drawn.
 
         """
-        is_other = not isinstance(drawable, Curve | voxelization.Sequence | type)
+        is_other = not isinstance(drawable, Curve | Body | voxelization.Sequence | type)
         if is_other and isinstance(drawable, Drawable):
             if color is not None:
                 raise TypeError("color: a scene has colours of its own; leave it out")
             return drawable.draw_on(self, fit=fit)
+        if isinstance(drawable, Body):
+            drawable = voxelize_body(drawable, VoxelBox.of_grid(self.grid))
         colors = as_colors("white" if color is None else color)
+        if isinstance(drawable, voxelization.VoxelSet):
+            own = drawable.colors if color is None else None
+            drawing = self._add(drawable.voxels, colors if own is None else own, _NO_INDICES)
+            return replace(drawing, notes=drawable.notes)
         if isinstance(drawable, Curve):
             drawable = voxelization.voxelize(drawable)
         if isinstance(drawable, voxelization.Sequence):
@@ -210,7 +227,7 @@ class Frame:
             drawing = self._add(drawable.voxels, colors, _corner_rows(drawable))
             return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
         if not is_array_like(drawable) or isinstance(drawable, Frame):
-            wanted = "a curve, a sequence, an (N, 3) array of voxels or a scene"
+            wanted = "a curve, a body, a sequence, an (N, 3) array of voxels or a scene"
             raise wrong_kind("drawable", wanted, drawable)
         return self._add_set(as_voxels("drawable", drawable), colors)
 

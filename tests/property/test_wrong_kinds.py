@@ -68,6 +68,11 @@ SCENE = """{"size": [9, 9, 9], "objects": [
  {"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}]}"""
 # Arguments of a call that succeeds, by the name of what is called.
 CALLS = {
+    "Box": {"start": (1, 1, 1), "end": (4, 5, 6), "fill": "solid"},
+    "Mesh": {"vertices": POINTS, "faces": [(0, 1, 2)], "fill": "shell", "vertex_colors": None,
+             "face_colors": [(1, 2, 3)], "uv": [(0, 0)] * 4,
+             "texture": np.zeros((2, 2, 3), dtype=np.uint8), "face_textures": None,
+             "parameters": {"u": [1, 2, 3, 4]}},
     "Arc": {"center": (5, 5, 5), "radius": 3, "start": 0, "end": 1, "normal": (0, 0, 1)},
     "BSpline": {"points": POINTS, "degree": 2, "knots": None, "weights": [1, 2, 2, 1]},
     "Bezier": {"points": POINTS},
@@ -85,10 +90,11 @@ CALLS = {
     "load_scene": {"path": "nowhere.json"},
     "read_scene": {"data": SCENE, "folder": None},
     "voxelize": {"curve": WRONG["curve"], "method": "grid-plane", "variant": 3, "tangent": None,
-                 "pitch": None, "reach": None, "certified": False},
+                 "pitch": None, "reach": None, "certified": False, "clip": None},
     "voxelize_many": {"curves": [WRONG["curve"]], "method": "march", "variant": 3},
     "open": {"port": "sim:?size=8x8x8", "baud": 115200, "timeout_s": 1.0, "reconnect_s": 0.0,
              "no_reset": False, "note": None, "capture": None},
+    "BodyError": {"message": "what", "hint": "do"},
     "CurveError": {"message": "what", "axis": "x", "hint": "do"},
     "DesyncError": {"message": "what", "hint": "do"},
     "DeviceError": {"message": "what", "code": 7, "hint": "do"},
@@ -105,8 +111,8 @@ CALLS = {
     "VoxDisplayError": {"message": "what", "hint": "do"},
 }  # fmt: skip
 # Made by the package, plain records, an enumeration, or abstract: users do not call them.
-RECORDS = {"Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "Receipt", "Report",
-           "Scene", "Sequence"}  # fmt: skip
+RECORDS = {"Body", "Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "Receipt",
+           "Report", "Scene", "Sequence", "VoxelSet"}  # fmt: skip
 CALLS["Segment"] = dict(zip(inspect.signature(vd.Segment).parameters, POINTS, strict=False))
 
 
@@ -164,7 +170,7 @@ def test_functions_and_classes(name):
         result = call(f"{name}({what})", function, arguments)
         if isinstance(result, vd.Display):
             result.close()
-        elif isinstance(result, vd.Curve | vd.Frame | vd.Scene | vd.VoxDisplayError):
+        elif isinstance(result, vd.Body | vd.Curve | vd.Frame | vd.Scene | vd.VoxDisplayError):
             assert isinstance(repr(result), str)
 
 

@@ -29,9 +29,19 @@ CURVES = {
     "Segment": vd.Segment((1, 1, 1), (5, 2, 3)),
     "TorusKnot": vd.TorusKnot(2, 3, (5, 5, 5), 3, 1),
 }
+BODIES = {
+    "Box": vd.Box((1, 1, 1), (4, 5, 6), fill="solid"),
+    "Mesh": vd.Mesh(
+        [(1, 1, 1), (5, 2, 3), (4, 5, 6)],
+        [(0, 1, 2)],
+        vertex_colors=[(255, 0, 0), (0, 255, 0), (0, 0, 255)],
+        parameters={"u": [0, 0.5, 1]},
+    ),
+}
 # (n,) -> (3, n), by what every process can import.
 BY_FUNCTION = vd.Parametric(partial(np.multiply.outer, np.array([1.0, 2.0, 3.0])), t=(1, 3))
 ERRORS = {
+    "BodyError": vd.BodyError("what", hint="do"),
     "CurveError": vd.CurveError("what", axis="x", hint="do"),
     "DesyncError": vd.DesyncError("what", hint="do"),
     "DeviceError": vd.DeviceError("what", code=7, hint="do"),
@@ -67,14 +77,15 @@ def values():
         "Report": sequence.report,
         "Scene": vd.read_scene(TWO),
         "Sequence": sequence,
+        "VoxelSet": vd.voxelize(BODIES["Mesh"], clip=(9, 9, 9)),
     }
 
 
-SAMPLES = CURVES | ERRORS | values()
+SAMPLES = CURVES | BODIES | ERRORS | values()
 # Abstract, or, as an open display, of one process alone.
 BAD = '{"type": "circle", "center": [1, 1, 1], "radius": "q"}'
 PALETTE = ("palette",)
-NO_VALUES = {"Curve", "ProtocolError", "Display"}
+NO_VALUES = {"Body", "Curve", "ProtocolError", "Display"}
 COPIES = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),  # noqa: S301 - our own
     "oldest pickle": lambda value: pickle.loads(pickle.dumps(value, 2)),  # noqa: S301
@@ -108,6 +119,16 @@ def described(value):
             [array.tolist() for array in arrays],
             [array.flags.writeable for array in arrays],
             value.closed, value.report, repr(value.proof), described(value.curve),
+        )  # fmt: skip
+    if isinstance(value, vd.Body):
+        low, high = value.bounds()
+        return repr(value), low.tolist(), high.tolist(), described(vd.voxelize(value))
+    if isinstance(value, vd.VoxelSet):
+        return (
+            repr(value), value.box, value.kind, value.notes, value.voxels.tolist(),
+            value.colors is not None and value.colors.tolist(),
+            {name: numbers.tolist() for name, numbers in value.parameters.items()},
+            value.index.flags.writeable, value.voxels.flags.writeable,
         )  # fmt: skip
     if isinstance(value, vd.Scene):
         return value.size, [

@@ -113,9 +113,9 @@ def test_voxelize_has_its_own_signature_and_documentation():
     assert inspect.isfunction(vd.voxelize)
     parameters = inspect.signature(vd.voxelize).parameters
     assert list(parameters) == [
-        "curve", "method", "variant", "tangent", "pitch", "reach", "certified",
+        "curve", "method", "variant", "tangent", "pitch", "reach", "certified", "clip",
     ]  # fmt: skip
-    assert "voxelize(curve:'Curve',*," in without_blanks(pydoc.render_doc(vd.voxelize))
+    assert "voxelize(curve:'Curve|Body',*," in without_blanks(pydoc.render_doc(vd.voxelize))
 
 
 def test_help_is_an_overview_of_every_name():

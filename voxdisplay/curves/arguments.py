@@ -1,4 +1,7 @@
-"""Validation of curve arguments: each error names the argument. Must not know the curves."""
+"""Validation of arguments of curves and bodies: each error names the argument.
+
+Must not know the curves and the bodies.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import TYPE_CHECKING, SupportsFloat
 import numpy as np
 
 from voxdisplay import argument_checks
-from voxdisplay.errors import CurveError
+from voxdisplay.errors import BodyError, CurveError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -24,8 +27,8 @@ _NO_NUMBERS = "cMmV"
 """Kinds of arrays that numpy would convert: complex numbers, dates, durations, records."""
 
 
-class ArgumentError(CurveError):
-    """A wrong argument of a curve.
+class ArgumentError(CurveError, BodyError):
+    """A wrong argument of a curve or a body.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""Voxelisation of parametric space curves: ordered, 26-connected sequences of voxels.
+"""Voxelisation: curves to ordered, 26-connected sequences, bodies to sets of voxels.
 
-``voxelize(curve)`` returns a `Sequence`; `measure` judges any list of voxels. This package knows
-curves only by their positions, and neither displays nor colours nor the wire. It needs numpy; with
+``voxelize(curve)`` returns a `Sequence`, ``voxelize(body)`` a `VoxelSet`; `measure` judges any list
+of voxels. This package knows curves only by their positions, bodies by their geometries, and
+neither displays nor colours of displays nor the wire. It needs numpy; with
 the extra `fast`, much work is done compiled, with the same voxels
 (`voxdisplay.compute.kernel_backend`).
 """
@@ -9,27 +10,35 @@ the extra `fast`, much work is done compiled, with the same voxels
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, overload
 
-from voxdisplay.argument_checks import choice, flag, instance, wrong_kind
+from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
+from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
 from voxdisplay.voxelization import measure, tangent_march
+from voxdisplay.voxelization.body_voxelization import MAX_SPAN, box_of, voxelize_body
 from voxdisplay.voxelization.digitise import digitise
 from voxdisplay.voxelization.point_indices import point_indices
 from voxdisplay.voxelization.sequence import Report, Sequence, clip
+from voxdisplay.voxelization.voxel_box import VoxelBox
+from voxdisplay.voxelization.voxel_set import VoxelSet
 
 __all__ = [
     "Report",
     "Sequence",
+    "VoxelBox",
+    "VoxelSet",
     "clip",
     "march",
     "measure",
     "point_indices",
     "voxelize",
+    "voxelize_body",
     "voxelize_many",
 ]
 
 
+@overload
 def voxelize(
     curve: Curve,
     *,
@@ -39,13 +48,33 @@ def voxelize(
     pitch: float | None = None,
     reach: float | None = None,
     certified: bool = False,
-) -> Sequence:
-    """Return the voxels along a curve.
+) -> Sequence: ...
+
+
+@overload
+def voxelize(
+    curve: Body, *, certified: bool = False, clip: tuple[int, int, int] | None = None
+) -> VoxelSet: ...
+
+
+def voxelize(
+    curve: Curve | Body,
+    *,
+    method: str = "grid-plane",
+    variant: int = 3,
+    tangent: str | None = None,
+    pitch: float | None = None,
+    reach: float | None = None,
+    certified: bool = False,
+    clip: tuple[int, int, int] | None = None,
+) -> Sequence | VoxelSet:
+    """Return the voxels along a curve, or those of a body.
 
     Parameters
     ----------
-    curve : Curve
-        Any continuous curve; where it jumps, the sequence is split.
+    curve : Curve or Body
+        Any continuous curve; where it jumps, the sequence is split. For a body, the options of
+        methods are left out.
     method : {"grid-plane", "march"}
         Grid-plane intersection digitisation (`grid_plane`), for which the guarantees below hold, or
         the tangent march of the paper (`tangent_march`), for comparison.
@@ -62,10 +91,16 @@ def voxelize(
         narrower than 1/64 of the range of t may be missed. The report's ``certified`` is True if
         there is a proof; the sequence's ``proof`` is the certificate, or the reason why there is
         none: a callable has no bounds, and a curve that jumps is not connected.
+    clip : (int, int, int), optional
+        For a body: size (nx, ny, nz) of a display, outside of which no voxel is wanted. Bodies
+        that have no end, such as planes, need it.
 
     Returns
     -------
+    VoxelSet
+        For a body.
     Sequence
+        For a curve:
         26-connected; the first voxel of an open curve holds its first point, the last its last;
         others are within 0.7072 of the curve, if a step from one float t to the next moves it by
         less than 0.002. Each has exactly two neighbours but for the contacts that
@@ -79,12 +114,19 @@ def voxelize(
 
     Raises
     ------
-    CurveError
-        If the curve cannot be evaluated, runs off, or has no end.
+    CurveError, BodyError
+        If the curve or body cannot be evaluated, runs off, or has no end.
     ValueError
         If there is no such method or option, or the method has none such.
 
     """
+    if isinstance(curve, Body):
+        box = box_of(curve) if clip is None else VoxelBox.of_grid(_sides(clip))
+        return voxelize_body(curve, box, certified=flag("certified", certified))
+    if clip is not None:
+        raise ValueError(
+            "clip: a sequence is whole; `Sequence.clip` finds what is inside a display"
+        )
     return voxelize_many(
         [curve],
         method=method,
@@ -120,6 +162,14 @@ def voxelize_many(
         tangent_march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
         for curve in curves
     ]
+
+
+def _sides(clip: Any) -> tuple[int, int, int]:
+    """Return three whole numbers, or raise an error that names the argument."""
+    if not isinstance(clip, tuple | list) or len(clip) != 3:
+        raise wrong_kind("clip", "three whole numbers (nx, ny, nz)", clip)
+    nx, ny, nz = (whole_number("clip", side, 1, MAX_SPAN) for side in clip)
+    return nx, ny, nz
 
 
 def _as_curves(curves: Any) -> list[Curve]:

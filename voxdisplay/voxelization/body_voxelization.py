@@ -1,0 +1,82 @@
+"""Voxelisation of bodies: dispatch by geometry to its voxeliser."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
+from voxdisplay.errors import BodyError
+from voxdisplay.voxelization.voxel_box import VoxelBox
+
+if TYPE_CHECKING:
+    from voxdisplay.bodies.body import Body
+    from voxdisplay.voxelization.voxel_set import VoxelSet
+
+MAX_SPAN = 1 << 14
+"""Largest side, in voxels, of the box of a body that is not clipped."""
+
+
+class Voxeliser(Protocol):
+    """A function that voxelises geometries of one class."""
+
+    def __call__(
+        self, geometry: Geometry, box: VoxelBox, body: Body, *, certified: bool
+    ) -> VoxelSet:
+        """Return the voxels inside a box; ``body.kind`` says whether the inside is wanted."""
+
+
+# Module and function of the voxeliser of each geometry, imported on first use.
+_VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
+    TriangleMesh: ("mesh", "voxelize_mesh"),
+    LitVoxels: ("lit_voxels", "voxelize_lit"),
+}
+
+
+def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> VoxelSet:
+    """Return the voxels of a body inside a box.
+
+    Parameters
+    ----------
+    body : Body
+    box : VoxelBox
+    certified : bool
+        Prove that nothing of a body given by formulas is missed.
+
+    Raises
+    ------
+    BodyError
+        If the body cannot be evaluated or drawn.
+
+    """
+    began_s = time.perf_counter()
+    geometry = body.geometry(box.corners, certified=certified)
+    module, name = _VOXELISERS[type(geometry)]
+    package = __name__.rpartition(".")[0]
+    voxelize: Voxeliser = getattr(import_module(f"{package}.surfaces.{module}"), name)
+    voxels = voxelize(geometry, box, body, certified=certified)
+    return replace(voxels, body=body, seconds=time.perf_counter() - began_s)
+
+
+def box_of(body: Body) -> VoxelBox:
+    """Return a box that holds all voxels of a body.
+
+    Raises
+    ------
+    BodyError
+        If the body has no end, or is larger than any display.
+
+    """
+    low, high = body.bounds()
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise BodyError(f"{body} has no end", hint="clip it to a display: clip=(nx, ny, nz)")
+    if (high - low).max() > MAX_SPAN or max(np.abs(low).max(), np.abs(high).max()) > 1 << 30:
+        raise BodyError(
+            f"{body} is more than {MAX_SPAN} voxels long or far away",
+            hint="scale it, or clip it to a display: clip=(nx, ny, nz)",
+        )
+    return VoxelBox.around(low, high)

@@ -1,0 +1,1 @@
+"""Voxelisers of geometries: one module for each, from arrays and a box to voxels."""

@@ -1,0 +1,92 @@
+"""Voxel sets: the voxels of a body, without an order, and what is known of each.
+
+A voxel set is a value. It must not know displays or how it was made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.bodies.body import Body, Kind
+from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.voxelization.voxel_box import VoxelBox
+
+
+@dataclass(eq=False, repr=False)
+class VoxelSet:
+    """The voxels of a body inside a box.
+
+    Attributes
+    ----------
+    box : VoxelBox
+        What the body was clipped to.
+    index : (N,) int64 array
+        Scan-order indices in the box, ascending, each once; read-only.
+    kind : {"surface", "solid", "volume", "points"}
+    colors : (N, 3) uint8 array or None
+        The body's own colours.
+    parameters : mapping of str to (N,) float64 array
+        Numbers at voxels, by which they can be coloured: u, v, value, ...
+    notes : tuple of str
+        What was wrong with the body or left out, one line each, for people.
+    body : Body, optional
+        What the voxels show.
+    seconds : float
+        Time spent on them.
+
+    """
+
+    box: VoxelBox
+    index: Ints
+    kind: Kind
+    colors: NDArray[np.uint8] | None = None
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    body: Body | None = None
+    seconds: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    def _freeze(self) -> None:
+        self.index.flags.writeable = False
+        for array in (self.colors, *self.parameters.values(), vars(self).get("voxels")):
+            if array is not None:
+                array.flags.writeable = False
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Pickling forgets that arrays are read-only.
+        self.__dict__.update(state)
+        self._freeze()
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def __repr__(self) -> str:
+        count = len(self)
+        extent = ""
+        if count:
+            low, high = (
+                tuple(bound(axis=0).tolist()) for bound in (self.voxels.min, self.voxels.max)
+            )
+            extent = f", from {low} to {high}"
+        return f"<VoxelSet: {self.kind}, {count} voxel{'s' * (count != 1)}{extent}>"
+
+    @cached_property
+    def voxels(self) -> NDArray[np.int32]:
+        """Voxels, (N, 3) int32, columns x, y, z, distinct, in scan order; read-only."""
+        voxels = self.box.voxels_at(self.index)
+        voxels.flags.writeable = False
+        return voxels
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture for notebooks, in its bounding box; None without Pillow."""
+        from voxdisplay.view.rich_display import voxels_png  # noqa: PLC0415 - needs an extra
+
+        return voxels_png(self.voxels)
