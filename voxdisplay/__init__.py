@@ -17,6 +17,7 @@ Displays and frames: ``help(voxdisplay.Display)`` and so on says more of each.
     Drawing             Voxel counts of one drawn object.
     Grid                Size of a display in voxels.
     PixelFormat         Pixel formats of displays: mono1, index8, rgb565, rgb888.
+    volume_pixels       Pixels of an array of any real numbers, for Frame.set.
 
 What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0 to 1.
 
@@ -113,6 +114,7 @@ if TYPE_CHECKING:
     from voxdisplay.frame import Drawing, Frame
     from voxdisplay.raster.grid import Grid
     from voxdisplay.raster.pixel_format import PixelFormat
+    from voxdisplay.raster.volume_pixels import volume_pixels
     from voxdisplay.scene import Scene, load_scene, read_scene
     from voxdisplay.voxelization import Report, Sequence, VoxelSet, voxelize, voxelize_many
 
@@ -165,6 +167,7 @@ if TYPE_CHECKING:
         "load_scene",
         "open",
         "read_scene",
+        "volume_pixels",
         "voxelize",
         "voxelize_many",
     ]
@@ -228,6 +231,9 @@ _MODULES = {
     ],
     "voxdisplay.raster.pixel_format": [
         "PixelFormat",
+    ],
+    "voxdisplay.raster.volume_pixels": [
+        "volume_pixels",
     ],
     "voxdisplay.scene": [
         "Scene",

@@ -146,7 +146,7 @@ class PixelFormat(enum.Enum):
         if array.shape != want:
             raise ValueError(
                 f"the array has the shape {array.shape}, a {self.value} frame of this display "
-                f"has {want}, indexed [z, y, x]"
+                f"has {want}, indexed [z, y, x]{self._fitting(array, array_shape)}"
             )
         if array.dtype != self.dtype:
             raise ValueError(
@@ -156,6 +156,13 @@ class PixelFormat(enum.Enum):
         if self is PixelFormat.MONO1 and (array.astype(np.uint8) > 1).any():
             raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
 
+    def _fitting(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> str:
+        """Return how an array of another shape becomes pixels of this format, if it is a volume."""
+        if array.ndim != 3 or array.dtype.kind not in "fiub":
+            return ""
+        grid = "" if array.shape == array_shape else ", grid=frame.grid"
+        return f"; voxdisplay.volume_pixels(array, format={self.value!r}{grid}) makes them"
+
     def _conversion(self, array: NDArray[np.generic]) -> str:
         """Return how an array of another type becomes pixels of this format."""
         top = 1 if self is PixelFormat.MONO1 else int(np.iinfo(self.dtype).max)
@@ -164,13 +171,19 @@ class PixelFormat(enum.Enum):
         ):
             return f"convert it with array.astype('{self.dtype.__name__}')"
         if self is PixelFormat.MONO1:
-            return "choose what is lit, as by (array > threshold).astype('uint8')"
+            return (
+                "choose what is lit, as by (array > threshold).astype('uint8') or "
+                "voxdisplay.volume_pixels(array, format='mono1')"
+            )
         meaning = {
             PixelFormat.INDEX8: "pixels are entries of the palette, 0 (dark) to 255",
             PixelFormat.RGB565: "pixels are red << 11 | green << 5 | blue, with 5, 6 and 5 bits",
             PixelFormat.RGB888: "red, green and blue are 0 (dark) to 255",
         }[self]
-        return f"{meaning}; scale the values to that, round, and convert them"
+        return (
+            f"{meaning}; voxdisplay.volume_pixels(array, format={self.value!r}) makes pixels of "
+            "any volume"
+        )
 
 
 def is_lit(pixels: NDArray[np.generic]) -> NDArray[np.bool_]:

@@ -93,7 +93,7 @@ def test_values_that_a_cast_would_spoil_are_not_advised_to_be_cast(format_, arra
     with pytest.raises(ValueError, match=f"frame is {format_.dtype.__name__}") as caught:
         format_.validate(np.full(format_.shape((7, 5, 3)), array), (7, 5, 3))
     assert "convert it with" not in str(caught.value)
-    word = "threshold" if format_ is PixelFormat.MONO1 else "scale the values"
+    word = "threshold" if format_ is PixelFormat.MONO1 else "volume_pixels"
     assert word in str(caught.value)
 
 
