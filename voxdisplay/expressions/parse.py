@@ -53,6 +53,8 @@ MAX_DEPTH = 100
 MAX_STEPS = 1024
 """Most numbers, names and operations in one expression."""
 
+TIME = "time"
+"""Name of the seconds since a moving scene began."""
 CONSTANTS = {"pi": math.pi, "tau": math.tau, "e": math.e, "deg": math.pi / 180}
 
 
@@ -296,6 +298,9 @@ class _Parser:
                 if self.variables
                 else "t runs only in x, y, z, dx, dy, dz of a parametric curve",
             )
+        if name == TIME:
+            problem = f"{name!r} {self.place(token)} has no value here"
+            self.fail(problem, hint='it runs in scenes that have a "duration"')
         known = [*CONSTANTS, *self.names, *FUNCTIONS, *self.variables]
         what, like = ("function", list(FUNCTIONS)) if called else ("name", known)
         hint = suggest(name, like) or f"known: {shorten(', '.join(like), 300)}"

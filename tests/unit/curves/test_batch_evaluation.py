@@ -63,6 +63,9 @@ FAMILIES: dict[str, Make] = {
     "functions": formula("atan2(A, t) + max(B, t*t) + hypot(t, C, 2) + exp(-A*t) + log(B*t)"),
     "constants": formula("A"),
     "transformed": lambda rng: Transformed(Bezier(points(rng, 4)), rng.uniform(1, 2), (1, 2, 3)),
+    "turned": lambda rng: Transformed(
+        Bezier(points(rng, 4)), [[0, rng.uniform(1, 2), 0], [1, 1, 0], [0, 3, rng.uniform(1, 2)]]
+    ),
     "twice": lambda rng: Transformed(Transformed(Circle(points(rng, 1)[0], 20), 0.5), 3),
 }
 

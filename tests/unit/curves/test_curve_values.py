@@ -50,7 +50,7 @@ TEXTS = {
         ZIGZAG, 2
     ),
     "CatmullRom(points=[(1, 2, 3), (4, 2, 1), (4, 6, 1), ... 2 more])": vd.CatmullRom(ZIGZAG),
-    "Transformed(curve=Circle(center=(3, 5, 7), radius=2, normal=(0, 0, 1)), scale=2, "
+    "Transformed(curve=Circle(center=(3, 5, 7), radius=2, normal=(0, 0, 1)), matrix=2, "
     "offset=(1, 0, 0))": Transformed(vd.Circle((3, 5, 7), 2), 2, (1, 0, 0)),
 }
 

@@ -55,6 +55,7 @@ EVERY: dict[str, Curve] = {
     "catmull-rom": CatmullRom(ZIGZAG),
     "closed catmull-rom": CatmullRom(ZIGZAG, closed=True),
     "transformed": Transformed(Circle(C, 2), 0.5, (1, 2, 3)),
+    "turned": Transformed(Circle(C, 2), [[0, -1, 0], [0.6, 0.3, 0], [0, 0.5, -2]], (1, 2, 3)),
 }
 
 
@@ -407,7 +408,7 @@ class TestParametric:
             "weights must not be negative, as -2",
         ),
         (lambda: CatmullRom([C, C]), "points are all the same"),
-        (lambda: Transformed(Circle(C, 1), 0), "scale must be positive"),
+        (lambda: Transformed(Circle(C, 1), 0), "matrix must be positive"),
     ],
 )
 def test_what_curves_cannot_be_made_from(make: object, message: str) -> None:

@@ -22,6 +22,7 @@ LONG = [
     vd.TorusKnot(2, 3, C, 5, 2),
     vd.TorusKnot(101, -300, C, 5, 2, (1, 0, 2)),
     Transformed(vd.TorusKnot(7, 8, C, 5, 2), 3.5),
+    Transformed(vd.TorusKnot(7, 8, C, 5, 2), [[0, -2, 0], [1.8, 0.3, 0], [0, 0, -2]]),
 ]
 
 

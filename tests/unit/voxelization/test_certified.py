@@ -42,6 +42,7 @@ ANY = {
     "catmull-rom": vd.CatmullRom(POINTS),
     "closed catmull-rom": vd.CatmullRom(POINTS, closed=True),
     "transformed": Transformed(vd.CatmullRom(POINTS), 0.3, (1, -2, 3)),
+    "turned": Transformed(vd.CatmullRom(POINTS), [[0, -1, 0], [0.6, 0.3, 0], [0, 0.5, -2]]),
 }
 PAPER = [(40, 2), (80, 2), (40, 4), (80, 4)]
 
