@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from firmware_sim import spec
 from firmware_sim.device import Device
+from firmware_sim.sparse_pixels import SparsePixels
 
 _TYPES = {
     value: name.removeprefix("TYPE_")
@@ -26,8 +27,8 @@ class Snapshot:
 
     Parameters
     ----------
-    pixels
-        All pixels in scan order, as in memory; MONO1 has a byte per voxel.
+    stored
+        All pixels in scan order; MONO1 has a byte per voxel.
     grid
         (nx, ny, nz).
     pixel_format
@@ -42,7 +43,7 @@ class Snapshot:
         256 colours of red, green and blue, a byte each; empty if the format is not INDEX8.
     """
 
-    pixels: bytes
+    stored: SparsePixels
     grid: tuple[int, int, int]
     pixel_format: str
     frame: int | None
@@ -50,6 +51,11 @@ class Snapshot:
     boot: int
     swaps: int
     palette: bytes = b""
+
+    @property
+    def pixels(self) -> bytes:
+        """All pixels in scan order in one piece: of a large volume that is much memory."""
+        return bytes(self.stored)
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,7 @@ class Bench:
         with device.page_lock:
             front, session = device.memory.front, device.session
             return Snapshot(
-                front.pixels,
+                front.stored.copy(),
                 device.config.grid,
                 device.config.pixel_format,
                 session.shown if session else None,

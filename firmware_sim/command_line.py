@@ -47,8 +47,8 @@ def run(argv: list[str] | None, stop: int) -> int:
     Returns
     -------
     int
-        Exit code: 0 if it was told to stop, 2 if a port or file cannot be opened, or if there is no
-        such device or not enough memory for it.
+        Exit code: 0 if it was told to stop, 2 if a port or file cannot be opened, if there is no
+        such device, or not enough memory for what is drawn.
     """
     parser, options = parse_arguments(argv)
     try:
@@ -61,6 +61,12 @@ def run(argv: list[str] | None, stop: int) -> int:
         parser.error(str(error))
     except OSError as error:
         _note(f"error: {error.strerror or error}")
+        return 2
+    except MemoryError:
+        _note(
+            "error: what is lit of {}x{}x{} {} needs more memory than there is: take a smaller "
+            "--size".format(*options.size, options.format)
+        )
         return 2
     return 0
 

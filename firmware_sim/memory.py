@@ -5,8 +5,6 @@ costs what has been written on it: the rest takes no memory, and no time to clea
 nothing of packets and ops: callers pass voxels that are on the grid.
 """
 
-import mmap
-import os
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,14 +13,13 @@ from typing import Final
 from firmware_sim import spec
 from firmware_sim.digest import mix_sum
 from firmware_sim.grid import Grid
+from firmware_sim.sparse_pixels import BLOCK_BITS, SparsePixels
 
 _COLOR: Final = 3  # bytes of a colour: red, green, blue
 _LOG_VOXELS: Final = 4096  # written voxels to collect before the digest is updated with them
 _DIRECT_VOXELS: Final = 256  # writes of so many voxels update the digest at once
-_MEGABYTE: Final = 1_000_000
-_BLOCK_BITS: Final = 10  # a block of so many voxels in scan order is copied as a whole
 _PENDING_VOXELS: Final = 1 << 16  # written voxels to collect before their blocks are found
-_SPARSE: Final = 4  # with more than one of so many blocks to copy, the whole page is copied
+_RUN_VOXELS: Final = 1 << 16  # longest run to write at once, to bound what a copy of it takes
 
 
 @dataclass(frozen=True)
@@ -70,16 +67,6 @@ def _default_palette() -> bytes:
 DEFAULT_PALETTE: Final = _default_palette()
 
 
-def _dark_memory(size: int) -> mmap.mmap:
-    """Return zeros that take up memory only where they are written."""
-    # Without a reservation: most of a large volume is never written.
-    flags = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | getattr(mmap, "MAP_NORESERVE", 0)}
-    memory = mmap.mmap(-1, size, **flags if hasattr(mmap, "MAP_PRIVATE") else {})
-    if hasattr(mmap, "MADV_NOHUGEPAGE"):  # or one voxel takes up 2 MiB
-        memory.madvise(mmap.MADV_NOHUGEPAGE)
-    return memory
-
-
 class Page:
     """Video memory for one frame, initially dark.
 
@@ -92,8 +79,8 @@ class Page:
 
     Attributes
     ----------
-    memory : mmap
-        All pixels in scan order, `volume` times `pixel_size` bytes.
+    stored : SparsePixels
+        All pixels in scan order.
     palette : bytearray
         256 colours of red, green and blue, a byte each. Used with INDEX8 only.
     """
@@ -101,15 +88,15 @@ class Page:
     def __init__(self, volume: int, pixel_size: int) -> None:
         self.volume = volume
         self.pixel_size = pixel_size
+        self.stored = SparsePixels(volume, pixel_size)
         self.clear()
 
     def clear(self) -> None:
         """Make all voxels dark, and the palette the default one."""
-        self.memory = _dark_memory(self.volume * self.pixel_size)
+        self.stored.clear()
         self.palette = bytearray(DEFAULT_PALETTE)
         self._digest = 0
         self._clear_log()
-        self._lit_blocks: set[int] = set()  # blocks that may have lit voxels
         self._equal_since: object = object()  # identifies the last copy between two pages
         self._changed_blocks: set[int] = set()  # blocks written since that copy
         self._clear_writes()
@@ -118,21 +105,13 @@ class Page:
         """Copy pixels and palette of another page of the same size."""
         self._find_blocks()
         other._find_blocks()  # noqa: SLF001 - of its own kind
+        blocks = None
         if self._equal_since is other._equal_since:  # noqa: SLF001
             blocks = self._changed_blocks | other._changed_blocks  # noqa: SLF001
-        else:
-            blocks = self._lit_blocks | other._lit_blocks  # noqa: SLF001
-        if len(blocks) * _SPARSE > self.volume >> _BLOCK_BITS:
-            self.memory[:] = other.memory[:]
-        else:
-            block_size = self.pixel_size << _BLOCK_BITS
-            for block in blocks:
-                place = slice(block * block_size, (block + 1) * block_size)
-                self.memory[place] = other.memory[place]
+        self.stored.copy_from(other.stored, blocks)
         self.palette[:] = other.palette
         self._digest = other.digest
         self._clear_log()
-        self._lit_blocks = set(other._lit_blocks)  # noqa: SLF001
         self._equal_since = other._equal_since = object()  # noqa: SLF001
         self._changed_blocks.clear()
         other._changed_blocks.clear()  # noqa: SLF001
@@ -140,7 +119,7 @@ class Page:
     @property
     def pixels(self) -> bytes:
         """A copy of all pixels in scan order."""
-        return bytes(self.memory)
+        return bytes(self.stored)
 
     def put(self, start: int, pixels: bytes) -> None:
         """Write pixels in scan order.
@@ -150,13 +129,10 @@ class Page:
         start
             Index of the first voxel.
         pixels
-            Pixels of consecutive voxels on the grid.
+            Pixels of consecutive voxels on the grid, at least one.
         """
-        size = self.pixel_size
-        place = slice(start * size, start * size + len(pixels))
-        old = self.memory[place]
-        self.memory[place] = pixels
-        self._log_replaced(range(start, start + len(pixels) // size), old, pixels)
+        old = self.stored.exchange_run(start, pixels)
+        self._log_replaced(range(start, start + len(pixels) // self.pixel_size), old, pixels)
 
     def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
         """Write the same pixel to runs of voxels in scan order.
@@ -170,9 +146,17 @@ class Page:
         pixel
             The pixel.
         """
-        run = pixel * count
+        dark = not any(pixel)
+        run = pixel * min(count, _RUN_VOXELS)
         for start in starts:
-            self.put(start, run)
+            if count <= _RUN_VOXELS and not dark:
+                self.put(start, run)
+                continue
+            at, end = start, start + count
+            while (at := self.stored.next_stored(at, end) if dark else at) < end:
+                length = min(end - at, _RUN_VOXELS)
+                self.put(at, run[: length * self.pixel_size])
+                at += length
 
     def plot(self, indices: "array[int]", pixel: bytes) -> None:
         """Write the same pixel to many voxels.
@@ -184,14 +168,7 @@ class Page:
         pixel
             The pixel.
         """
-        memory = self.memory
-        size = self.pixel_size
-        old = bytearray(len(indices) * size)
-        for k, value in enumerate(pixel):
-            places = indices if size == 1 else [index * size + k for index in indices]
-            old[k::size] = bytes(map(memory.__getitem__, places))
-            for place in places:
-                memory[place] = value
+        old = self.stored.exchange(indices, pixel)
         self._log_replaced(indices, old, pixel * len(indices))
 
     def set_colors(self, first: int, colors: bytes) -> None:
@@ -250,14 +227,13 @@ class Page:
         self._pending_voxels = 0
 
     def _find_blocks(self) -> None:
-        """Add the blocks of all collected writes to those that have changed and may be lit."""
+        """Add the blocks of all collected writes to those that have changed."""
         for indices in self._writes:
             if isinstance(indices, range):
-                blocks = range(indices[0] >> _BLOCK_BITS, (indices[-1] >> _BLOCK_BITS) + 1)
+                blocks = range(indices[0] >> BLOCK_BITS, (indices[-1] >> BLOCK_BITS) + 1)
                 self._changed_blocks.update(blocks)
             else:
-                self._changed_blocks.update([index >> _BLOCK_BITS for index in indices])
-        self._lit_blocks |= self._changed_blocks
+                self._changed_blocks.update([index >> BLOCK_BITS for index in indices])
         self._clear_writes()
 
     def _color_terms(self, place: slice) -> int:
@@ -285,11 +261,6 @@ class Memory:
     ----------
     front, back : Page
         The page that is shown, and the one that is written.
-
-    Raises
-    ------
-    ValueError
-        If this machine has not enough memory for the pages.
     """
 
     PAGES: Final = 2
@@ -297,18 +268,8 @@ class Memory:
     def __init__(self, grid: Grid, pixel_format: PixelFormat) -> None:
         self.grid = grid
         self.pixel_format = pixel_format
-        needed = self.PAGES * grid.volume * pixel_format.size  # if all is written
-        too_large = ValueError(
-            f"a grid of {grid} {pixel_format.name} needs {needed // _MEGABYTE} MB of memory, more "
-            "than this machine has: take a smaller one"
-        )
-        if needed > _memory_bytes():
-            raise too_large
-        try:
-            self.front = Page(grid.volume, pixel_format.size)
-            self.back = Page(grid.volume, pixel_format.size)
-        except (MemoryError, OSError):
-            raise too_large from None
+        self.front = Page(grid.volume, pixel_format.size)
+        self.back = Page(grid.volume, pixel_format.size)
 
     def begin_frame(self, dark: bool) -> None:
         """Prepare the back page for a frame: dark, or a copy of the front page with its palette."""
@@ -320,11 +281,3 @@ class Memory:
     def swap(self) -> None:
         """Exchange the pages."""
         self.front, self.back = self.back, self.front
-
-
-def _memory_bytes() -> int:
-    """Return the physical memory of this machine; a very large number if it is not known."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return 1 << 62

@@ -56,8 +56,14 @@ def write_npy(path: Path, snapshot: Snapshot) -> None:
     beside = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
     try:
         with beside.open("xb") as file:  # exclusive: fails if anything is there
-            file.write(npy_header(snapshot))
-            file.write(snapshot.pixels)
+            header = npy_header(snapshot)
+            file.write(header)
+            stored = snapshot.stored
+            # The system keeps what is left out as a hole, which takes no space.
+            for start, pixels in stored.pieces():
+                file.seek(len(header) + start * stored.pixel_size)
+                file.write(pixels)
+            file.truncate(len(header) + stored.volume * stored.pixel_size)
         beside.replace(path)
     except OSError as error:
         beside.unlink(missing_ok=True)

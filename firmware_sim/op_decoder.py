@@ -172,7 +172,7 @@ class _PacketDecoder:
 
     def run(self, operand: int) -> None:
         count = self._check_room(self._operands.count(operand))
-        self._page.put(self._cursor, self._pen * count)
+        self._page.fill((self._cursor,), count, self._pen)
         self._cursor += count
 
     def literal(self, operand: int) -> None:

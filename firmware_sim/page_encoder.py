@@ -3,16 +3,17 @@
 Reads a page; knows nothing of packets.
 """
 
-import mmap
 import re
 from typing import Final
 
 from firmware_sim import spec
 from firmware_sim.memory import Page, PixelFormat
+from firmware_sim.sparse_pixels import SparsePixels
 
 _SHORT: Final = 31  # section 7.2: largest count that fits the op byte
 _MARGIN: Final = 11  # most bytes that one stretch can need: a pixel, two op bytes, two counts
 _CHUNK: Final = 24  # MONO1: number of pixels to consider for a LIT, 3 bytes
+_WINDOW: Final = 4096  # number of pixels to look at in one piece
 _DIGITS: Final = bytes.maketrans(b"\0\1", b"01")
 _DARK: Final = re.compile(rb"\0*+")
 _SAME: Final = {  # a pixel and its repetitions
@@ -43,13 +44,64 @@ def encode_page(
     ops : bytes
         The ops, at most `room` bytes.
     """
-    size = pixel_format.size
     writer = _OpWriter(pixel_format)
-    at, end = start * size, (start + count) * size
-    while at < end and writer.size + _MARGIN <= room:
-        at += writer.add(page.memory, at, end)
+    pixels = _PixelReader(page.stored, start, start + count)
+    while pixels.at < pixels.end and writer.size + _MARGIN <= room:
+        pixels.at += writer.add(pixels)
     writer.close_literal()
-    return at // size - start, bytes(writer.ops)
+    return pixels.at - start, bytes(writer.ops)
+
+
+class _PixelReader:
+    """Cursor in a range of pixels, with a window of them in one piece.
+
+    Parameters
+    ----------
+    stored
+        All pixels of the page.
+    at, end
+        The range.
+    """
+
+    def __init__(self, stored: SparsePixels, at: int, end: int) -> None:
+        self._stored = stored
+        self._size = stored.pixel_size
+        self._load(at, end)
+        self.at = at
+        self.end = end
+
+    def _load(self, start: int, end: int) -> None:
+        self._start, self._stop = start, min(start + _WINDOW, end)
+        self._window = self._stored.read(start, self._stop - start)
+
+    def peek(self, count: int) -> bytes:
+        """Return the next pixels: `count` of them, or as many as there are."""
+        stop = min(self.at + count, self.end)
+        if stop > self._stop:
+            self._load(self.at, self.end)
+        size = self._size
+        return self._window[(self.at - self._start) * size : (stop - self._start) * size]
+
+    def stretch(self) -> int:
+        """Return the number of equal pixels from the cursor on."""
+        size = self._size
+        pixel = self.peek(1)
+        dark = not any(pixel)
+        pattern = _DARK if dark else _SAME[size]
+        begin = at = self.at
+        while True:
+            match = pattern.match(self._window, (at - self._start) * size)
+            # The zeros at the end of a dark stretch may belong to the next pixel.
+            at = self._start + (match.end() // size if match else 0)
+            if at < self._stop or at == self.end:
+                return at - begin
+            if dark:
+                at = self._stored.next_stored(at, self.end)
+                if at == self.end:
+                    return at - begin
+            self._load(at, self.end)
+            if self._window[:size] != pixel:
+                return at - begin
 
 
 class _OpWriter:
@@ -75,16 +127,14 @@ class _OpWriter:
         """Return the number of bytes of a pixel run (2.1)."""
         return (count + 7) // 8 if self._mono else count * self._size
 
-    def add(self, pixels: mmap.mmap, at: int, end: int) -> int:
-        """Encode a stretch of equal pixels at an offset in memory; return its length in bytes."""
-        size = self._size
-        if self._mono and _prefers_literal(chunk := pixels[at : min(at + _CHUNK, end)]):
+    def add(self, pixels: _PixelReader) -> int:
+        """Encode a stretch of equal pixels at the reader's cursor; return its length in pixels."""
+        if self._mono and _prefers_literal(chunk := pixels.peek(_CHUNK)):
             self._extend_literal(chunk)
             return len(chunk)
-        pixel = pixels[at : at + size]
+        pixel = pixels.peek(1)
         dark = not any(pixel)
-        stretch = _length(_DARK if dark else _SAME[size], pixels, at, end)
-        count = stretch // size  # the zeros at the end of a dark one may belong to the next pixel
+        count = pixels.stretch()
         if self._literal and count <= self._cheap:
             self._extend_literal(pixel * count)
         elif dark:
@@ -101,7 +151,7 @@ class _OpWriter:
             self.ops += pixel
             self._pen = bytes(pixel)
             self._append_op(spec.OP_RUN, count)
-        return count * size
+        return count
 
     def _extend_literal(self, pixels: bytes) -> None:
         self._literal += pixels
@@ -129,11 +179,6 @@ def _prefers_literal(pixels: bytes) -> bool:
     """Return whether pixels of MONO1 need fewer bytes as a LIT than as SKIPs and RUNs."""
     ops = 1 + pixels.count(b"\0\1") + pixels.count(b"\1\0")
     return ops > 1 + (len(pixels) + 7) // 8
-
-
-def _length(pattern: re.Pattern[bytes], pixels: mmap.mmap, at: int, end: int) -> int:
-    match = pattern.match(pixels, at, end)
-    return match.end() - at if match else 0
 
 
 def _op(op: int, count: int) -> bytes:

@@ -34,10 +34,11 @@ import socket
 import struct
 import threading
 import time
+from collections.abc import Iterable, Iterator
 from typing import Final, Self
 
 from firmware_sim import spec
-from firmware_sim.bench import Bench
+from firmware_sim.bench import Bench, Snapshot
 from firmware_sim.device import Device
 from firmware_sim.readiness import wait_ready
 from firmware_sim.serve import accept
@@ -48,6 +49,7 @@ _HEADER: Final = struct.Struct("<4sHHHHHHIIIIII")
 _MAGIC: Final = b"VXT1"
 _NO_FRAME: Final = 0xFFFF
 _IDLE_FACTOR: Final = 20  # pause after copying a page, in multiples of the time that it took
+_SEND_BYTES: Final = 1 << 23  # most of a page in one call, to bound what a large volume takes
 _U32: Final = 0xFFFFFFFF
 
 
@@ -123,20 +125,21 @@ class Tap:
     def _serve(self, watcher: socket.socket) -> None:
         """Respond to a watcher until it disconnects.
 
-        The socket blocks, so that the system takes a whole page in one call and the interpreter
-        lock is released once. With many small calls it would change hands each time, and stall
-        either the device or this thread.
+        The socket blocks, so that the system takes a page in few calls and the interpreter lock is
+        released as often. With many small calls it would change hands each time, and stall either
+        the device or this thread.
         """
         while self._readable(watcher):
             request = watcher.recv(_REQUEST.size, socket.MSG_WAITALL)
             if len(request) < _REQUEST.size or not self._await_new_picture(watcher, request):
                 return
             began = time.thread_time()
-            header, page = self._capture()
+            header, shown = self._capture()
             spent = time.thread_time() - began
             watcher.sendall(header)
-            watcher.sendall(page)
-            del page
+            for piece in _large_pieces(shown.stored.dense_pieces()):
+                watcher.sendall(piece)
+            watcher.sendall(shown.palette)
             self._closing.wait(_IDLE_FACTOR * spent)
 
     def _readable(self, one: socket.socket) -> bool:
@@ -168,7 +171,7 @@ class Tap:
         """Return the request of a watcher that has the picture on display."""
         return _REQUEST.pack(self._device.boot, self._device.swaps & _U32)
 
-    def _capture(self) -> tuple[bytes, bytes]:
+    def _capture(self) -> tuple[bytes, Snapshot]:
         shown = self._bench.snapshot()
         device = self._device
         header = _HEADER.pack(
@@ -184,4 +187,15 @@ class Tap:
             device.damaged & _U32,
             device.errors_by_code.get(spec.CODE_OVERRUN, 0) & _U32,
         )
-        return header, shown.pixels + shown.palette
+        return header, shown
+
+
+def _large_pieces(pieces: Iterable[memoryview]) -> Iterator[bytes]:
+    """Join pieces until they are large."""
+    large = bytearray()
+    for piece in pieces:
+        large += piece
+        if len(large) >= _SEND_BYTES:
+            yield bytes(large)
+            large.clear()
+    yield bytes(large)

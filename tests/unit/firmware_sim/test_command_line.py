@@ -28,7 +28,7 @@ from device_packets import (
 )
 
 from firmware_sim import __main__ as entry
-from firmware_sim import command_line, faults, memory, npy, serve
+from firmware_sim import command_line, faults, npy, serve
 from firmware_sim.__main__ import main
 from firmware_sim.config import Config
 from firmware_sim.device import Device
@@ -448,14 +448,25 @@ def test_more_open_files_than_select_takes() -> None:
         assert process.wait(WAIT) == 0
 
 
-def test_a_grid_beyond_the_memory_of_the_machine(
+def test_the_largest_grid_needs_no_memory(capsys: pytest.CaptureFixture[str]) -> None:
+    with entry._stop_on_signal() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        assert command_line.run(["--size", "2048x1024x1023"], stop) == 0
+    assert json.loads(capsys.readouterr().out)["size"] == "2048x1024x1023"
+    assert exit_code(["--size", "2048x1024x1024"]) == 2
+    assert "take one of 2147483647 voxels or less" in capsys.readouterr().err
+
+
+def test_what_is_lit_exceeds_the_memory(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(memory, "_memory_bytes", lambda: 3_000_000)
-    assert exit_code(["--size", "128x128x128"]) == 2
-    assert "needs 12 MB of memory, more than this machine has" in capsys.readouterr().err
-    with pytest.raises(ValueError, match="take a smaller one"):
-        open_in_process("sim:?size=128x128x128")
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(command_line, "_serve", fail)
+    assert command_line.run(["--size", "3x5x7"], 0) == 2
+    text = "what is lit of 3x5x7 rgb888 needs more memory than there is: take a smaller --size"
+    assert text in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("size", ["3x5x7", "3,5,7", "3X5X7"])

@@ -23,6 +23,7 @@ from firmware_sim.config import (
 from firmware_sim.faults import parse_faults
 from firmware_sim.memory import FORMATS
 from firmware_sim.npy import npy_header, write_npy
+from firmware_sim.sparse_pixels import SparsePixels
 
 
 def test_defaults() -> None:
@@ -140,7 +141,7 @@ def test_numpy_reads_a_dump(
 
 def test_the_header_is_aligned() -> None:
     for side in (1, 10, 100, 1000, 10_000):
-        header = npy_header(Snapshot(b"", (side, 1, 1), "index8", None, 0, 0, 0))
+        header = npy_header(Snapshot(SparsePixels(side, 1), (side, 1, 1), "index8", None, 0, 0, 0))
         assert len(header) % 64 == 0
         assert header.endswith(b"\n")
         assert np.lib.format.read_magic(io.BytesIO(header)) == (1, 0)

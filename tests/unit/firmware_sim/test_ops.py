@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_ops import VoxelwiseDecoder, random_ops
 
+from firmware_sim import spec
 from firmware_sim.config import Config
 from firmware_sim.grid import Grid
 from firmware_sim.memory import FORMATS, Page
 from firmware_sim.packet_error import PacketError
-from firmware_sim.page_encoder import encode_page
+from firmware_sim.page_encoder import _op, encode_page
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -257,6 +258,35 @@ def test_a_page_unpacks_to_what_was_packed(name: str, data: st.DataObject) -> No
     if covered <= 256 * 256:
         draw_ops(ops, Grid(covered, 1, 1), name, back, features=0)
     assert back.pixels == pixels[start * size : (start + covered) * size]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_stretches_are_found_across_windows_and_blocks(name: str) -> None:
+    """SKIP and RUN of all that is equal, wherever memory is divided."""
+    pixel_format = FORMATS[name]
+    size, full = pixel_format.size, pixel_format.full
+    for counts in ((5000, 9000, 4096), (4096, 4096, 1), (1, 12_288, 128), (20_000, 100, 9999)):
+        dark, lit, rest = counts
+        page = Page(sum(counts), size)
+        page.fill([dark], lit, full)
+        page.put(dark + lit - 1, bytes(size) * 2)  # a dark pixel that was lit once
+        covered, ops = encode_page(page, pixel_format, 0, sum(counts), 64)
+        assert covered == sum(counts)
+        expected = _op(spec.OP_SKIP, dark) + _op(spec.OP_RUN, lit - 1)
+        assert ops == expected + _op(spec.OP_SKIP, rest + 1)
+
+
+def test_pixels_are_read_across_windows() -> None:
+    rng = random.Random(5)
+    for name, pixel_format in FORMATS.items():
+        values = bytes(rng.choices((0, 1), k=10_000 * pixel_format.size))
+        page = Page(10_000, pixel_format.size)
+        page.put(0, values)
+        covered, ops = encode_page(page, pixel_format, 3, 9990, 60_000)
+        back = Page(covered, pixel_format.size)
+        draw_ops(ops, Grid(covered, 1, 1), name, back, features=0)
+        assert covered == 9990
+        assert back.pixels == values[3 * pixel_format.size : 9993 * pixel_format.size]
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ import pytest
 from device_packets import CLEAR, COMMIT, DOT, data, hello
 
 from firmware_sim import command_line, serve
+from firmware_sim import tap as tap_module
 from firmware_sim import viewer as viewers
 from firmware_sim.__main__ import main
 from firmware_sim.bench import Bench
@@ -92,6 +93,17 @@ def test_a_palette_comes_behind_its_page() -> None:
     shown = Bench(watched).snapshot()
     assert page == shown.pixels + shown.palette
     assert page[105 + 9 : 105 + 12] == b"\x01\x02\x04"
+
+
+def test_a_large_page_comes_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tap_module, "_SEND_BYTES", 100_000)
+    watched = Device(Config((64, 64, 64), refresh=0))
+    watched.receive(hello() + data(0, 0, b"\x02\x3e\x3f\x3f" + DOT, CLEAR | COMMIT))
+    with tapped(watched) as tap, watch(tap) as watcher:
+        watcher.sendall(NOTHING)
+        _, page = take(watcher, 64**3 * 3)
+    assert page == Bench(watched).snapshot().pixels
+    assert page.strip(b"\0")
 
 
 def test_a_watcher_gets_the_newest_picture_and_none_twice() -> None:

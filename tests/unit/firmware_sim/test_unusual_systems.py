@@ -5,16 +5,13 @@ import io
 import os
 import socket
 import sys
-import types
 
 import pytest
 
-from firmware_sim import command_line, memory, readiness, serve
+from firmware_sim import command_line, readiness, serve
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
-from firmware_sim.grid import Grid
-from firmware_sim.memory import FORMATS, Memory, Page
 from firmware_sim.usb import usbip_server
 from firmware_sim.usb.device import UsbDevice
 from firmware_sim.usb.function import DisplayFunction
@@ -63,27 +60,6 @@ def test_origins_are_those_of_a_view(capsys: pytest.CaptureFixture[str]) -> None
     with pytest.raises(SystemExit):
         command_line.run(["--allow-origin", "display.example"], 0)
     assert "--allow-origin is for --view" in capsys.readouterr().err
-
-
-def test_memory_without_advice_on_large_pages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(memory.mmap, "MADV_NOHUGEPAGE", raising=False)
-    page = Page(105, 3)
-    page.put(7, b"abc")
-    assert page.pixels[21:24] == b"abc"
-
-
-def test_memory_that_there_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(_size: int) -> None:
-        raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
-
-    monkeypatch.setattr(memory, "_dark_memory", none)
-    with pytest.raises(ValueError, match="take a smaller one"):
-        Memory(Grid(3, 5, 7), FORMATS["rgb888"])
-
-
-def test_a_system_that_does_not_tell_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "os", types.SimpleNamespace())
-    assert memory._memory_bytes() == 1 << 62
 
 
 def test_a_host_that_has_gone_before_it_is_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
