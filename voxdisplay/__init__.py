@@ -37,6 +37,13 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     Curve               Base class, for curves of one's own.
     Mesh                Triangles between vertices.
     Box                 Box along the axes.
+    Plane               Plane, as far as the display goes.
+    Disc                Flat disc.
+    Sphere              Sphere or ball.
+    Ellipsoid           Ellipsoid along the axes.
+    SphericalTriangle   Triangle of great circles.
+    Cylinder            Cylinder with its ends.
+    Cone                Cone with its base.
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -74,7 +81,18 @@ Errors.
 # modules and __all__ agree.
 TYPE_CHECKING = False  # by its name true for type checkers; typing itself takes long to import
 if TYPE_CHECKING:
-    from voxdisplay.bodies import Body, Box, Mesh
+    from voxdisplay.bodies import (
+        Body,
+        Box,
+        Cone,
+        Cylinder,
+        Disc,
+        Ellipsoid,
+        Mesh,
+        Plane,
+        Sphere,
+        SphericalTriangle,
+    )
     from voxdisplay.curves import (
         Arc,
         Bezier,
@@ -129,14 +147,18 @@ if TYPE_CHECKING:
         "Box",
         "CatmullRom",
         "Circle",
+        "Cone",
         "Curve",
         "CurveError",
+        "Cylinder",
         "DesyncError",
         "DeviceError",
         "DeviceInfo",
+        "Disc",
         "Display",
         "Drawing",
         "Ellipse",
+        "Ellipsoid",
         "Frame",
         "Grid",
         "Helix",
@@ -148,6 +170,7 @@ if TYPE_CHECKING:
         "OpenError",
         "Parametric",
         "PixelFormat",
+        "Plane",
         "Points",
         "Polyline",
         "ProtocolError",
@@ -158,6 +181,8 @@ if TYPE_CHECKING:
         "SceneError",
         "Segment",
         "Sequence",
+        "Sphere",
+        "SphericalTriangle",
         "TorusKnot",
         "TransportClosed",
         "TransportError",
@@ -177,7 +202,14 @@ _MODULES = {
     "voxdisplay.bodies": [
         "Body",
         "Box",
+        "Cone",
+        "Cylinder",
+        "Disc",
+        "Ellipsoid",
         "Mesh",
+        "Plane",
+        "Sphere",
+        "SphericalTriangle",
     ],
     "voxdisplay.curves": [
         "Arc",

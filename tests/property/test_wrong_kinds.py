@@ -68,6 +68,13 @@ SCENE = """{"size": [9, 9, 9], "objects": [
  {"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}]}"""
 # Arguments of a call that succeeds, by the name of what is called.
 CALLS = {
+    "Cone": {"start": (2, 2, 2), "end": (5, 6, 7), "radius": 2, "fill": "shell"},
+    "Cylinder": {"start": (2, 2, 2), "end": (5, 6, 7), "radius": 2, "fill": "shell"},
+    "SphericalTriangle": {"center": (5, 5, 5), "radius": 3, "corners": POINTS[1:]},
+    "Ellipsoid": {"center": (5, 5, 5), "radii": (3, 2, 1), "fill": "solid"},
+    "Sphere": {"center": (5, 5, 5), "radius": 3, "fill": "solid"},
+    "Disc": {"center": (5, 5, 5), "radius": 3, "normal": (0, 0, 1)},
+    "Plane": {"point": (1, 2, 3), "normal": (0, 1, 1)},
     "Box": {"start": (1, 1, 1), "end": (4, 5, 6), "fill": "solid"},
     "Mesh": {"vertices": POINTS, "faces": [(0, 1, 2)], "fill": "shell", "vertex_colors": None,
              "face_colors": [(1, 2, 3)], "uv": [(0, 0)] * 4,

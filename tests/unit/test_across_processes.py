@@ -30,6 +30,13 @@ CURVES = {
     "TorusKnot": vd.TorusKnot(2, 3, (5, 5, 5), 3, 1),
 }
 BODIES = {
+    "Cone": vd.Cone((2, 2, 2), (5, 6, 7), 2),
+    "Cylinder": vd.Cylinder((2, 2, 2), (5, 6, 7), 2),
+    "SphericalTriangle": vd.SphericalTriangle((5, 5, 5), 3, [(9, 5, 5), (5, 9, 5), (5, 5, 9)]),
+    "Ellipsoid": vd.Ellipsoid((5, 5, 5), (3, 2, 1)),
+    "Sphere": vd.Sphere((5, 5, 5), 3, fill="solid"),
+    "Disc": vd.Disc((5, 5, 5), 3, (1, 2, 3)),
+    "Plane": vd.Plane((1, 2, 3), (0, 0, 1)),
     "Box": vd.Box((1, 1, 1), (4, 5, 6), fill="solid"),
     "Mesh": vd.Mesh(
         [(1, 1, 1), (5, 2, 3), (4, 5, 6)],
@@ -122,7 +129,12 @@ def described(value):
         )  # fmt: skip
     if isinstance(value, vd.Body):
         low, high = value.bounds()
-        return repr(value), low.tolist(), high.tolist(), described(vd.voxelize(value))
+        return (
+            repr(value),
+            low.tolist(),
+            high.tolist(),
+            described(vd.voxelize(value, clip=(9, 9, 9))),
+        )
     if isinstance(value, vd.VoxelSet):
         return (
             repr(value), value.box, value.kind, value.notes, value.voxels.tolist(),

@@ -2,5 +2,26 @@
 
 from voxdisplay.bodies.body import Body, TransformedBody
 from voxdisplay.bodies.mesh import Box, Mesh
+from voxdisplay.bodies.primitives import (
+    Cone,
+    Cylinder,
+    Disc,
+    Ellipsoid,
+    Plane,
+    Sphere,
+    SphericalTriangle,
+)
 
-__all__ = ["Body", "Box", "Mesh", "TransformedBody"]
+__all__ = [
+    "Body",
+    "Box",
+    "Cone",
+    "Cylinder",
+    "Disc",
+    "Ellipsoid",
+    "Mesh",
+    "Plane",
+    "Sphere",
+    "SphericalTriangle",
+    "TransformedBody",
+]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
+from voxdisplay.bodies.quadrics import QuadricPatches
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.voxel_box import VoxelBox
 
@@ -34,6 +35,7 @@ class Voxeliser(Protocol):
 _VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
     TriangleMesh: ("mesh", "voxelize_mesh"),
     LitVoxels: ("lit_voxels", "voxelize_lit"),
+    QuadricPatches: ("quadrics", "voxelize_quadrics"),
 }
 
 
