@@ -22,10 +22,12 @@ from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint
 from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
 from voxdisplay.raster.color import Color, as_colors, colors_at, interpolate_colors
-from voxdisplay.raster.display_list import DisplayList, OrderedVoxels
+from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
-from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
+from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values
+from voxdisplay.raster.pixel_map import contains, without
+from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.voxelization.body_voxelization import voxelize_body
 from voxdisplay.voxelization.voxel_box import VoxelBox
 from voxdisplay.wire import spec
@@ -108,11 +110,7 @@ class Frame:
     ) -> None:
         self.grid = Grid.of(grid)
         self.format = PixelFormat.of(format)
-        self._raster: Pixels = np.zeros(self.format.shape((self.grid.voxels,)), self.format.dtype)
-        self._shared = False  # raster is shared with a copy
-        self._drawn = DisplayList()
-        self._has_base = False  # set from an array, over which the list was drawn
-        self._lit: tuple[NDArray[np.int64], Values] | None = None
+        self._raster = SparseRaster(self.grid, self.format)
         if palette is not None and self.format is not PixelFormat.INDEX8:
             raise ValueError(f"a {self.format.value} display has no palette: leave it out")
         self._palette: Palette | None = None  # None: the default palette, or a format without
@@ -133,7 +131,7 @@ class Frame:
         mine, others = self.palette, other.palette
         if mine is not None and others is not None and not np.array_equal(mine, others):
             return False
-        return self._raster is other._raster or np.array_equal(self._raster, other._raster)
+        return not len(self._raster.differing(other._raster))
 
     __hash__ = None  # type: ignore[assignment]  # it can be drawn on
 
@@ -145,26 +143,14 @@ class Frame:
 
     def copy(self) -> Frame:
         """Return another frame of the same picture; quick, until one of the two is drawn on."""
-        self._visible(dark=True)  # so that it is found once for both
         twin = type(self).__new__(type(self))
         twin.__dict__.update(self.__dict__)
-        twin._drawn = self._drawn.copy()  # noqa: SLF001 - of its own kind
-        if len(self._drawn) > _OVERDRAW_LIMIT * len(self.lit()[0]):
-            # Most drawn voxels are covered: the raster alone is smaller.
-            twin._drawn, twin._has_base = DisplayList(), True  # noqa: SLF001
+        twin._raster = self._raster.copy()  # noqa: SLF001 - of its own kind
         twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
-        self._shared = twin._shared = True  # noqa: SLF001
         return twin
 
     def __copy__(self) -> Frame:
         return self.copy()
-
-    def _prepare_change(self) -> None:
-        """Take the raster out of sharing before a change, so that copies keep their picture."""
-        if self._shared:
-            self._raster = self._raster.copy()
-            self._shared = False
-        self._lit = None
 
     def draw(
         self,
@@ -217,19 +203,19 @@ class Frame:
         colors = as_colors("white" if color is None else color)
         if isinstance(drawable, voxelization.VoxelSet):
             own = drawable.colors if color is None else None
-            drawing = self._add(drawable.voxels, colors if own is None else own, _NO_INDICES)
+            drawing = self._add_set(drawable.voxels, colors if own is None else own)
             return replace(drawing, notes=drawable.notes)
         if isinstance(drawable, Curve):
             drawable = voxelization.voxelize(drawable)
         if isinstance(drawable, voxelization.Sequence):
             if len(colors) > 1 and len(colors) == drawable.curve.point_count:
                 colors = colors_at(colors, voxelization.point_indices(drawable))
-            drawing = self._add(drawable.voxels, colors, _corner_rows(drawable))
+            drawing = self._add(drawable.voxels, colors, Kind.CURVE, _corner_rows(drawable))
             return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
         if not is_array_like(drawable) or isinstance(drawable, Frame):
             wanted = "a curve, a body, a sequence, an (N, 3) array of voxels or a scene"
             raise wrong_kind("drawable", wanted, drawable)
-        return self._add_set(as_voxels("drawable", drawable), colors)
+        return self._add(as_voxels("drawable", drawable), colors, Kind.ARRAY)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
@@ -256,12 +242,15 @@ class Frame:
             One colour, or one for each voxel, or several spread along the rows.
 
         """
-        return self._add(voxels, colors, _NO_INDICES)
+        return self._add(voxels, colors, Kind.SET)
 
     def _add(
-        self, voxels: NDArray[np.integer], colors: NDArray[np.uint8], corners: NDArray[np.int64]
+        self,
+        voxels: NDArray[np.integer],
+        colors: NDArray[np.uint8],
+        kind: Kind,
+        corners: NDArray[np.int64] | None = None,
     ) -> Drawing:
-        self._prepare_change()
         # A single colour is looked up once.
         each = len(colors) in {1, len(voxels)}
         rgb = colors if each else interpolate_colors(colors, len(voxels))
@@ -270,14 +259,11 @@ class Frame:
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
         inside = self.grid.inside(voxels)
         at_corner = np.zeros(len(voxels), dtype=np.bool_)
-        at_corner[corners] = True
-        owner = np.zeros(len(voxels), dtype=np.int64)
+        if corners is not None:
+            at_corner[corners] = True
         # Voxels outside have meaningless indices; they are removed here.
-        item = OrderedVoxels(voxels, self.grid.index_of(voxels), values, owner, at_corner).select(
-            inside
-        )
-        self._raster[item.index] = self.format.pixels(item.values)
-        self._drawn.append(item)
+        item = DrawnVoxels.of_item(self.grid.index_of(voxels), values, at_corner, kind)
+        self._raster.draw(item.select(inside))
         return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
 
     def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
@@ -300,21 +286,14 @@ class Frame:
         """
         array = as_array("array", array)
         self.format.validate(array, self.grid.array_shape)
-        self._prepare_change()
-        self._raster[...] = array.reshape(self._raster.shape)
-        self._drawn = DisplayList()
-        self._has_base = True
+        pixels: Pixels = np.array(array, order="C").reshape(self.format.shape((self.grid.voxels,)))
+        self._raster.set(pixels)
         if self._palette:
-            self._palette.mark_used(
-                np.flatnonzero(np.bincount(self._raster.reshape(-1), minlength=256))
-            )
+            self._palette.mark_used(np.flatnonzero(np.bincount(pixels, minlength=256)))
 
     def clear(self) -> None:
         """Make all voxels dark."""
-        self._prepare_change()
-        self._raster[...] = 0
-        self._drawn = DisplayList()
-        self._has_base = False
+        self._raster.clear()
 
     @property
     def palette(self) -> NDArray[np.uint8] | None:
@@ -328,13 +307,9 @@ class Frame:
         """True if the palette is not the default one."""
         return self._palette is not None and len(self._palette.entries_differing(DEFAULT)) > 0
 
-    @property
-    def _raster_zyx(self) -> Pixels:
-        return self._raster.reshape(self.format.shape(self.grid.array_shape))
-
     def array(self) -> Pixels:
         """Return the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
-        return self._raster_zyx.copy()
+        return self._raster.pixels().reshape(self.format.shape(self.grid.array_shape))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a picture of the frame.
@@ -357,7 +332,7 @@ class Frame:
         """
         from voxdisplay.view.rich_display import save_page  # noqa: PLC0415 - needs an extra
 
-        save_page(path, self._raster_zyx, self.grid, self.format, self.palette)
+        save_page(path, self.array(), self.grid, self.format, self.palette)
 
     def show(self) -> None:
         """Show a picture of the frame: in a notebook's output, else in the picture viewer.
@@ -372,44 +347,41 @@ class Frame:
         """
         from voxdisplay.view.rich_display import show_page  # noqa: PLC0415 - needs an extra
 
-        show_page(self._raster_zyx, self.grid, self.format, self.palette)
+        show_page(self.array(), self.grid, self.format, self.palette)
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks; None without Pillow."""
         from voxdisplay.view.rich_display import page_png  # noqa: PLC0415 - needs an extra
 
-        return page_png(self._raster_zyx, self.grid, self.format, self.palette)
+        return page_png(self.array(), self.grid, self.format, self.palette)
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the colours shown, (nz, ny, nx, 3) uint8, whatever the format."""
-        colors = self._colors_of(self.format.values(self._raster))
+        index, values = self.lit()
+        colors = np.empty((self.grid.voxels, 3), dtype=np.uint8)
+        colors[:] = self._colors_of(np.zeros(1, dtype=np.uint32))  # palettes may show the dark
+        colors[index] = self._colors_of(values)
         return colors.reshape(*self.grid.array_shape, 3)
 
     def lit(self) -> tuple[NDArray[np.int64], Values]:
         """Return the scan-order indices of lit voxels, ascending, and their pixel values."""
-        if self._lit is None:
-            self._lit = self._find_lit()
-        return self._lit
-
-    def _find_lit(self) -> tuple[NDArray[np.int64], Values]:
-        if self._has_base:
-            index = np.flatnonzero(is_lit(self._raster))
-            return index, self._values_at(index)
-        index = self._drawn.indices()
-        values = self._values_at(index)
-        return index[values != 0], values[values != 0]
-
-    def _values_at(self, index: NDArray[np.int64]) -> Values:
-        return self.format.values(self._raster.take(index, axis=0))
+        lit = self._raster.lit
+        return lit.index, lit.values
 
     def digest(self) -> int:
         """Return the digest that a display reports when it shows this frame (section 8)."""
-        # In a frame that was set from an array, much may be lit.
-        whole = self._has_base
-        found = page_digest(self._raster, self.format) if whole else digest(*self.lit())
+        found = self._raster_digest()
         if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
         return found & 0xFFFFFFFF
+
+    def _raster_digest(self) -> int:
+        if not (page := self._raster.page):
+            return digest(*self.lit())
+        # In a page, much may be lit; a digest is a sum, to which what was drawn is added.
+        drawn = self._raster.drawn
+        found = page_digest(page.pixels, self.format)
+        return found - digest(drawn.index, page.at(drawn.index)) + digest(drawn.index, drawn.values)
 
     def payloads(self, max_payload: int, features: Collection[str] = ()) -> list[bytes]:
         """Return payloads that draw the frame on a dark page, in whatever order they arrive.
@@ -442,13 +414,14 @@ class Frame:
         """
         config = self._encoder_config(max_payload, features, bytes_per_s)
         colors = self._palette_blocks(DEFAULT, config)
-        if self._has_base and (plain := encode_raw_if_faster(self._raster, config, colors)):
+        if self._raster.page and (
+            plain := encode_raw_if_faster(self._raster.pixels(), config, colors)
+        ):
             yield from plain
             return
-        items = self._visible(dark=False)
-        index = _without(self.lit()[0], items) if self._has_base else _NO_INDICES
+        ordered, index = self._visible_parts()
         yield []
-        yield from encode_update(PageUpdate(items, index, self._values_at), config, colors)
+        yield from encode_update(PageUpdate(ordered, index, self._raster.at), config, colors)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -465,11 +438,13 @@ class Frame:
         """
         config = self._encoder_config(max_payload, features)
         changed = self.changed_indices(base)
-        items = self._visible(dark=True)
-        if items:  # items without any change are on the page already
-            fresh = np.isin(items.index, changed)
-            items = items.select(np.bincount(items.item, fresh)[items.item] > 0)
-        content = PageUpdate(items, _without(changed, items), self._values_at)
+        ordered = self._ordered()
+        rest = changed
+        if ordered:  # items without any change are on the page already
+            fresh = contains(changed, ordered.index)
+            ordered = ordered.select(np.bincount(ordered.item, fresh)[ordered.item] > 0)
+            rest = changed[without(changed, ordered.index)]
+        content = PageUpdate(ordered, rest, self._raster.at)
         old = base._palette.colors if base._palette else DEFAULT
         return list(
             chain.from_iterable(encode_update(content, config, self._palette_blocks(old, config)))
@@ -482,13 +457,7 @@ class Frame:
             raise ValueError(
                 f"base: expected a frame of {self.grid} {self.format.value}, found {base}"
             )
-        mine, other = self._raster, base._raster
-        if mine is other:
-            return np.empty(0, dtype=np.int64)
-        if not (self._has_base or base._has_base):
-            index = np.union1d(self.lit()[0], base.lit()[0])
-            return np.asarray(index[self._values_at(index) != base._values_at(index)])
-        return np.flatnonzero(is_lit(mine ^ other))
+        return self._raster.differing(base._raster)
 
     def _encoder_config(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
@@ -502,10 +471,23 @@ class Frame:
             )
         return config
 
-    def _visible(self, *, dark: bool) -> OrderedVoxels | None:
-        """Return the drawn voxels that no later item covers, without dark ones unless asked for."""
-        drawn = self._drawn.visible(self._values_at)
-        return drawn if dark or drawn is None else drawn.select(drawn.values != 0)
+    def _visible_parts(self) -> tuple[DrawnVoxels | None, NDArray[np.int64]]:
+        """Return the lit voxels of items that may have an order, and the indices of all others."""
+        ordered = self._ordered()
+        index = self.lit()[0]
+        if ordered is None:
+            return None, index
+        lit = ordered.select(ordered.values != 0)
+        if not self._raster.page and ordered is self._raster.visible:
+            return lit, index[:0]
+        return lit, index[without(index, lit.index)]
+
+    def _ordered(self) -> DrawnVoxels | None:
+        """Return the visible voxels, dark ones included, of items that may have an order."""
+        drawn = self._raster.visible
+        if drawn and (drawn.kinds == Kind.SET).any():
+            drawn = drawn.select((drawn.kinds != Kind.SET)[drawn.item])
+        return drawn
 
     def _palette_blocks(self, old: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks | None:
         """Return op blocks that set the entries that differ from another palette, or None."""
@@ -515,8 +497,6 @@ class Frame:
 
 
 _NO_INDICES = np.empty(0, dtype=np.int64)
-# With more drawn voxels for each lit one, a copy keeps the raster alone.
-_OVERDRAW_LIMIT = 4
 
 
 def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
@@ -527,8 +507,3 @@ def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
     behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
     before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)
     return np.unique(behind - before)
-
-
-def _without(index: NDArray[np.int64], items: OrderedVoxels | None) -> NDArray[np.int64]:
-    """Return indices, ascending, without those of drawn voxels."""
-    return np.setdiff1d(index, items.index) if items else index

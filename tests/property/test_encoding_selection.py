@@ -198,11 +198,13 @@ def test_no_coder_alone_takes_fewer_bytes(device, seed):
     config = frame._encoder_config(most, features)
     values = format_.values(frame.array())
     assert size <= sum(map(len, encode_spans(values, config)))
-    items = frame._visible(dark=False)
-    if not frame._has_base and items:
+    items = frame._raster.visible
+    if not frame._raster.page and items:
+        items = items.select(items.values != 0)
+        voxels = grid.voxels_at(items.index)
         plain_coding = EncoderConfig(grid, format_, most)
         for each in (config, plain_coding):
-            chains = encode_chains(items.voxels, items.values, each)
+            chains = encode_chains(voxels, items.values, each)
             assert size <= sum(map(len, chains))
 
 

@@ -1,111 +1,163 @@
 """Display list of a frame: drawn voxels in drawing order, and which of them are visible.
 
-Painter's algorithm: a later item covers an earlier one. Must not know curves, colours or encodings.
+Painter's algorithm: a later item covers an earlier one. Costs what was drawn, whatever the grid.
+Must not know curves, colours or encodings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.pixel_format import Values
+from voxdisplay.raster.pixel_map import EMPTY, PixelMap
+
+_ROW_BITS = 32  # of a sort key: an index and a row fit one int64 together
+
+
+class Kind(enum.IntEnum):
+    """What is known of the order of an item's voxels.
+
+    Attributes
+    ----------
+    CURVE
+        They follow a curve: most are neighbours of the one before.
+    ARRAY
+        They stand in the order of somebody's array, which may follow a curve or not.
+    SET
+        They have no order.
+
+    """
+
+    CURVE = 0
+    ARRAY = 1
+    SET = 2
 
 
 @dataclass(frozen=True)
-class OrderedVoxels:
+class DrawnVoxels:
     """Voxels on the grid in drawing order, of one item or of several, one after another.
 
     Attributes
     ----------
-    voxels : (n, 3) integer array
-        Columns x, y, z.
     index : (n,) int64 array
         Their scan-order indices.
-    values : (n,) integer array
+    values : (n,) uint32 array
         Their pixel values.
-    item : (n,) int64 array
+    item : (n,) int32 array
         Number of the item of each, ascending.
     corners : (n,) bool array
         True where a straight line may end and another begin.
+    kinds : (items,) int8 array
+        `Kind` of each item.
 
     """
 
-    voxels: NDArray[np.integer]
     index: NDArray[np.int64]
-    values: NDArray[np.integer]
-    item: NDArray[np.int64]
+    values: NDArray[np.uint32]
+    item: NDArray[np.int32]
     corners: NDArray[np.bool_]
+    kinds: NDArray[np.int8]
+
+    @classmethod
+    def of_item(
+        cls,
+        index: NDArray[np.int64],
+        values: NDArray[np.uint32],
+        corners: NDArray[np.bool_],
+        kind: Kind,
+    ) -> DrawnVoxels:
+        """Return the voxels of one item."""
+        item = np.zeros(len(index), dtype=np.int32)
+        return cls(index, values, item, corners, np.array([kind], dtype=np.int8))
 
     def __len__(self) -> int:
         return len(self.values)
 
-    def select(self, kept: NDArray[np.bool_]) -> OrderedVoxels:
-        """Return the voxels where a mask, (n,), is set."""
+    def select(self, kept: NDArray[np.bool_]) -> DrawnVoxels:
+        """Return the voxels where a mask, (n,), is set; items keep their numbers."""
         if kept.all():
             return self
-        return OrderedVoxels(*(getattr(self, field.name)[kept] for field in fields(self)))
+        return DrawnVoxels(
+            self.index[kept], self.values[kept], self.item[kept], self.corners[kept], self.kinds
+        )
 
 
-def concatenate_ordered(parts: Sequence[OrderedVoxels]) -> OrderedVoxels:
+def concatenate_drawn(parts: Sequence[DrawnVoxels]) -> DrawnVoxels:
     """Return the voxels of all parts, at least one, with their items renumbered."""
     if len(parts) == 1:
         return parts[0]
-    voxels, index, values, _, corners = (
-        np.concatenate([getattr(part, field.name) for part in parts])
-        for field in fields(OrderedVoxels)
+    together = DrawnVoxels(
+        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in _FIELDS)
     )
-    # Parts that were concatenated before have several items, numbered from 0.
-    ordered = [int(part.item[-1]) + 1 if len(part) else 0 for part in parts]
-    first = np.cumsum(ordered) - ordered
-    owner = np.concatenate([part.item + n for part, n in zip(parts, first, strict=True)])
-    return OrderedVoxels(voxels, index, values, owner, corners)
+    items = [len(part.kinds) for part in parts]
+    first = np.cumsum(items, dtype=np.int32) - np.array(items, dtype=np.int32)
+    return replace(together, item=together.item + np.repeat(first, [len(part) for part in parts]))
 
 
 class DisplayList:
     """Drawn items, whose covered voxels are removed on request."""
 
     def __init__(self) -> None:
-        self._items: list[OrderedVoxels] = []
-        self._all_visible = True  # no voxel is covered by a later item
+        self._items: list[DrawnVoxels] = []
+        self._pixels = EMPTY
+        self._resolved = True  # no voxel is covered by a later item, and `_pixels` is theirs
 
     def __len__(self) -> int:
         return sum(map(len, self._items))
 
     def copy(self) -> DisplayList:
-        """Return another list of the same items."""
+        """Return another list of the same items; what was resolved is shared."""
         twin = DisplayList()
-        twin._items, twin._all_visible = list(self._items), self._all_visible
+        twin._items, twin._pixels, twin._resolved = list(self._items), self._pixels, self._resolved
         return twin
 
-    def append(self, item: OrderedVoxels) -> None:
+    def append(self, item: DrawnVoxels) -> None:
         """Draw an item over all others."""
-        self._items.append(item)
-        self._all_visible = False
+        if len(item):
+            self._items.append(item)
+            self._resolved = False
 
-    def indices(self) -> NDArray[np.int64]:
-        """Return the scan-order indices of all drawn voxels, ascending, each once."""
-        if not self._items:
-            return np.empty(0, dtype=np.int64)
-        index = np.sort(np.concatenate([item.index for item in self._items]))
-        return np.asarray(index[np.concatenate((index[:1] >= 0, index[1:] != index[:-1]))])
+    @property
+    def pixels(self) -> PixelMap:
+        """Pixel values of all drawn voxels, dark ones included."""
+        self._resolve()
+        return self._pixels
 
-    def visible(self, values_at: Callable[[NDArray[np.int64]], Values]) -> OrderedVoxels | None:
-        """Return the voxels that no later item covers; None if nothing was drawn.
+    @property
+    def visible(self) -> DrawnVoxels | None:
+        """Drawn voxels that no later item covers; None if nothing was drawn.
 
-        Parameters
-        ----------
-        values_at : callable
-            Function from indices to the pixel values of the raster.
-
+        A voxel that was drawn several times with its final value remains in each of the items.
         """
-        if not self._items:
-            return None
-        if not self._all_visible:
-            drawn = concatenate_ordered(self._items)
-            # A covered voxel never shows again: a newer item would have drawn it.
-            self._items = [drawn.select(values_at(drawn.index) == drawn.values)]
-            self._all_visible = True
-        return self._items[0]
+        self._resolve()
+        return self._items[0] if self._items else None
+
+    def _resolve(self) -> None:
+        if self._resolved:
+            return
+        drawn = concatenate_drawn(self._items)
+        index, values, row = drawn.index, drawn.values, None
+        if not (index[1:] > index[:-1]).all():
+            key = np.sort(index << _ROW_BITS | np.arange(len(index)))  # faster than argsort
+            row = key & ((1 << _ROW_BITS) - 1)
+            index = key >> _ROW_BITS
+            del key
+            values = values[row]
+            last = np.append(index[1:] != index[:-1], True)
+            if not last.all():
+                # A covered voxel never shows again: a newer item would have drawn it.
+                final = values[last]
+                visible = np.empty(len(row), dtype=np.bool_)
+                visible[row] = values == final[np.cumsum(last) - last]
+                drawn = drawn.select(visible)
+                index, values = index[last], final
+        self._items = [drawn]
+        self._pixels = PixelMap(index, values)
+        self._resolved = True
+
+
+_FIELDS = fields(DrawnVoxels)

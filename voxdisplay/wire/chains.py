@@ -81,6 +81,7 @@ def build_chains(
     pens: NDArray[np.integer],
     config: EncoderConfig,
     corners: Bools | None = None,
+    index: Ints | None = None,
 ) -> Chains:
     """Return the chains of voxels: runs of 26-neighbours with the same pen, cut into segments.
 
@@ -90,6 +91,8 @@ def build_chains(
         As of `encode_chains`.
     corners : (n,) bool array, optional
         True where a straight line may end and another begin.
+    index : (n,) int64 array, optional
+        Scan-order indices of the voxels, if known.
 
     """
     n = len(voxels)
@@ -109,7 +112,7 @@ def build_chains(
     at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step and no octant
     octant = 8 * mains[at] + falls[at] if n > 1 else np.zeros(n, dtype=np.int64)
     body, size = _encode_ops(spots, steps, begin, count, octant, lines, config)
-    index = config.grid.index_of(voxels)
+    index = config.grid.index_of(voxels) if index is None else index
     lone = count == 0
     pen = value[begin]
     blocks = OpBlocks(

@@ -16,7 +16,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.display_list import OrderedVoxels
+from voxdisplay.raster.display_list import DrawnVoxels
 from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.wire import spans, spec, voxel_sets
 from voxdisplay.wire.chains import Chains, build_chains
@@ -49,7 +49,7 @@ class PageUpdate:
 
     Attributes
     ----------
-    ordered : OrderedVoxels or None
+    ordered : DrawnVoxels or None
         Voxels with a drawing order.
     unordered : (n,) int64 array
         Scan-order indices of all others, ascending, each once.
@@ -58,7 +58,7 @@ class PageUpdate:
 
     """
 
-    ordered: OrderedVoxels | None
+    ordered: DrawnVoxels | None
     unordered: Ints
     pixels_at: spans.PixelLookup
 
@@ -146,7 +146,8 @@ def _encode(update: PageUpdate, config: EncoderConfig, first: OpBlocks) -> Itera
         return
     # A repeated voxel would end a chain.
     ordered = ordered.select(np.concatenate(([True], ordered.index[1:] != ordered.index[:-1])))
-    chains = build_chains(ordered.voxels, ordered.values, config, ordered.corners)
+    voxels = config.grid.voxels_at(ordered.index)
+    chains = build_chains(voxels, ordered.values, config, ordered.corners, ordered.index)
     yield []
     if not len(update.unordered):
         best.offer(chains.blocks)
@@ -174,7 +175,7 @@ def _encode(update: PageUpdate, config: EncoderConfig, first: OpBlocks) -> Itera
     if spans.min_bytes(index, config) < best.total_bytes:
         best.offer(run_to_end(spans.encode_span_set(index, pixels_at(index), pixels_at, config)))
     if config.has(spec.FEATURE_ARC) and not len(update.unordered):
-        best.offer_payloads(encode_range_coded(ordered.voxels, ordered.values, config))
+        best.offer_payloads(encode_range_coded(voxels, ordered.values, config))
     yield best.payloads
 
 
@@ -243,7 +244,7 @@ def _voxel_rows(chains: Chains, which: Bools) -> Ints:
 
 
 def _cheaper_as_set(
-    chains: Chains, ordered: OrderedVoxels, pixels_at: spans.PixelLookup, config: EncoderConfig
+    chains: Chains, ordered: DrawnVoxels, pixels_at: spans.PixelLookup, config: EncoderConfig
 ) -> Bools:
     """Return which segments are cheaper as a set of their voxels: (segments,).
 
@@ -257,8 +258,9 @@ def _cheaper_as_set(
     goes = np.concatenate(([True], blocks.cursor[1:] != blocks.cursor_after[:-1]))
     cost = blocks.size + goes * (config.position_bytes + ~blocks.starts_with_step)
     item = ordered.item[chains.begin]
-    as_chain = np.bincount(item, weights=cost)
-    least = voxel_sets.min_bytes(ordered.index, ordered.item, len(as_chain), config)
+    items = len(ordered.kinds)  # a segment may go on into the next item, where none begins
+    as_chain = np.bincount(item, weights=cost, minlength=items)
+    least = voxel_sets.min_bytes(ordered.index, ordered.item, items, config)
     maybe = (least < as_chain)[item]
     if not maybe.any():
         return as_set

@@ -178,14 +178,14 @@ def _large_boxes(
     return with_boxes if with_boxes.bytes_per_value.sum() < bytes_without else None
 
 
-def min_bytes(index: Ints, group: Ints, groups: int, config: EncoderConfig) -> Ints:
+def min_bytes(index: Ints, group: NDArray[np.integer], groups: int, config: EncoderConfig) -> Ints:
     """Return a lower bound of the bytes of each of several sets: (groups,); cheap to find.
 
     Every cube of two voxels a side that is not full costs a mask, or more.
     """
     x, y, z = (config.grid.voxels_at(index).T >> 1).astype(np.int64)
     half = [side // 2 + 1 for side in config.grid]
-    cell = np.sort(x + half[0] * (y + half[1] * (z + half[2] * group)))
+    cell = np.sort(x + half[0] * (y + half[1] * (z + half[2] * group.astype(np.int64))))
     first = np.flatnonzero(np.concatenate(([True], cell[1:] != cell[:-1])))
     partly = np.diff(first, append=len(cell)) < 8
     owner = cell[first][partly] // (half[0] * half[1] * half[2])
