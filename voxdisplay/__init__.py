@@ -44,6 +44,7 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     SphericalTriangle   Triangle of great circles.
     Cylinder            Cylinder with its ends.
     Cone                Cone with its base.
+    HeightField         Surface z = f(x, y).
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
         Cylinder,
         Disc,
         Ellipsoid,
+        HeightField,
         Mesh,
         Plane,
         Sphere,
@@ -161,6 +163,7 @@ if TYPE_CHECKING:
         "Ellipsoid",
         "Frame",
         "Grid",
+        "HeightField",
         "Helix",
         "IncompatibleDevice",
         "Lissajous",
@@ -206,6 +209,7 @@ _MODULES = {
         "Cylinder",
         "Disc",
         "Ellipsoid",
+        "HeightField",
         "Mesh",
         "Plane",
         "Sphere",

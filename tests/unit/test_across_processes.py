@@ -30,6 +30,7 @@ CURVES = {
     "TorusKnot": vd.TorusKnot(2, 3, (5, 5, 5), 3, 1),
 }
 BODIES = {
+    "HeightField": vd.HeightField("3 + sin(x)*k", x=(1, 6), y=(2, 5), params={"k": 2}),
     "Cone": vd.Cone((2, 2, 2), (5, 6, 7), 2),
     "Cylinder": vd.Cylinder((2, 2, 2), (5, 6, 7), 2),
     "SphericalTriangle": vd.SphericalTriangle((5, 5, 5), 3, [(9, 5, 5), (5, 9, 5), (5, 5, 9)]),

@@ -1,6 +1,7 @@
 """Surfaces, solids and voxel models as values. Must not know displays, frames or voxelisation."""
 
 from voxdisplay.bodies.body import Body, TransformedBody
+from voxdisplay.bodies.height_field import HeightField
 from voxdisplay.bodies.mesh import Box, Mesh
 from voxdisplay.bodies.primitives import (
     Cone,
@@ -19,6 +20,7 @@ __all__ = [
     "Cylinder",
     "Disc",
     "Ellipsoid",
+    "HeightField",
     "Mesh",
     "Plane",
     "Sphere",

@@ -14,15 +14,13 @@ from numpy.typing import ArrayLike
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
+from voxdisplay.curves.formula_arguments import Bounds, Formula, parse_formula, parse_range
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions import program
 from voxdisplay.expressions.interval import Interval
 from voxdisplay.expressions.params import resolve_params
-from voxdisplay.expressions.parse import constant, excerpt, parse
 from voxdisplay.expressions.program import Expression
 
-Formula = str | float | Expression
-Bounds = Sequence[str | float]
 Function = Callable[[Any], ArrayLike]
 
 _AXES = ("x", "y", "z")
@@ -106,7 +104,7 @@ class Parametric(Curve):
         values = resolve_params({} if params is None else params)
         self._formulas: list[Expression] = []
         self._always_defined = False
-        self.t_range = _range(t, values)
+        self.t_range = parse_range("t", t, values)
         self.closed = closed
         shown: dict[str, object]
         if callable(x):
@@ -125,12 +123,12 @@ class Parametric(Curve):
             if derivative is not None:
                 raise TypeError("derivative goes with a callable; with expressions use dx, dy, dz")
             self._formulas = formulas = [
-                _formula(axis, axis, formula, values)
+                parse_formula(axis, formula, values, axis=axis)
                 for axis, formula in zip(_AXES, (x, y, z), strict=True)
             ]
             self.family = tuple(formula.template for formula in formulas)
             self._slopes = [
-                None if slope is None else _formula(axis, f"d{axis}", slope, values)
+                None if slope is None else parse_formula(f"d{axis}", slope, values, axis=axis)
                 for axis, slope in zip(_AXES, (dx, dy, dz), strict=True)
             ]
             self._evaluate = program.compile_rows(formulas)
@@ -208,23 +206,6 @@ class Parametric(Curve):
                 values = formula.enclosure(Interval(t_lo, t_hi))
                 found |= ~(np.isfinite(values.lo) & np.isfinite(values.hi))
         return found
-
-
-def _range(t: Bounds, values: Mapping[str, float]) -> tuple[float, float]:
-    is_pair = isinstance(t, Sequence | np.ndarray) and not isinstance(t, str | bytes)
-    if not is_pair or getattr(t, "ndim", 1) != 1 or len(t) != 2:
-        raise arguments.ArgumentError("t", f"must be two numbers (a, b), not {excerpt(t)}")
-    low, high = (constant(bound, values) for bound in t)
-    return arguments.parameter_range("t", low, high)
-
-
-def _formula(axis: str, name: str, formula: Formula, values: Mapping[str, float]) -> Expression:
-    if isinstance(formula, Expression):
-        return formula
-    try:
-        return parse(formula, values)
-    except CurveError as error:
-        raise CurveError(f"{name}: {error}", axis=axis, hint=error.hint) from None
 
 
 class _Vectorised:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
+from voxdisplay.bodies.height_field import HeightFunction
 from voxdisplay.bodies.quadrics import QuadricPatches
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -36,6 +37,7 @@ _VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
     TriangleMesh: ("mesh", "voxelize_mesh"),
     LitVoxels: ("lit_voxels", "voxelize_lit"),
     QuadricPatches: ("quadrics", "voxelize_quadrics"),
+    HeightFunction: ("height_field", "voxelize_heights"),
 }
 
 

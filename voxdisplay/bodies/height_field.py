@@ -1,0 +1,108 @@
+"""Height fields: surfaces z = f(x, y) over a rectangle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from voxdisplay.bodies.body import Body, TransformedBody, invertible
+from voxdisplay.bodies.functions import Callback, ScalarFunction
+from voxdisplay.bodies.geometry import Bounds, Geometry
+from voxdisplay.compute.array_types import Floats
+from voxdisplay.curves import arguments
+from voxdisplay.curves.formula_arguments import Bounds as Range
+from voxdisplay.curves.formula_arguments import Formula, parse_range
+from voxdisplay.errors import BodyError
+from voxdisplay.expressions.params import resolve_params
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeightFunction(Geometry):
+    """A function z = f(x, y) over a rectangle.
+
+    Attributes
+    ----------
+    value : callable
+        x and y, float64 arrays that broadcast, to z; not finite where there is none.
+    low, high : (2,) float64 array
+        Corners of the rectangle.
+
+    """
+
+    value: Callable[[Floats, Floats], Floats]
+    low: Floats
+    high: Floats
+
+    def transformed(self, matrix: Floats, offset: Floats) -> Geometry:
+        """Return the height field of the points ``matrix @ p + offset``, matrix diagonal."""
+        scale = np.diag(matrix)
+        if (matrix != np.diag(scale)).any():
+            raise BodyError("a height field that is turned is none", hint="draw it as a surface")
+        ends = np.sort(np.stack((self.low, self.high)) * scale[:2] + offset[:2], axis=0)
+        return HeightFunction(_Scaled(self.value, scale, offset), ends[0], ends[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scaled:
+    value: Callable[[Floats, Floats], Floats]
+    scale: Floats
+    offset: Floats
+
+    def __call__(self, x: Floats, y: Floats) -> Floats:
+        inner = (x - self.offset[0]) / self.scale[0], (y - self.offset[1]) / self.scale[1]
+        return np.asarray(self.scale[2] * self.value(*inner) + self.offset[2])
+
+
+class HeightField(Body):
+    """The surface z = f(x, y) over a rectangle.
+
+    Parameters
+    ----------
+    z : str, float, Expression or callable
+        An expression of x and y, in voxels, or a callable of two (n,) float64 arrays to (n,).
+    x, y : (a, b)
+        The rectangle; numbers, or expressions without variables, a < b.
+    params : mapping of str to float or str, optional
+        Names that the expressions may use.
+
+    """
+
+    def __init__(
+        self,
+        z: Formula | Callback,
+        *,
+        x: Range,
+        y: Range,
+        params: Mapping[str, str | float] | None = None,
+    ) -> None:
+        values = resolve_params({} if params is None else params)
+        self.x_range, self.y_range = parse_range("x", x, values), parse_range("y", y, values)
+        self.function = ScalarFunction("z", z, ("x", "y"), values)
+        self._arguments = {"z": self.function.source, "x": self.x_range, "y": self.y_range}
+
+    def bounds(self) -> Bounds:
+        """Return a box that holds the surface: heights by sampling, infinite where they are."""
+        low, high = (np.array(ends) for ends in zip(self.x_range, self.y_range, strict=True))
+        x, y = (np.linspace(*ends, 65) for ends in (self.x_range, self.y_range))
+        heights = self.function(x, y[:, None])
+        heights = heights[np.isfinite(heights)]
+        if not heights.size:
+            return np.append(low, 0.0), np.append(high, 0.0)
+        spread = heights.max() - heights.min()
+        return np.append(low, heights.min() - spread), np.append(high, heights.max() + spread)
+
+    def geometry(self, bounds: Bounds, *, certified: bool = False) -> Geometry:  # noqa: ARG002 - column by column
+        """Return the function: `Body.geometry`."""
+        low, high = (np.array(ends) for ends in zip(self.x_range, self.y_range, strict=True))
+        return HeightFunction(self.function, low, high)
+
+    def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:
+        """Return the body under an affine map: `Body.transformed`."""
+        by = invertible("matrix", matrix)
+        return TransformedBody(self, by, arguments.vector("offset", offset))
