@@ -5,6 +5,7 @@ Must not know any of the packages that use it.
 
 from __future__ import annotations
 
+import math
 import reprlib
 from collections.abc import Callable
 from numbers import Integral
@@ -38,6 +39,22 @@ def number(name: str, value: Any) -> float:
         raise ValueError(f"{name}: {_SHORT.repr(value)} is too large") from None
     except (TypeError, ValueError):
         raise wrong_kind(name, "a number", value) from None
+
+
+def finite(name: str, value: Any) -> float:
+    """Return a finite number as a float; raise `TypeError` or `ValueError` otherwise."""
+    result = number(name, value)
+    if not math.isfinite(result):
+        raise ValueError(f"{name}: expected a finite number, found {result:g}")
+    return result
+
+
+def positive(name: str, value: Any) -> float:
+    """Return a finite number above 0 as a float; raise `TypeError` or `ValueError` otherwise."""
+    result = number(name, value)
+    if not 0 < result < float("inf"):
+        raise ValueError(f"{name}: expected a number above 0, found {result:g}")
+    return result
 
 
 def duration(name: str, value: Any) -> float:

@@ -11,8 +11,9 @@ from typing import Any, Final, Literal, TextIO
 from voxdisplay.argument_checks import duration, flag, function, whole_number, wrong_kind
 from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate
 from voxdisplay.display.connection import Clock
-from voxdisplay.display.display import TIMEOUT_S, Display
+from voxdisplay.display.display import Display
 from voxdisplay.display.reconnect import Reconnector, open_when_available
+from voxdisplay.display.shared_display import TIMEOUT_S
 from voxdisplay.transport import Transport
 
 DEFAULT_PORT: Final = "sim:"

@@ -10,7 +10,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TextIO, TypeAlias
+from typing import Final, TextIO, TypeAlias
 
 from voxdisplay.display.device_info import DeviceInfo, check_compatible, device_info
 from voxdisplay.display.handshake import closed_before_info, closed_meanwhile, random_session
@@ -21,7 +21,7 @@ from voxdisplay.link.session_opening import HELLO_INTERVAL_S
 from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 
-_MAX_WAIT_S = 0.5
+MAX_WAIT_S: Final = 0.5  # of one exchange
 # Assumed of a line without a known rate before the first ACK: that of 9600 Bd.
 _SLOW_BYTES_PER_S = 960.0
 _MAX_DRAIN_S = 45.0
@@ -123,13 +123,15 @@ class Connection:
         """Have `pump` raise `LocalProtocolError` in whichever thread it runs, soon."""
         self._cancelled = True
 
-    def pump(self, *, wait: bool) -> None:
+    def pump(self, *, wait: bool, within_s: float = MAX_WAIT_S) -> None:
         """Write what may be written, and read what has come.
 
         Parameters
         ----------
         wait : bool
             Whether to wait for an answer, until something is to be sent again.
+        within_s : float
+            How long to wait at most.
 
         Raises
         ------
@@ -139,21 +141,27 @@ class Connection:
             If the connection was cancelled.
 
         """
-        if self._cancelled:
+        if self._not_wanted:
             raise closed_meanwhile()
         try:
-            self._exchange(wait=wait)
+            self._exchange(wait=wait, within_s=within_s)
         except (TransportClosed, TransportTimeout) as error:
+            if self.closed:  # by a signal handler, in the middle of the exchange
+                raise closed_meanwhile() from error
             self._wait_for_device(error)
 
-    def _exchange(self, *, wait: bool) -> None:
+    @property
+    def _not_wanted(self) -> bool:
+        return self._cancelled or self.closed
+
+    def _exchange(self, *, wait: bool, within_s: float = MAX_WAIT_S) -> None:
         if not wait:  # bytes that came while the caller was away must not count as newer than now
             self._receive(0.0)
         if out := self.link.transmit(self._clock()):
             self._transport.write(out, self._timeout_s)
         if wait:
             wait_s = self.link.next_timeout(self._clock())
-            self._receive(_MAX_WAIT_S if wait_s is None else min(wait_s, _MAX_WAIT_S))
+            self._receive(within_s if wait_s is None else min(wait_s, within_s))
 
     def _receive(self, wait_s: float) -> None:
         data = self._transport.read(wait_s)
@@ -164,7 +172,7 @@ class Connection:
             raise error
         self._transport.close()
         self._pipe = self._reconnector.wait_for_device(
-            error, self.info.serial, lambda: self._cancelled
+            error, self.info.serial, lambda: self._not_wanted
         )
         self._transport = self._with_capture(self._pipe)
         self.port = self._transport.port

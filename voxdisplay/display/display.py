@@ -1,47 +1,38 @@
 """`Display`: the user's handle of an open display.
 
-Blocks in the caller's thread, and needs no other. Threads that share a display take turns; a forked
-process must open its own. Must not know bytes.
+Blocks in the caller's thread, and needs no other. Must not know bytes, threads or how it ends.
 """
 
 from __future__ import annotations
 
-import contextlib
-import time
-import warnings
-from collections.abc import Callable, Iterator
-from types import TracebackType
-from typing import Literal, NoReturn, Self, TextIO, overload
+import math
+from collections.abc import Iterator
+from typing import Literal, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.argument_checks import duration, flag, function
-from voxdisplay.display.connection import Clock, Connection
+from voxdisplay.argument_checks import duration, finite, flag, function, positive
 from voxdisplay.display.device_info import DeviceInfo
-from voxdisplay.display.display_operations import DisplayOperations, Progress
-from voxdisplay.display.fair_lock import FairLock
+from voxdisplay.display.display_operations import Progress
+from voxdisplay.display.playback import Playback
 from voxdisplay.display.receipt import Receipt, count_noun, describe_difference
-from voxdisplay.display.reconnect import Reconnector
+from voxdisplay.display.shared_display import SharedDisplay
 from voxdisplay.errors import (
     DesyncError,
     IncompatibleDevice,
     LocalProtocolError,
-    VoxDisplayError,
 )
 from voxdisplay.frame import Frame
 from voxdisplay.link import LinkCounters
 from voxdisplay.raster.pixel_format import Pixels
-from voxdisplay.transport import Transport
 
-__all__ = ["TIMEOUT_S", "Display", "Receipt"]
+__all__ = ["Display", "Receipt"]
 
-TIMEOUT_S = 5.0
-FLUSH_TIMEOUT_S = 30.0  # for the last frame: a large one on a slow line takes that long
-_BLANK_TIMEOUT_S = 2.0
+_MAX_TURN_S = 0.02  # of a wait: other threads may use the display in between
 
 
-class Display:
+class Display(SharedDisplay):
     """An open display. Use it as a context manager, or `close` it.
 
     It may be used from several threads: each call waits until those before it have returned.
@@ -64,23 +55,6 @@ class Display:
 
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        *,
-        timeout_s: float = TIMEOUT_S,
-        reconnector: Reconnector | None = None,
-        note: Callable[[str], None] | None = None,
-        capture: TextIO | None = None,
-        clock: Clock = time.monotonic,
-    ) -> None:
-        self._note = note
-        self._lock = FairLock()
-        self._connection = Connection(
-            transport, timeout_s=timeout_s, reconnector=reconnector, capture=capture, clock=clock
-        )
-        self._operations = DisplayOperations(self._connection, clock)
-
     def __repr__(self) -> str:
         """Return it in one line: ``<Display sim: 128x128x128 rgb888, 3 frames shown>``."""
         info, shown = self.info, count_noun(self._operations.queue.frames, "frame")
@@ -100,11 +74,6 @@ class Display:
     def info(self) -> DeviceInfo:
         """Properties that the device has announced."""
         return self._connection.info
-
-    @property
-    def port(self) -> str:
-        """The name the pipe was opened by."""
-        return self._connection.port
 
     @property
     def counters(self) -> LinkCounters:
@@ -174,9 +143,10 @@ class Display:
             Of this display's grid and format.
         wait : bool
             Whether to wait until the frame is displayed and its digest has been compared. If not,
-            only the newest frame is kept while an earlier one is on its way: a display that is
-            slower than its caller skips frames, and never lags behind. The last one is shown before
-            `close` returns.
+            the frame is encoded within the call, and sent as far as the device has room for it; and
+            only the newest frame is kept while earlier ones are on their way: a display that is
+            slower than its caller skips frames, and never lags behind. `playback` counts them. The
+            last one is shown before `close` returns.
         progress : callable, optional
             Called with (packets received, packets in all) while it waits.
 
@@ -201,7 +171,7 @@ class Display:
             self._check_frame(frame)
             if not wait:
                 operations.queue.replace_pending(frame)
-                operations.pump(wait=False)
+                operations.send_encoded()
                 return None
             operations.flush()
             return operations.show(frame, progress)
@@ -228,10 +198,103 @@ class Display:
         with self._turn() as operations:
             operations.pump(wait=False)
 
-    def flush(self) -> None:
-        """Wait until every frame that was handed over is displayed, or was skipped."""
+    def flush(self, timeout_s: float | None = None) -> None:
+        """Wait until every frame that was handed over is displayed, or was skipped.
+
+        Parameters
+        ----------
+        timeout_s : float, optional
+            How long to wait. None: as long as the device goes on.
+
+        Raises
+        ------
+        TransportTimeout
+            If that takes longer.
+
+        """
+        limit_s = math.inf if timeout_s is None else duration("timeout_s", timeout_s)
         with self._turn() as operations:
-            operations.flush()
+            operations.flush(limit_s)
+
+    # -- time
+
+    @property
+    def playback(self) -> Playback:
+        """Counts of frames presented, shown and dropped, since `clock` began or it was opened."""
+        return self._operations.queue.playback.reading()
+
+    def wait_until(self, when: float) -> None:
+        """Wait for a moment, and send and receive meanwhile.
+
+        Unlike `time.sleep`, it lets frames of ``present(wait=False)`` go on their way. Other
+        threads have their turns.
+
+        Parameters
+        ----------
+        when : float
+            Seconds on the clock of the display: ``time.monotonic``, unless it was opened with
+            another.
+
+        Raises
+        ------
+        TransportError, DeviceError, DesyncError
+            As of `present`.
+
+        """
+        when = finite("when", when)
+        while True:
+            with self._turn() as operations:
+                left_s = when - self._clock()
+                operations.pump(wait=left_s > 0, within_s=min(left_s, _MAX_TURN_S))
+            if left_s <= 0:
+                return
+
+    def clock(self, *, fps: float, seconds: float | None = None) -> Iterator[float]:
+        """Yield the times of frames, each when it is due, and send and receive while it waits.
+
+        Frame n is due n / fps seconds after the first. If the caller is late, frames are left out:
+        the next is always the newest that is due. `playback` counts anew.
+
+        Parameters
+        ----------
+        fps : float
+            Frames per second.
+        seconds : float, optional
+            How long it goes on; without, it does not end.
+
+        Yields
+        ------
+        float
+            Seconds since the first frame.
+
+        Raises
+        ------
+        TransportError, DeviceError, DesyncError
+            As of `present`.
+
+        Examples
+        --------
+        >>> import voxdisplay as vd
+        >>> with vd.open("sim:?size=16x16x16") as display:
+        ...     for frame_time in display.clock(fps=30, seconds=0.1):
+        ...         frame = display.frame()
+        ...         frame.draw([(int(30 * frame_time), 1, 2)])
+        ...         display.present(frame, wait=False)
+
+        """
+        fps = positive("fps", fps)
+        length_s = math.inf if seconds is None else duration("seconds", seconds)
+        return self._frame_times(fps, length_s)
+
+    def _frame_times(self, fps: float, length_s: float) -> Iterator[float]:
+        with self._turn() as operations:
+            operations.queue.restart_playback()
+        began_s, number = self._clock(), 0
+        while number / fps < length_s:
+            self.wait_until(began_s + number / fps)
+            yield number / fps
+            number = max(number + 1, math.floor((self._clock() - began_s) * fps))
+        self.wait_until(began_s + length_s)
 
     def clear(self) -> Receipt:
         """Make the display dark."""
@@ -316,90 +379,3 @@ class Display:
         if differs := describe_difference(frame.array(), page):
             raise DesyncError(f"what was read back is not the frame: {differs}")
         return page
-
-    # -- turns, and the end
-
-    @contextlib.contextmanager
-    def _turn(self) -> Iterator[DisplayOperations]:
-        """Have the display to oneself, as long as it is open and this process's."""
-        if self._connection.is_inherited:
-            raise LocalProtocolError(
-                "this display was opened by the process that this one was forked from",
-                hint="open it in the process that uses it, and use it in no other",
-            )
-        with self._lock:
-            if self._connection.closed:
-                raise LocalProtocolError("the display is closed")
-            yield self._operations
-
-    def close(
-        self, *, blank: bool = False, flush: bool = True, flush_timeout_s: float = FLUSH_TIMEOUT_S
-    ) -> None:
-        """Close the port. Twice is fine.
-
-        The last frame from ``present(wait=False)`` is shown first. If that fails or takes too long,
-        the port is closed all the same, and `vd.open`'s ``note`` is called, or a `RuntimeWarning`
-        is given. A call of another thread may finish within the same time; then it raises
-        `LocalProtocolError`. In a forked process, this only closes what that has inherited.
-
-        Parameters
-        ----------
-        blank : bool
-            Make the display dark first, at once; frames that are not displayed yet are dropped.
-            Otherwise the display keeps its last whole picture.
-        flush : bool
-            False drops frames that are not displayed yet, and ends calls of other threads at once.
-        flush_timeout_s : float
-            How long to wait for the last frame, and for other threads.
-
-        Raises
-        ------
-        TransportError, DeviceError
-            If the display could not be made dark. The port is closed all the same.
-
-        """
-        if self._connection.is_inherited:
-            self._connection.close()
-            return
-        blank = flag("blank", blank)
-        flush = flag("flush", flush) and not blank
-        flush_timeout_s = duration("flush_timeout_s", flush_timeout_s)
-        if not self._lock.acquire(flush_timeout_s if flush else 0.0):
-            self._connection.cancel()
-            self._lock.acquire()
-        try:
-            if self._connection.closed:
-                return
-            if blank:
-                self._operations.blank(_BLANK_TIMEOUT_S)
-            elif flush:
-                self._flush_last(flush_timeout_s)
-        finally:
-            self._connection.close()
-            self._lock.release()
-
-    def _flush_last(self, timeout_s: float) -> None:
-        """Show the last frame that nobody waits for; report if that fails."""
-        try:
-            if self._operations.flush_unwaited(timeout_s):
-                return
-            reason = f"that took longer than {timeout_s:g} s"
-        except VoxDisplayError as error:
-            reason = str(error)
-        text = f"the last frame was not shown before {self.port} was closed: {reason}"
-        if self._note is not None:
-            self._note(text)
-        else:
-            warnings.warn(text, RuntimeWarning, stacklevel=4)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        # A generator that is closed, and sys.exit, end a program as it is meant to end.
-        self.close(flush=error is None or isinstance(error, GeneratorExit | SystemExit))

@@ -6,13 +6,14 @@ them: neither threads nor closing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
-from voxdisplay.display.connection import Clock, Connection, Reconnected
+from voxdisplay.display.connection import MAX_WAIT_S, Clock, Connection, Reconnected
 from voxdisplay.display.device_info import device_error
 from voxdisplay.display.frame_queue import FrameQueue
 from voxdisplay.display.receipt import (
@@ -21,7 +22,7 @@ from voxdisplay.display.receipt import (
     describe_difference,
     describe_wrong_digest,
 )
-from voxdisplay.errors import DesyncError, IncompatibleDevice
+from voxdisplay.errors import DesyncError, IncompatibleDevice, TransportTimeout
 from voxdisplay.frame import Frame
 from voxdisplay.link import (
     Event,
@@ -71,14 +72,20 @@ class DisplayOperations:
 
     # -- waiting
 
-    def pump(self, *, wait: bool = True) -> None:
+    def pump(self, *, wait: bool = True, within_s: float = MAX_WAIT_S) -> None:
         """Encode a portion, write, read, and handle what came.
 
         It waits for nothing while a frame is being encoded.
         """
         self.queue.encode()
-        self._connection.pump(wait=wait and not self.queue.encoding)
+        self._connection.pump(wait=wait and not self.queue.encoding, within_s=within_s)
         self._handle_events()
+
+    def send_encoded(self) -> None:
+        """Pump without waiting until frames are encoded whose turn it is, and sent if they may."""
+        self.pump(wait=False)  # ACKs that have come meanwhile may let the next frame begin
+        while self.queue.has_work or self._connection.link.has_more:
+            self.pump(wait=False)
 
     def _handle_events(self) -> None:
         for event in self._connection.events():
@@ -87,7 +94,7 @@ class DisplayOperations:
     def _handle(self, event: Event | Reconnected) -> None:
         match event:
             case FrameShown(ticket, digest):
-                self.queue.note_shown(ticket, digest)
+                self.queue.note_shown(ticket, digest, self._clock())
             case Reconnected():
                 self.queue.note_reconnect()
             case StatusReceived():
@@ -98,10 +105,23 @@ class DisplayOperations:
                 self.queue.note_refusal()
                 raise device_error(error)
 
-    def flush(self) -> None:
-        """Wait until no frame is queued."""
+    def flush(self, timeout_s: float = math.inf) -> None:
+        """Wait until no frame is queued.
+
+        Raises
+        ------
+        TransportTimeout
+            If that takes longer than ``timeout_s``.
+
+        """
+        deadline_s = self._clock() + timeout_s
         while self.queue.busy:
-            self.pump()
+            if (left_s := deadline_s - self._clock()) <= 0:
+                raise TransportTimeout(
+                    f"the last frame was not shown within {timeout_s:g} s",
+                    hint="it is still on its way: call flush again, or allow more time",
+                )
+            self.pump(within_s=min(left_s, MAX_WAIT_S))
 
     def flush_unwaited(self, timeout_s: float) -> bool:
         """Wait until no frame is queued that nobody waits for; return whether that was in time."""
@@ -120,12 +140,13 @@ class DisplayOperations:
         before = replace(self._counters)
         frame = frame.copy()
         ticket = self.queue.enqueue(frame)
+        self.queue.playback.note_presented()
         digest = self.wait_until_shown(ticket, progress)
         repaired = None
         if digest is not None and digest != frame.digest():
             ticket, repaired = self._repair(frame, digest)
             digest = frame.digest()
-        self.queue.confirm(frame, ticket, digest)
+        self.queue.confirm(frame, ticket, digest, self._clock())
         counters = self._counters
         return Receipt(
             frame=self.queue.frames,

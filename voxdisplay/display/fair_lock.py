@@ -47,6 +47,11 @@ class FairLock:
         finally:
             self._next.release()
 
+    @property
+    def is_reentered(self) -> bool:
+        """True if the calling thread holds it more than once, as a signal handler may."""
+        return self._owner == threading.get_ident() and self._depth > 1
+
     def release(self) -> None:
         """Release the lock, once for each `acquire`."""
         self._depth -= 1

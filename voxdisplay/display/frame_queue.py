@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 from voxdisplay.display.connection import Connection
+from voxdisplay.display.playback import PlaybackMeter
 from voxdisplay.display.receipt import WRONG_TWICE_HINT, describe_wrong_digest
 from voxdisplay.errors import DesyncError
 from voxdisplay.frame import Frame
@@ -37,11 +38,14 @@ class FrameQueue:
     ----------
     frames : int
         Number of frames that have been displayed.
+    playback : PlaybackMeter
+        Counts what is presented, shown and dropped.
 
     """
 
     def __init__(self, connection: Connection) -> None:
         self.frames = 0
+        self.playback = PlaybackMeter()
         self._connection = connection
         self._link = connection.link
         self._last: Frame | None = None  # that was displayed
@@ -77,7 +81,17 @@ class FrameQueue:
 
     def replace_pending(self, frame: Frame) -> None:
         """Have a copy of a frame started when the line needs one, unless a newer one follows."""
-        self._pending = frame.copy()
+        copy = frame.copy()
+        if self._pending is not None and self._pending is not self._last:
+            self.playback.note_dropped()
+        self._pending = copy
+        self.playback.note_presented()
+
+    def restart_playback(self) -> None:
+        """Count anew, from the frames that are still on their way."""
+        handed_over = [self._pending, *self._unwaited.values()]
+        waiting = sum(frame is not None and frame is not self._last for frame in handed_over)
+        self.playback = PlaybackMeter(waiting)
 
     def payloads(self, frame: Frame) -> list[bytes]:
         """Return a frame encoded for this device and its line."""
@@ -107,6 +121,11 @@ class FrameQueue:
     def encoding(self) -> bool:
         """True if a frame is being encoded."""
         return self._encoder is not None
+
+    @property
+    def has_work(self) -> bool:
+        """True if `encode` would encode something."""
+        return self.encoding or (self._pending is not None and self._may_start)
 
     def encode(self) -> None:
         """Encode a portion of a frame; start the pending one if the line needs it."""
@@ -147,10 +166,11 @@ class FrameQueue:
         """Record that it is unknown what is displayed."""
         self._displayed = None
 
-    def confirm(self, frame: Frame, ticket: int, digest: int | None) -> None:
+    def confirm(self, frame: Frame, ticket: int, digest: int | None, now: float) -> None:
         """Record that a frame that was waited for is displayed; without digest, unproved."""
         self._last = frame
         self.frames += 1
+        self.playback.note_shown(1, now)
         self._set_shown(frame, ticket, digest)
 
     def _set_shown(self, frame: Frame, ticket: int, digest: int | None) -> None:
@@ -167,7 +187,7 @@ class FrameQueue:
         """Return the digest that the device reported for a frame, once."""
         return self._shown.pop(ticket)
 
-    def note_shown(self, ticket: int, digest: int | None) -> None:
+    def note_shown(self, ticket: int, digest: int | None, now: float) -> None:
         """Record that the device displays a frame.
 
         Raises
@@ -177,22 +197,28 @@ class FrameQueue:
 
         """
         if ticket in self._unwaited:
-            self._note_unwaited_shown(ticket, digest)
+            self._note_unwaited_shown(ticket, digest, now)
         else:
             self._shown[ticket] = digest
 
-    def _note_unwaited_shown(self, ticket: int, digest: int | None) -> None:
+    def _note_unwaited_shown(self, ticket: int, digest: int | None, now: float) -> None:
         """Record that an unwaited frame is displayed, and all before it are finished."""
         frame = self._unwaited[ticket]
         again = frame is self._last  # after a reconnect, or because it was displayed wrongly
+        # A device begins no frame before it displays the one before: their ACKs were lost.
+        overtaken = sum(
+            earlier < ticket and f is not self._last for earlier, f in self._unwaited.items()
+        )
         self._last, self._displayed = frame, None
         self._unwaited = {later: f for later, f in self._unwaited.items() if later > ticket}
         self.frames += not again
+        self.playback.note_shown(overtaken + (not again), now)
         if digest is None or digest == (expected := frame.digest()):
             self._wrong_in_a_row = 0
             self._set_shown(frame, ticket, digest)
             return
         self._wrong_in_a_row += 1
+        self.playback.note_wrong()
         if self._wrong_in_a_row > 1:
             raise DesyncError(describe_wrong_digest(digest, expected), hint=WRONG_TWICE_HINT)
         if not self.busy:  # otherwise the next frame repairs it
@@ -209,6 +235,9 @@ class FrameQueue:
     def note_refusal(self) -> None:
         """Record that the device refused a packet, and that the link has dropped all frames."""
         self._encoder = None
+        self.playback.note_dropped(
+            sum(frame is not self._last for frame in self._unwaited.values())
+        )
         self._unwaited.clear()
 
 

@@ -86,5 +86,7 @@ def closed_before_info(error: TransportClosed, link: Link) -> TransportClosed:
 
 
 def closed_meanwhile() -> LocalProtocolError:
-    """Return the error for an operation during which another thread has closed the display."""
-    return LocalProtocolError("the display was closed by another thread in the meantime")
+    """Return the error for an operation during which the display was closed elsewhere."""
+    return LocalProtocolError(
+        "the display was closed by another thread or a signal handler in the meantime"
+    )

@@ -109,6 +109,11 @@ class Link:
         return self.delivery_rate.drains_early(self._frames.unsent_bytes)
 
     @property
+    def has_more(self) -> bool:
+        """True if the last burst ended at its size, so that another may follow at once."""
+        return self.ready and self._sender.has_more
+
+    @property
     def payload_count(self) -> int:
         """Number of payloads of all frames in the backlog, as far as they are encoded."""
         return self._frames.payload_count

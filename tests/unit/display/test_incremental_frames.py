@@ -54,6 +54,7 @@ def test_any_frame_that_differs_little_goes_as_its_difference():
     for wait in (True, False):
         display.present(random_frame(display, 1 + wait), wait=wait)
         assert flags.pop() & spec.DATA_FLAG_CLEAR
+    display.flush()
 
 
 def test_without_waiting_too():
