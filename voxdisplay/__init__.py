@@ -45,6 +45,8 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     Cylinder            Cylinder with its ends.
     Cone                Cone with its base.
     HeightField         Surface z = f(x, y).
+    Volume              Samples of real numbers, shown by a colour map.
+    VoxelModel          Voxels with colours of their own.
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -94,6 +96,8 @@ if TYPE_CHECKING:
         Plane,
         Sphere,
         SphericalTriangle,
+        Volume,
+        VoxelModel,
     )
     from voxdisplay.curves import (
         Arc,
@@ -190,7 +194,9 @@ if TYPE_CHECKING:
         "TransportClosed",
         "TransportError",
         "TransportTimeout",
+        "Volume",
         "VoxDisplayError",
+        "VoxelModel",
         "VoxelSet",
         "load_scene",
         "open",
@@ -214,6 +220,8 @@ _MODULES = {
         "Plane",
         "Sphere",
         "SphericalTriangle",
+        "Volume",
+        "VoxelModel",
     ],
     "voxdisplay.curves": [
         "Arc",

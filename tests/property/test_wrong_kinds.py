@@ -119,6 +119,10 @@ CALLS = {
     "TransportClosed": {"message": "what", "hint": "do"},
     "TransportError": {"message": "what", "hint": "do"},
     "TransportTimeout": {"message": "what", "hint": "do"},
+    "Volume": {"array": np.ones((3, 5, 7)), "window": (0, 1), "threshold": 0.5, "map": "magma",
+               "spacing": (1, 1, 2), "offset": (1, 2, 3), "labels": False},
+    "VoxelModel": {"voxels": [(1, 2, 3), (4, 5, 6)], "colors": [(1, 2, 3), (4, 5, 6)],
+                   "offset": (1, 2, 3)},
     "VoxDisplayError": {"message": "what", "hint": "do"},
 }  # fmt: skip
 # Made by the package, plain records, an enumeration, or abstract: users do not call them.

@@ -12,6 +12,7 @@ from voxdisplay.bodies.primitives import (
     Sphere,
     SphericalTriangle,
 )
+from voxdisplay.bodies.volume import Volume, VoxelModel
 
 __all__ = [
     "Body",
@@ -26,4 +27,6 @@ __all__ = [
     "Sphere",
     "SphericalTriangle",
     "TransformedBody",
+    "Volume",
+    "VoxelModel",
 ]

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 # Voxels that are computed at once, so that a display of any size takes bounded memory.
 _BLOCK = 1 << 22
 _MAX_COORDINATE = 1 << 24
+_EVEN = 1e-9  # a scale this near to 1 is 1
 
 
 class AffineSamples(Body):
@@ -294,7 +295,8 @@ class VoxelModel(AffineSamples):
         axes = self._axes()
         sizes = np.linalg.norm(self.matrix, axis=0)
         found, rows = [], []
-        if axes is None or not (sizes >= 1).all():
+        enlarged = bool((sizes > 1 + _EVEN).any())
+        if axes is None or not enlarged or (sizes < 1 - _EVEN).any():
             # Each voxel lights that which holds its centre; of several, the nearest comes last.
             centers = (self.voxels + 0.5) @ self.matrix.T + self.offset
             held = np.floor(centers)
@@ -303,7 +305,7 @@ class VoxelModel(AffineSamples):
             order = np.argsort(-distance[inside], kind="stable")
             rows.append(np.flatnonzero(inside)[order])
             found.append(held[rows[-1]].astype(np.int64))
-        if axes is None or not (sizes <= 1).all():
+        if axes is None or enlarged:
             # Each voxel whose centre is in a box of the model.
             lookup = _Lookup(self.voxels)
             for low, high in self._slabs(bounds):

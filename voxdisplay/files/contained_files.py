@@ -44,15 +44,13 @@ def read_inside(folder: Path, name: str, most: int = MAX_BYTES) -> bytes:
 
 
 def path_inside(folder: Path, name: str) -> Path:
-    """Return the path of an existing file in a folder or below it; raise `BodyError` otherwise."""
+    """Return the path of a file in a folder or below it; raise `BodyError` otherwise."""
     parts = PureWindowsPath(name)  # knows / and \ and drives, on any system
     if parts.is_absolute() or parts.anchor or ".." in parts.parts or "\0" in name:
         raise BodyError(f"{short_name(name)} is outside the folder {short_name(folder)}")
     try:
         root = folder.resolve()
-        path = (root / name).resolve(strict=True)
-    except FileNotFoundError:
-        raise _missing(folder / name) from None
+        path = (root / name).resolve()
     except (OSError, RuntimeError) as error:  # of links in a loop
         raise _unreadable(name, error) from None
     if not path.is_relative_to(root):
@@ -74,16 +72,17 @@ def read_file(path: Path, most: int = MAX_BYTES) -> bytes:
     try:
         handle = os.open(path, flags)
         with os.fdopen(handle, "rb") as file:
-            if not stat.S_ISREG(os.fstat(handle).st_mode):
+            status = os.fstat(handle)
+            if not stat.S_ISREG(status.st_mode):
                 raise BodyError(f"{short_name(path)} is not a regular file")
-            data = file.read(most + 1)
+            data = file.read(most + 1) if status.st_size <= most else b""
     except FileNotFoundError:
         raise _missing(path) from None
     except IsADirectoryError:
         raise BodyError(f"{short_name(path)} is a folder") from None
     except (OSError, ValueError, MemoryError) as error:
         raise _unreadable(path, error) from None
-    if len(data) > most:
+    if max(len(data), status.st_size) > most:
         raise BodyError(f"{short_name(path)} is larger than {most >> 20} MiB")
     return data
 
