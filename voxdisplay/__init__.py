@@ -47,6 +47,7 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     HeightField         Surface z = f(x, y).
     Volume              Samples of real numbers, shown by a colour map.
     VoxelModel          Voxels with colours of their own.
+    Implicit            Surface or solid by f(x, y, z).
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
         Disc,
         Ellipsoid,
         HeightField,
+        Implicit,
         Mesh,
         Plane,
         Sphere,
@@ -169,6 +171,7 @@ if TYPE_CHECKING:
         "Grid",
         "HeightField",
         "Helix",
+        "Implicit",
         "IncompatibleDevice",
         "Lissajous",
         "LocalProtocolError",
@@ -216,6 +219,7 @@ _MODULES = {
         "Disc",
         "Ellipsoid",
         "HeightField",
+        "Implicit",
         "Mesh",
         "Plane",
         "Sphere",

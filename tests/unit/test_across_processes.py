@@ -30,6 +30,9 @@ CURVES = {
     "TorusKnot": vd.TorusKnot(2, 3, (5, 5, 5), 3, 1),
 }
 BODIES = {
+    "Implicit": vd.Implicit(
+        "hypot(x - 5, y - 5, z - r) - 3", box=[(1, 1, 1), (9, 9, 9)], params={"r": 4}
+    ),
     "HeightField": vd.HeightField("3 + sin(x)*k", x=(1, 6), y=(2, 5), params={"k": 2}),
     "Cone": vd.Cone((2, 2, 2), (5, 6, 7), 2),
     "Cylinder": vd.Cylinder((2, 2, 2), (5, 6, 7), 2),

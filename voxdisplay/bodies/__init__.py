@@ -2,6 +2,7 @@
 
 from voxdisplay.bodies.body import Body, TransformedBody
 from voxdisplay.bodies.height_field import HeightField
+from voxdisplay.bodies.implicit import Implicit
 from voxdisplay.bodies.mesh import Box, Mesh
 from voxdisplay.bodies.primitives import (
     Cone,
@@ -22,6 +23,7 @@ __all__ = [
     "Disc",
     "Ellipsoid",
     "HeightField",
+    "Implicit",
     "Mesh",
     "Plane",
     "Sphere",

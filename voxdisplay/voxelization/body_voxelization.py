@@ -11,6 +11,7 @@ import numpy as np
 
 from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
 from voxdisplay.bodies.height_field import HeightFunction
+from voxdisplay.bodies.implicit import ImplicitFunction
 from voxdisplay.bodies.quadrics import QuadricPatches
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -37,6 +38,7 @@ _VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
     TriangleMesh: ("mesh", "voxelize_mesh"),
     LitVoxels: ("lit_voxels", "voxelize_lit"),
     QuadricPatches: ("quadrics", "voxelize_quadrics"),
+    ImplicitFunction: ("implicit", "voxelize_implicit"),
     HeightFunction: ("height_field", "voxelize_heights"),
 }
 

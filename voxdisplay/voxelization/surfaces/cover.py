@@ -93,13 +93,14 @@ def _light(
     for step in np.ndindex(*(1 + spread.astype(int))):
         corner = base + step
         known = box.inside(corner)
-        lit[known] |= _contains(index, box.index_of(corner[known]))
+        lit[known] |= contains(index, box.index_of(corner[known]))
     voxels = np.floor(points[~lit]).astype(np.int64)
     needed = box.index_of(voxels[~inside(voxels.astype(np.float64) + 0.5)])
     return distinct([index, needed]) if needed.size else index
 
 
-def _contains(index: Ints, at: Ints) -> Bools:
+def contains(index: Ints, at: Ints) -> Bools:
+    """Return which numbers, (m,), are among ascending ones, (n,): (m,) bool."""
     if not index.size:
         return np.zeros(at.size, dtype=bool)
     place = np.searchsorted(index, at)
