@@ -230,8 +230,11 @@ class Page:
         """Add the blocks of all collected writes to those that have changed."""
         for indices in self._writes:
             if isinstance(indices, range):
-                blocks = range(indices[0] >> BLOCK_BITS, (indices[-1] >> BLOCK_BITS) + 1)
-                self._changed_blocks.update(blocks)
+                first, last = indices[0] >> BLOCK_BITS, indices[-1] >> BLOCK_BITS
+                if first == last:
+                    self._changed_blocks.add(first)
+                else:
+                    self._changed_blocks.update(range(first, last + 1))
             else:
                 self._changed_blocks.update([index >> BLOCK_BITS for index in indices])
         self._clear_writes()

@@ -82,26 +82,36 @@ class _PixelReader:
         size = self._size
         return self._window[(self.at - self._start) * size : (stop - self._start) * size]
 
-    def stretch(self) -> int:
-        """Return the number of equal pixels from the cursor on."""
-        size = self._size
-        pixel = self.peek(1)
-        dark = not any(pixel)
-        pattern = _DARK if dark else _SAME[size]
-        begin = at = self.at
-        while True:
-            match = pattern.match(self._window, (at - self._start) * size)
-            # The zeros at the end of a dark stretch may belong to the next pixel.
-            at = self._start + (match.end() // size if match else 0)
-            if at < self._stop or at == self.end:
-                return at - begin
-            if dark:
-                at = self._stored.next_stored(at, self.end)
-                if at == self.end:
-                    return at - begin
+    def stretch(self) -> tuple[bytes, bool, int]:
+        """Return the next pixel, whether it is dark, and the number of equal ones from it on."""
+        at, size = self.at, self._size
+        if at == self._stop:
             self._load(at, self.end)
-            if self._window[:size] != pixel:
-                return at - begin
+        offset = (at - self._start) * size
+        pixel = self._window[offset : offset + size]
+        lit = any(pixel)
+        pattern = _SAME[size] if lit else _DARK
+        match = pattern.match(self._window, offset)
+        # The zeros at the end of a dark stretch may belong to the next pixel.
+        count = (match.end() - offset) // size if match else 0
+        if at + count == self._stop < self.end:
+            count = self._extend(pixel, pattern) - at
+        return pixel, not lit, count
+
+    def _extend(self, pixel: bytes, pattern: re.Pattern[bytes]) -> int:
+        """Return where a stretch ends that goes on to the end of the window."""
+        stop = self._stop
+        while stop == self._stop < self.end:
+            if pattern is _DARK:
+                stop = self._stored.next_stored(stop, self.end)
+                if stop == self.end:
+                    break
+            self._load(stop, self.end)
+            if self._window[: self._size] != pixel:
+                break
+            match = pattern.match(self._window)
+            stop = self._start + (match.end() if match else 0) // self._size
+        return stop
 
 
 class _OpWriter:
@@ -132,9 +142,7 @@ class _OpWriter:
         if self._mono and _prefers_literal(chunk := pixels.peek(_CHUNK)):
             self._extend_literal(chunk)
             return len(chunk)
-        pixel = pixels.peek(1)
-        dark = not any(pixel)
-        count = pixels.stretch()
+        pixel, dark, count = pixels.stretch()
         if self._literal and count <= self._cheap:
             self._extend_literal(pixel * count)
         elif dark:

@@ -222,10 +222,10 @@ class SparsePixels:  # noqa: PLW1641 - not hashable: its pixels change
         begin, end = start * size, start * size + len(pixels)
         first = start >> BLOCK_BITS
         last = (end - 1) // size >> BLOCK_BITS
-        offsets = [table[block] for block in range(first, last + 1)]
+        offset = table[first]
+        offsets = [table[block] for block in range(first, last + 1)] if last > first else []
         pool = table.pool
-        offset = offsets[0]
-        if offsets.count(offset) == len(offsets):  # they follow each other in the pool, too
+        if offsets.count(offset) == len(offsets):  # in one piece in the pool, too
             place = slice(offset + begin, offset + end)
             old = pool[place]
             pool[place] = pixels
