@@ -151,20 +151,68 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
     )
 
 
+SETS = ("box", "oct", "dots", "line")
+
+
+def size_of(frame, features=SETS, bytes_per_s=0.0):
+    """Bytes of all payloads of a frame."""
+    return sum(map(len, chain.from_iterable(frame.iter_payloads(1024, features, bytes_per_s))))
+
+
 def test_a_curve_on_a_fast_line_goes_as_its_chain():
-    """Also a solid in the order of its voxels: what is drawn as a set is sent as one."""
+    """Also those that fill a solid: nobody waits for a search of a shorter encoding."""
     frame = Frame(GRIDS[0], "mono1")
-    frame.draw(np.argwhere(np.ones((9, 9, 9))), "white")
+    for y, z in np.argwhere(np.ones((9, 9))) + 0.5:
+        frame.draw(vd.Segment((0.5, y, z), (8.5, y, z)))
+    assert len(frame.lit()[0]) == 729
     features = ("box", "oct", "dots")
-    sizes = [
-        sum(
-            len(payload)
-            for portion in frame.iter_payloads(1024, features, rate)
-            for payload in portion
-        )
-        for rate in (0.0, 1.2e6)
-    ]
-    assert sizes[0] < 20 < sizes[1]
+    assert size_of(frame, features) < 20 < size_of(frame, features, 1.2e6)
+
+
+@pytest.mark.parametrize("rate", [0.0, 24_000.0, 0.3e6, 1.2e6, 1e9])
+@pytest.mark.parametrize("order", ["scan", "shuffled", "sampled", "colours"])
+def test_an_array_of_a_surface_is_a_set_on_every_line(order, rate):
+    place = np.argwhere(np.ones((40, 40, 40)))[:, ::-1]
+    distance = np.linalg.norm(place - 19.5, axis=1)
+    shell = place[np.abs(distance - 15) < 0.6]
+    rng = np.random.default_rng(3)
+    if order == "shuffled":
+        shell = rng.permutation(shell)
+    elif order == "sampled":
+        shell = shell[np.lexsort(np.arctan2(*(shell[:, :2] - 19.5).T).round(1)[None])]
+    colors = rng.choice(["red", "lime"], len(shell)).tolist() if order == "colours" else "red"
+    as_array, as_set = Frame((40, 40, 40), "rgb565"), Frame((40, 40, 40), "rgb565")
+    as_array.draw(shell, colors)
+    as_set.set(as_array.array())
+    with pytest.MonkeyPatch.context() as patch:
+        # The set is so much shorter that range coding need not be tried.
+        patch.delattr(encoding_selection.range_coded_chains, "encode_range_coded")
+        size = size_of(as_array, (*SETS, "arc"), rate)
+    assert size == size_of(as_set, SETS, rate)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.3e6, 1.2e6, 1e9])
+def test_an_array_that_follows_a_curve_is_a_chain_on_every_line(rate):
+    drawn = vd.voxelize(vd.TorusKnot(3, 5, (64, 64, 64), 36, 18))
+    by_curve, by_array = Frame((128,) * 3, "mono1"), Frame((128,) * 3, "mono1")
+    by_curve.draw(drawn)
+    by_array.draw(drawn.voxels)
+    assert size_of(by_array, SETS, rate) == size_of(by_curve, SETS, rate)
+
+
+def test_a_set_and_an_array_of_it_that_share_voxels_send_them_once():
+    solid = np.argwhere(np.ones((20, 20, 20)))
+    frame = Frame((40, 33, 50), "mono1")
+    frame.draw(vd.Segment((0.5, 5.5, 5.5), (30.5, 5.5, 5.5)))
+    frame.draw(solid)
+    frame._add_set(solid + 3, np.full((1, 3), 255, dtype=np.uint8))
+    for rate in (0.0, 1e9):
+        frame.device = (frame.grid, frame.format, 1024, set(SETS))
+        assert_draws(list(chain.from_iterable(frame.iter_payloads(1024, SETS, rate))), frame)
+
+
+def test_isolated_voxels_are_no_chain_on_any_line():
+    features = ("box", "oct", "dots")
     dots = Frame(GRIDS[0], "mono1")
     dots.draw(np.argwhere(np.ones((4, 4, 4))) * 3, "white")
     portions = dots.iter_payloads(1024, features, 1.2e6)

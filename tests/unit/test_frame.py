@@ -178,7 +178,7 @@ def test_the_default_colour_is_white():
 )  # fmt: skip
 def test_draw_names_what_it_takes(what):
     with pytest.raises(
-        TypeError, match=r"drawable: expected a curve, a sequence, an .* or a scene, found"
+        TypeError, match=r"drawable: expected a curve, a body, a sequence, an .* or a scene, found"
     ):
         Frame((3, 5, 7)).draw(what)
 

@@ -10,20 +10,21 @@ encoded in independent slabs, so that the first can be sent at once. Must not kn
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.display_list import DrawnVoxels
+from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.pixel_format import Pixels
-from voxdisplay.wire import spans, spec, voxel_sets
+from voxdisplay.raster.pixel_map import contains
+from voxdisplay.wire import range_coded_chains, spans, spec, voxel_sets
+from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
 from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout, concatenate_blocks, no_blocks
-from voxdisplay.wire.range_coded_chains import encode_range_coded
 from voxdisplay.wire.raw_pixels import encode_raw, is_incompressible
 
 # With more colours, voxels that mostly differ from the next in their row make no bricks.
@@ -39,6 +40,10 @@ _SLABS_FROM = 100_000
 # Line rate, bytes/s, from which chains are sent without trying whether sets are shorter.
 _CHAINS_FROM = 800_000
 _LONE_FRACTION = 16  # unless one voxel in so many is isolated
+# Bits of a range-coded step, at least: curves were seen to take 1.1, surfaces in any order 4.
+_LEAST_STEP_BITS, _LEAST_SET_STEP_BITS = 0.5, 2.0
+# Bytes of a typical set for each byte of its lower bound.
+_TYPICAL_FACTOR = 1.5
 # Line rate, bytes/s, from which incompressible pages are sent raw rather than parsed.
 _RAW_FROM = 2_400_000
 
@@ -84,17 +89,40 @@ def encode_update(
         At most ``config.max_payload`` bytes each, none of them empty.
 
     """
+    chained = None if len(update.unordered) else update.ordered
+    update = _with_known_order(update, config)
     ordered, index = update.ordered, update.unordered
     if len(index) > _LARGE_SET and config.bytes_per_s >= _SLABS_FROM:
         for slab in _slabs(index, update.pixels_at, config):
-            yield from _encode(
-                PageUpdate(None, slab, update.pixels_at), config, first or no_blocks()
+            best = _BestLayout(config, first or no_blocks())
+            yield from _with_pauses(
+                _offer_encodings(best, PageUpdate(None, slab, update.pixels_at))
             )
+            yield best.payloads
             first = None
         if not ordered:
             return
-        index = index[:0]
-    yield from _encode(PageUpdate(ordered, index, update.pixels_at), config, first or no_blocks())
+        update = replace(update, unordered=index[:0])
+    best = _BestLayout(config, first or no_blocks())
+    yield from _with_pauses(_offer_encodings(best, update))
+    if chained and config.bytes_per_s < _CHAINS_FROM:
+        _offer_range_coded(best, chained, len(update.unordered) / max(1, len(chained)))
+    yield best.payloads
+
+
+def _with_known_order(update: PageUpdate, config: EncoderConfig) -> PageUpdate:
+    """Return an update in which arrays that are sets are unordered."""
+    ordered, index = update.ordered, update.unordered
+    if ordered is None or not len(ordered):
+        return replace(update, ordered=None)
+    are_sets = items_that_are_sets(ordered, config)
+    if not are_sets.any():
+        return update
+    rows = are_sets[ordered.item]
+    rest, sets = ordered.select(~rows), ordered.index[rows]
+    if len(rest):  # what two items drew with one value is sent once
+        sets = sets[~contains(np.sort(rest.index), sets)]
+    return PageUpdate(rest if len(rest) else None, _union(sets, index), update.pixels_at)
 
 
 def encode_raw_if_faster(
@@ -134,49 +162,69 @@ def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> 
                 yield part
 
 
-def _encode(update: PageUpdate, config: EncoderConfig, first: OpBlocks) -> Iterator[list[bytes]]:
-    best = _BestLayout(config, first)
-    ordered, pixels_at = update.ordered, update.pixels_at
-    if ordered is None or not len(ordered):
+def _offer_encodings(best: _BestLayout, update: PageUpdate) -> Incremental[None]:
+    """Offer each encoding of an update but range coding, incrementally."""
+    config, ordered, pixels_at = best.config, update.ordered, update.pixels_at
+    if ordered is None:
         if len(update.unordered):
-            yield from _with_pauses(
-                _offer_set_encodings(best, no_blocks(), update.unordered, pixels_at)
-            )
-        yield best.payloads
+            yield from _offer_set_encodings(best, no_blocks(), update.unordered, pixels_at)
         return
-    # A repeated voxel would end a chain.
-    ordered = ordered.select(np.concatenate(([True], ordered.index[1:] != ordered.index[:-1])))
+    ordered = _without_repeats(ordered)
     voxels = config.grid.voxels_at(ordered.index)
     chains = build_chains(voxels, ordered.values, config, ordered.corners, ordered.index)
-    yield []
+    yield
     if not len(update.unordered):
         best.offer(chains.blocks)
         if (ordered.values != ordered.values[0]).any():
             best.offer(_sorted_by_pen(chains.blocks))
-    lone = int(np.count_nonzero(chains.count == 0))
-    if (
-        config.bytes_per_s >= _CHAINS_FROM
-        and _LONE_FRACTION * lone < len(ordered)
-        and not len(update.unordered)
-    ):
-        yield best.payloads
-        return
-    yield []
-    as_set = _cheaper_as_set(chains, ordered, pixels_at, config)
+        if config.bytes_per_s >= _CHAINS_FROM and _are_curves(ordered, chains):
+            return
+    yield
+    as_set, tried = _cheaper_as_set(chains, ordered, pixels_at, config)
     if as_set.any() or len(update.unordered):
         index = _union(ordered.index[_voxel_rows(chains, as_set)], update.unordered)
         kept = _sorted_by_pen(chains.blocks.take(np.flatnonzero(~as_set)))
-        yield from _with_pauses(_offer_set_encodings(best, kept, index, pixels_at))
-        yield []
+        yield from _offer_set_encodings(best, kept, index, pixels_at, tried)
+        yield
     if config.bytes_per_s >= _CHAINS_FROM:
-        yield best.payloads
         return
     index = _union(ordered.index, update.unordered)
     if spans.min_bytes(index, config) < best.total_bytes:
         best.offer(run_to_end(spans.encode_span_set(index, pixels_at(index), pixels_at, config)))
-    if config.has(spec.FEATURE_ARC) and not len(update.unordered):
-        best.offer_payloads(encode_range_coded(voxels, ordered.values, config))
-    yield best.payloads
+
+
+def _offer_range_coded(best: _BestLayout, drawn: DrawnVoxels, sets: float) -> None:
+    """Offer range-coded chains if the device has them and they may win.
+
+    Parameters
+    ----------
+    best : _BestLayout
+    drawn : DrawnVoxels
+        All that is to be drawn.
+    sets : float
+        Share of the voxels that belong to arrays which are sets.
+
+    """
+    config = best.config
+    if not config.has(spec.FEATURE_ARC) or not len(drawn):
+        return
+    drawn = _without_repeats(drawn)
+    voxels = config.grid.voxels_at(drawn.index)
+    step_bits = _LEAST_STEP_BITS * (1 - sets) + _LEAST_SET_STEP_BITS * sets
+    least = range_coded_chains.least_bytes(voxels, drawn.values, step_bits, config)
+    if least < best.total_bytes:
+        best.offer_payloads(range_coded_chains.encode_range_coded(voxels, drawn.values, config))
+
+
+def _without_repeats(ordered: DrawnVoxels) -> DrawnVoxels:
+    """Return voxels without those that repeat the one before: they would end a chain."""
+    return ordered.select(np.append(True, ordered.index[1:] != ordered.index[:-1]))
+
+
+def _are_curves(ordered: DrawnVoxels, chains: Chains) -> bool:
+    """Return whether all items follow curves, and few of their voxels are isolated."""
+    lone = int(np.count_nonzero(chains.count == 0))
+    return _LONE_FRACTION * lone < len(ordered) and not (ordered.kinds == Kind.ARRAY).any()
 
 
 def _with_pauses(steps: Incremental[None]) -> Iterator[list[bytes]]:
@@ -243,42 +291,61 @@ def _voxel_rows(chains: Chains, which: Bools) -> Ints:
     return concat_ranges(chains.begin[which], chains.count[which] + 1)
 
 
+@dataclass(frozen=True)
+class _TriedSet:
+    """A set of voxels, by scan-order indices, that was encoded for comparison."""
+
+    index: Ints
+    encoded: voxel_sets.EncodedSet
+
+
 def _cheaper_as_set(
     chains: Chains, ordered: DrawnVoxels, pixels_at: spans.PixelLookup, config: EncoderConfig
-) -> Bools:
-    """Return which segments are cheaper as a set of their voxels: (segments,).
+) -> tuple[Bools, _TriedSet | None]:
+    """Return which segments are cheaper as a set of their voxels, (segments,), and what was tried.
 
     Those of an item are if a lower bound admits it and all such segments of their pen together take
-    fewer bytes as a set. A lone voxel always is.
+    fewer bytes as a set. A lone voxel always is. For a fast line, curves are not tried.
     """
     blocks = chains.blocks
     as_set: Bools = chains.count == 0
-    if not voxel_sets.has_set_ops(config) or config.bytes_per_s >= _CHAINS_FROM:
-        return as_set
+    tried = np.ones(len(ordered.kinds), dtype=np.bool_)
+    if config.bytes_per_s >= _CHAINS_FROM:
+        tried = ordered.kinds == Kind.ARRAY
+    if not voxel_sets.has_set_ops(config) or not tried.any():
+        return as_set, None
     goes = np.concatenate(([True], blocks.cursor[1:] != blocks.cursor_after[:-1]))
     cost = blocks.size + goes * (config.position_bytes + ~blocks.starts_with_step)
     item = ordered.item[chains.begin]
     items = len(ordered.kinds)  # a segment may go on into the next item, where none begins
     as_chain = np.bincount(item, weights=cost, minlength=items)
     least = voxel_sets.min_bytes(ordered.index, ordered.item, items, config)
-    maybe = (least < as_chain)[item]
+    factor = _TYPICAL_FACTOR if config.bytes_per_s >= _CHAINS_FROM else 1
+    maybe = (tried & (factor * least < as_chain))[item]
     if not maybe.any():
-        return as_set
+        return as_set, None
     voxels = _union(ordered.index[_voxel_rows(chains, maybe)], ordered.index[:0])
     encoded = voxel_sets.encode_set(voxels, pixels_at(voxels), config)
     rank = np.searchsorted(encoded.values, blocks.pen[maybe])
     as_chains = np.bincount(rank, weights=cost[maybe], minlength=len(encoded.values))
     as_set[maybe] |= (encoded.bytes_per_value < as_chains)[rank]
-    return as_set
+    return as_set, _TriedSet(voxels, encoded)
 
 
 def _offer_set_encodings(
-    best: _BestLayout, kept: OpBlocks, index: Ints, pixels_at: spans.PixelLookup
+    best: _BestLayout,
+    kept: OpBlocks,
+    index: Ints,
+    pixels_at: spans.PixelLookup,
+    tried: _TriedSet | None = None,
 ) -> Incremental[None]:
     """Offer blocks together with each encoding of a set of voxels, n >= 1; incrementally."""
     config, values = best.config, pixels_at(index)
     if voxel_sets.has_set_ops(config) and not _is_incompressible(index, values):
-        encoded = voxel_sets.encode_set(index, values, config)
+        if tried and np.array_equal(tried.index, index):
+            encoded = tried.encoded
+        else:
+            encoded = voxel_sets.encode_set(index, values, config)
         yield
         best.offer(kept, encoded.blocks)
         in_spans = _cheaper_as_spans(index, values, encoded, config)
