@@ -38,7 +38,8 @@ from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import OpBlocks
 
-Fit = Literal["contain", "none"]
+Fit = Literal["contain", "none", "content"]
+FITS = ("contain", "none", "content")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,19 @@ class Drawing:
     undefined: tuple[SingularPoint, ...] = ()
     jumps: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @classmethod
+    def sum(cls, drawings: Iterable[Drawing]) -> Drawing:
+        """Return the result of drawing several objects."""
+        drawings = list(drawings)
+        return cls(
+            voxels=sum(drawing.voxels for drawing in drawings),
+            clipped=sum(drawing.clipped for drawing in drawings),
+            exact_color=all(drawing.exact_color for drawing in drawings),
+            undefined=tuple(point for drawing in drawings for point in drawing.undefined),
+            jumps=tuple(t for drawing in drawings for t in drawing.jumps),
+            notes=tuple(note for drawing in drawings for note in drawing.notes),
+        )
 
 
 @runtime_checkable
@@ -174,9 +188,9 @@ class Frame:
             A colour, or several spread along the curve: see `voxdisplay.raster.color.as_colors`.
             As many as a `Points` curve has points belong to those points. White by default, or a
             body's own colours. A scene has colours of its own.
-        fit : {"contain", "none"}
-            For a scene that was composed for a grid of another size: scale and centre it, or keep
-            its numbers.
+        fit : {"contain", "none", "content"}
+            For a scene: scale and centre one that was composed for a grid of another size, keep
+            its numbers, or scale and centre what is there in it.
 
         Returns
         -------
@@ -203,19 +217,34 @@ class Frame:
         colors = as_colors("white" if color is None else color)
         if isinstance(drawable, voxelization.VoxelSet):
             own = drawable.colors if color is None else None
-            drawing = self._add_set(drawable.voxels, colors if own is None else own)
-            return replace(drawing, notes=drawable.notes)
+            return self.draw_voxels(drawable, colors if own is None else own)
         if isinstance(drawable, Curve):
             drawable = voxelization.voxelize(drawable)
         if isinstance(drawable, voxelization.Sequence):
             if len(colors) > 1 and len(colors) == drawable.curve.point_count:
                 colors = colors_at(colors, voxelization.point_indices(drawable))
-            drawing = self._add(drawable.voxels, colors, Kind.CURVE, _corner_rows(drawable))
-            return replace(drawing, undefined=drawable.undefined, jumps=drawable.jumps)
+            return self.draw_voxels(drawable, colors)
         if not is_array_like(drawable) or isinstance(drawable, Frame):
             wanted = "a curve, a body, a sequence, an (N, 3) array of voxels or a scene"
             raise wrong_kind("drawable", wanted, drawable)
         return self._add(as_voxels("drawable", drawable), colors, Kind.ARRAY)
+
+    def draw_voxels(
+        self, voxels: voxelization.Sequence | voxelization.VoxelSet, colors: NDArray[np.uint8]
+    ) -> Drawing:
+        """Draw N voxels with one colour, a colour for each, or several spread along them.
+
+        Parameters
+        ----------
+        voxels : Sequence or VoxelSet
+        colors : (1, 3), (N, 3) or (k, 3) uint8 array
+
+        """
+        if isinstance(voxels, voxelization.VoxelSet):
+            drawing = self._add_set(voxels.voxels, colors)
+            return replace(drawing, notes=voxels.notes)
+        drawing = self._add(voxels.voxels, colors, Kind.CURVE, _corner_rows(voxels))
+        return replace(drawing, undefined=voxels.undefined, jumps=voxels.jumps)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""
@@ -502,7 +531,7 @@ _NO_INDICES = np.empty(0, dtype=np.int64)
 def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
     """Return the rows of voxels at which a curve has its corners."""
     breaks = sequence.curve.breaks
-    if not len(breaks):
+    if not len(breaks) or len(sequence) < 2:
         return _NO_INDICES
     behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
     before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)

@@ -66,12 +66,11 @@ def bench(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
             info = display.info
             frames = []
             for name, scene in bench_measurements.scenes(info.grid):
-                generation, sequences = bench_measurements.measure_generation(name, scene)
+                generation = bench_measurements.measure_generation(name, scene)
                 generations.append(generation)
                 step()
                 frame = display.frame()
-                for sequence, item in zip(sequences, scene.items, strict=True):
-                    frame.draw(sequence, item.color)
+                scene.draw_each(frame)
                 frames.append(frame)
                 coding = bench_measurements.measure_coding(name, frame, info, raw.bytes_per_s)
                 codings.append(coding)

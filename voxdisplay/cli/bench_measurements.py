@@ -142,7 +142,7 @@ def scenes(grid: vd.Grid) -> Iterator[tuple[str, Scene]]:
     yield f"{_CURVES} curves", vd.read_scene(text).fitted(grid)[0]
 
 
-def measure_generation(name: str, scene: Scene) -> tuple[Generation, list[vd.Sequence]]:
+def measure_generation(name: str, scene: Scene) -> Generation:
     """Measure voxelising with numpy; the kernels of the extra ``fast`` take long to compile."""
     curves = [item.curve for item in scene.items]
     before = kernel_backend.set_enabled(False)
@@ -150,7 +150,7 @@ def measure_generation(name: str, scene: Scene) -> tuple[Generation, list[vd.Seq
         seconds, sequences = _median_time(lambda: vd.voxelize_many(curves))
     finally:
         kernel_backend.set_enabled(before)
-    return Generation(name, sum(map(len, sequences)), seconds), sequences
+    return Generation(name, sum(map(len, sequences)), seconds)
 
 
 def measure_coding(name: str, frame: vd.Frame, info: vd.DeviceInfo, bytes_per_s: float) -> Coding:

@@ -143,10 +143,11 @@ quiet_option = click.option(
 
 fit_option = click.option(
     "--fit",
-    type=click.Choice(["contain", "none"]),
+    type=click.Choice(["contain", "none", "content"]),
     default="contain",
     help="contain: scale a scene that was composed for another size, and centre it. none: keep its "
-    "numbers and clip.  [default: contain]",
+    "numbers and clip. content: scale what is there so that it fills the display.  "
+    "[default: contain]",
 )
 
 capture_option = click.option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -26,6 +26,7 @@ from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.display.plan import Plan
+    from voxdisplay.frame import Fit
 
 _TIMEOUT_S: Final = 5.0
 _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what limits them
@@ -79,7 +80,7 @@ def plan_command(
     size: vd.Grid | None,
     format_: str | None,
     features: tuple[str, ...] | None,
-    fit: Literal["contain", "none"],
+    fit: Fit,
     as_json: bool,
 ) -> None:
     """Print how many packets and bytes SCENE takes, and how many frames per second a line carries.

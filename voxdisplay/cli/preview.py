@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -20,6 +20,7 @@ from voxdisplay.cli.output import note, plural, progress_bar
 from voxdisplay.cli.param_types import PIXEL_FORMATS, AngleType, PixelSizeType, RangeType
 
 if TYPE_CHECKING:
+    from voxdisplay.frame import Fit
     from voxdisplay.raster.grid import Grid
 
 # Pixels of all pictures of a film: what a GIF takes in memory, in bytes.
@@ -100,7 +101,7 @@ def preview(
     zoom: float,
     size: Grid | None,
     format_: str,
-    fit: Literal["contain", "none"],
+    fit: Fit,
     seconds: float,
     fps: float,
     plain: bool,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -32,6 +32,7 @@ from voxdisplay.cli.output import (
 if TYPE_CHECKING:
     from voxdisplay.cli.signals import OnExit
     from voxdisplay.display.baud import Baud
+    from voxdisplay.frame import Fit
 
 
 @click.command(
@@ -62,7 +63,7 @@ def push(
     port: str | None,
     baud: Baud,
     timeout_s: float,
-    fit: Literal["contain", "none"],
+    fit: Fit,
     verify: bool,
     preview: Path | None,
     reconnect_s: float,

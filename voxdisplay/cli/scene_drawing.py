@@ -3,40 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import voxdisplay as vd
 from voxdisplay.cli.output import note
 
 if TYPE_CHECKING:
-    from voxdisplay.scene.model import SceneItem
+    from voxdisplay.frame import Fit
+    from voxdisplay.scene.item import SceneItem
 
 _MAX_JUMPS_NAMED: Final = 3
 _MAX_UNDEFINED_NAMED: Final = 8
 
 
-def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence]:
-    """Return the sequences of a scene's objects; note the reader's choices, jumps and holes.
+def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence | vd.VoxelSet]:
+    """Return the voxels of a scene's objects; note the reader's choices, jumps and holes.
 
     Parameters
     ----------
     scene : Scene
     **options
-        Of `voxdisplay.voxelize`.
+        Of `Scene.voxelize`.
 
     Raises
     ------
     SceneError
-        If a curve cannot be drawn; it names the object.
+        If an object cannot be drawn; it names the object.
 
     """
+    _note_choices(scene)
+    found = scene.voxelize(**options)
+    for item, voxels in zip(scene.items, found, strict=True):
+        _note_remarks(item, _remarks(voxels))
+    return found
+
+
+def _note_choices(scene: vd.Scene) -> None:
     for remark in scene.notes:
         note(remark)
-    sequences = scene.voxelize(**options)
-    for item, sequence in zip(scene.items, sequences, strict=True):
-        for remark in _remarks(sequence):
-            note(f"{item.path} ({item.type}): {remark}")
-    return sequences
+
+
+def _note_remarks(item: SceneItem, remarks: Iterator[str]) -> None:
+    for remark in remarks:
+        note(f"{item.path} ({item.type}): {remark}")
 
 
 def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -> Any:
@@ -47,13 +56,17 @@ def with_object(item: SceneItem, function: Any, *arguments: Any, **named: Any) -
         raise item.scene_error(error) from error
 
 
-def _remarks(sequence: vd.Sequence) -> Iterator[str]:
-    """Yield remarks on the parameters at which a curve has no value or jumps."""
-    undefined = sequence.undefined
+def _remarks(found: vd.Sequence | vd.VoxelSet | vd.Drawing) -> Iterator[str]:
+    """Yield remarks on the parameters at which a curve has no value or jumps; those on a body."""
+    if not isinstance(found, vd.Sequence):
+        yield from found.notes
+    if isinstance(found, vd.VoxelSet):
+        return
+    undefined = found.undefined
     yield from map(str, undefined[:_MAX_UNDEFINED_NAMED])
     if len(undefined) > _MAX_UNDEFINED_NAMED:
         yield f"and has no value at {len(undefined) - _MAX_UNDEFINED_NAMED} more parameters"
-    jumps = sequence.jumps
+    jumps = found.jumps
     if jumps:
         named = ", ".join(f"{t:.6g}" for t in jumps[:_MAX_JUMPS_NAMED])
         more = ", ..." if len(jumps) > _MAX_JUMPS_NAMED else ""
@@ -61,7 +74,7 @@ def _remarks(sequence: vd.Sequence) -> Iterator[str]:
 
 
 def load_fitted_scene(
-    path: str, grid: vd.Grid | None, fit: Literal["contain", "none"] = "contain"
+    path: str, grid: vd.Grid | None, fit: Fit = "contain"
 ) -> tuple[vd.Scene, vd.Grid]:
     """Read a scene and fit it to a grid.
 
@@ -71,7 +84,7 @@ def load_fitted_scene(
         A file, or ``-`` for stdin.
     grid : Grid or None
         None: the size for which the scene was composed, else 128x128x128.
-    fit : {"contain", "none"}
+    fit : {"contain", "none", "content"}
 
     Returns
     -------
@@ -84,7 +97,7 @@ def load_fitted_scene(
     return fit_scene(scene, grid, fit), grid
 
 
-def fit_scene(scene: vd.Scene, grid: vd.Grid, fit: Literal["contain", "none"]) -> vd.Scene:
+def fit_scene(scene: vd.Scene, grid: vd.Grid, fit: Fit) -> vd.Scene:
     """Fit a scene to a grid, and note the change."""
     fitted, remark = scene.fitted(grid, fit)
     if remark:
@@ -94,15 +107,17 @@ def fit_scene(scene: vd.Scene, grid: vd.Grid, fit: Literal["contain", "none"]) -
 
 def draw_scene(scene: vd.Scene, frame: vd.Frame) -> None:
     """Draw a scene, and note what a display of the frame's kind cannot show."""
-    drawings = [
-        frame.draw(sequence, item.color)
-        for sequence, item in zip(voxelize_scene(scene), scene.items, strict=True)
-    ]
-    total = sum(drawing.voxels for drawing in drawings)
-    clipped = sum(drawing.clipped for drawing in drawings)
-    if total and clipped == total:
+    _note_choices(scene)
+    drawings = scene.draw_each(frame)
+    for item, drawing in zip(scene.items, drawings, strict=True):
+        _note_remarks(item, _remarks(drawing))
+    sums = vd.Drawing.sum(drawings)
+    total, clipped = sums.voxels, sums.clipped
+    if scene.items and not total:
+        note("warning: nothing is inside the display: the picture is empty")
+    elif total and clipped == total:
         note(f"warning: all {total} voxels are outside the display: the picture is empty")
     elif clipped:
         note(f"{clipped} of {total} voxels are outside the display and not shown")
-    if not all(drawing.exact_color for drawing in drawings):
+    if not sums.exact_color:
         note(f"this is a {frame.format.value} display: colours are the nearest it has")

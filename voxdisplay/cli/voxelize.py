@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from voxdisplay.scene.model import SceneItem
+    from voxdisplay.scene.item import SceneItem
 
 _COLUMNS: Final = ("object", "x", "y", "z")
 _STEP: Final = RangeType("step", 0, 1e6, "0.25")
@@ -118,10 +118,10 @@ def voxelize(
     loaded = vd.load_scene(scene)
     items = loaded.items
     began_s = time.perf_counter()
-    sequences = voxelize_scene(loaded, **options)
+    sequences = voxelize_scene(loaded, clip=clip, **options)
     seconds = time.perf_counter() - began_s
     for number, (item, sequence) in enumerate(zip(items, sequences, strict=True)):
-        if isinstance(sequence.proof, str):
+        if isinstance(sequence, vd.Sequence) and isinstance(sequence.proof, str):
             note(f"object {number} ({item.type}) is not certified: {sequence.proof}")
     kept = [_kept(sequence, clip) for sequence in sequences]
     rows = _rows(kept)
@@ -183,7 +183,7 @@ def _voxelize_options(
     }
 
 
-def _kept(sequence: vd.Sequence, clip: vd.Grid | None) -> NDArray[np.int32]:
+def _kept(sequence: vd.Sequence | vd.VoxelSet, clip: vd.Grid | None) -> NDArray[np.int32]:
     return sequence.voxels if clip is None else sequence.voxels[clip.inside(sequence.voxels)]
 
 
@@ -196,13 +196,29 @@ def _rows(kept: list[NDArray[np.int32]]) -> NDArray[np.int32]:
     return np.column_stack((numbers, np.concatenate([np.empty((0, 3), np.int32), *kept])))
 
 
-def _report(number: int, item: SceneItem, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:
+def _report(
+    number: int, item: SceneItem, voxels: vd.Sequence | vd.VoxelSet, clipped: int
+) -> dict[str, Any]:
+    facts: dict[str, Any] = {"object": number, "type": item.type}
+    if isinstance(voxels, vd.Sequence):
+        return facts | _sequence_report(item, voxels, clipped)
+    return facts | {
+        "kind": voxels.kind,
+        "voxels": len(voxels),
+        "clipped": clipped,
+        "seconds": round(voxels.seconds, 6),
+        "notes": list(voxels.notes),
+    }
+
+
+def _sequence_report(item: SceneItem, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:
     from voxdisplay.cli.scene_drawing import with_object  # noqa: PLC0415
 
+    if not len(sequence):  # a part of a curve may be nothing
+        return {"kind": "curve", "voxels": 0, "clipped": 0, "seconds": round(sequence.seconds, 6)}
     report = with_object(item, lambda: sequence.report)
     return {
-        "object": number,
-        "type": item.type,
+        "kind": "curve",
         "voxels": report.voxels,
         "closed": report.closed,
         "pieces": report.pieces,

@@ -6,7 +6,7 @@ Each is a number, or an expression in constants and other params. Must not know 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from voxdisplay.argument_checks import described
@@ -28,8 +28,29 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NAME_HINT = "a name is letters a-z A-Z, digits and _, and does not begin with a digit"
 
 
-def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
+def check_name(name: object, what: str) -> None:
+    """Raise CurveError if a name cannot be used in expressions, or has another meaning there.
+
+    Parameters
+    ----------
+    name : object
+    what : str
+        What it is a name of: ``"a param"``.
+
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise CurveError(f"{excerpt(name)} cannot be the name of {what}", hint=_NAME_HINT)
+    if name in RESERVED:
+        raise CurveError(f"{what} cannot be called {name!r}: that has a meaning already")
+
+
+def param_order(params: Mapping[str, str | float | Sequence[str | float]]) -> tuple[str, ...]:
     """Return the names of params in an order in which each uses only earlier ones.
+
+    Parameters
+    ----------
+    params : mapping of str to str, float or sequence of these
+        An expression, or all that the value of the param depends on.
 
     Raises
     ------
@@ -43,12 +64,14 @@ def param_order(params: Mapping[str, str | float]) -> tuple[str, ...]:
     if len(params) > MAX_PARAMS:
         raise CurveError(f"{len(params)} params are more than {MAX_PARAMS}")
     for name in params:
-        if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise CurveError(f"{excerpt(name)} cannot be the name of a param", hint=_NAME_HINT)
-        if name in RESERVED:
-            raise CurveError(f"a param cannot be called {name!r}: that has a meaning already")
+        check_name(name, "a param")
     uses = {
-        name: [word for word in names_in(str(source)) if word in params]
+        name: [
+            word
+            for text in ([source] if isinstance(source, str | float | int) else source)
+            for word in names_in(str(text))
+            if word in params
+        ]
         for name, source in params.items()
     }
     try:

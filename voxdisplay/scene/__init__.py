@@ -3,7 +3,8 @@
 It must not know displays or the wire.
 """
 
-from voxdisplay.scene.model import Scene, SceneItem
+from voxdisplay.scene.item import SceneItem
+from voxdisplay.scene.model import Scene
 from voxdisplay.scene.reader import load_scene, read_scene
 
 __all__ = ["Scene", "SceneItem", "load_scene", "read_scene"]

@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from voxdisplay.curves import arguments
-from voxdisplay.errors import CurveError, SceneError
-from voxdisplay.expressions.parse import constant, parse
+from voxdisplay.errors import BodyError, CurveError, SceneError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -18,19 +17,21 @@ if TYPE_CHECKING:
 
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.expressions.program import Expression
+    from voxdisplay.scene.environment import Environment
     from voxdisplay.scene.point_table import FilePoints
 
 
 @contextmanager
 def as_scene_error(path: str) -> Iterator[None]:
-    """Raise a CurveError of the block as a SceneError at a JSON path."""
+    """Raise a CurveError or BodyError of the block as a SceneError at a JSON path."""
     try:
         yield
-    except CurveError as error:
-        raise _scene_error(error, path) from error
+    except (CurveError, BodyError) as error:
+        raise scene_error(error, path) from error
 
 
-def _scene_error(error: CurveError, path: str) -> SceneError:
+def scene_error(error: CurveError | BodyError, path: str) -> SceneError:
+    """Return an error as one at a JSON path."""
     if isinstance(error, arguments.ArgumentError):
         path = f"{path}.{error.argument}"
     return SceneError(str(error), path=path, hint=error.hint)
@@ -43,30 +44,44 @@ class EvaluationContext:
     ----------
     path : str
         JSON path of the object.
-    names : mapping of str to float
-        The scene's params.
+    environment : Environment
+        The values of names.
     folder : Path or None
         Folder of the files that the object may name; None: it may name none.
     notes : list of str
         Choices made while the object was read, one line each, for people.
+    wanted_columns : tuple of str
+        Names that may be columns of its file, by which it is coloured.
+    columns : list of mappings of str to (n,) float64 array
+        Those that were found, for each of the things it is made of.
 
     """
 
-    def __init__(self, path: str, names: Mapping[str, float], folder: Path | None) -> None:
+    def __init__(self, path: str, environment: Environment, folder: Path | None) -> None:
         self.path = path
-        self.names = names
+        self.environment = environment
         self.folder = folder
         self.notes: list[str] = []
+        self.wanted_columns: tuple[str, ...] = ()
+        self.columns: list[Mapping[str, Floats]] = []
 
-    def formula(self, key: str, source: str | float) -> Expression:
-        """Return the expression of t that a key has."""
+    def error(self, key: str, message: str, *, hint: str | None = None) -> SceneError:
+        """Return an error at a key."""
+        return SceneError(message, path=f"{self.path}.{key}", hint=hint)
+
+    def formula(
+        self, key: str, source: str | float, variables: tuple[str, ...] = ("t",)
+    ) -> Expression:
+        """Return the expression of some variables that a key has."""
         with as_scene_error(f"{self.path}.{key}"):
-            return parse(source, self.names)
+            return self.environment.formula(source, variables)
 
     def number(self, key: str, source: str | float) -> float:
         """Return the number that a key has."""
-        with as_scene_error(f"{self.path}.{key}"):
-            return constant(source, self.names)
+        try:
+            return self.environment.number(source)
+        except CurveError as error:
+            raise scene_error(error, f"{self.path}.{key}") from error
 
     def numbers(self, key: str, sources: Sequence[str | float]) -> Floats:
         """Return a list of n numbers: (n,) float64."""
@@ -78,10 +93,13 @@ class EvaluationContext:
         try:
             return arguments.array(key, row, (None,))
         except CurveError as error:
-            raise _scene_error(error, self.path) from error
+            raise scene_error(error, self.path) from error
 
     def points(self, key: str, rows: Sequence[Sequence[str | float]]) -> Floats:
         """Return n rows of three numbers: (n, 3) float64."""
+        quick = self.environment.table_of(rows)
+        if quick is not None:
+            return quick
         table = [
             [
                 source if isinstance(source, float) else self.number(f"{key}[{i}][{j}]", source)
@@ -92,7 +110,7 @@ class EvaluationContext:
         try:
             return arguments.points(key, table, least=0)
         except CurveError as error:
-            raise _scene_error(error, self.path) from error
+            raise scene_error(error, self.path) from error
 
     def points_from_file(self, key: str, name: str, *, split: bool) -> FilePoints:
         """Read a file of points beside the scene.

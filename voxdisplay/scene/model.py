@@ -1,68 +1,39 @@
-"""Scene model: coloured curves in drawing order, and the grid they were composed for.
+"""Scene model: coloured curves and bodies in drawing order, and the grid they were composed for.
 
 It must not read files; of the one it came from it holds the text, for the places in errors.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from voxdisplay import voxelization
-from voxdisplay.argument_checks import choice, instance
-from voxdisplay.curves import Transformed
-from voxdisplay.errors import CurveError, SceneError
-from voxdisplay.frame import Drawing, Frame
+from voxdisplay.argument_checks import choice, instance, whole_number
+from voxdisplay.frame import FITS, Drawing, Fit, Frame
 from voxdisplay.raster.grid import Grid
+from voxdisplay.scene.content_fit import content_placement
+from voxdisplay.scene.item import PartSpan, SceneItem
+from voxdisplay.scene.placement import Placement, placed
+from voxdisplay.scene.show import SceneShow
+from voxdisplay.scene.voxelized_items import draw_items, shown_voxels, voxelize_items
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from voxdisplay.curves import Curve
-    from voxdisplay.scene.json_text import JsonText
-    from voxdisplay.voxelization import Sequence
+    from voxdisplay.voxelization import Sequence, VoxelSet
 
 DEFAULT_SIZE = Grid(128, 128, 128)
 """Size of the picture of a scene that names none."""
 
+DEFAULT_FPS = 30.0
+
 _MAX_TYPES = 5  # of objects that a repr names
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SceneItem:
-    """One object of a scene.
-
-    Attributes
-    ----------
-    type : str
-        Its type in the file: ``"parametric"``, ``"circle"``, ...
-    curve : Curve
-    color : (k, 3) uint8 array
-        Red, green, blue: one colour, or several as `Frame.draw` takes them.
-    path : str
-        Its JSON path in the file, such as ``$.objects[0]``.
-    source : JsonText, optional
-        The file's text.
-
-    """
-
-    type: str
-    curve: Curve
-    color: NDArray[np.uint8]
-    path: str
-    source: JsonText | None = field(default=None, repr=False)
-
-    def scene_error(self, error: CurveError) -> SceneError:
-        """Return an error of the item's curve as one that names the object's place in the file."""
-        found = SceneError(str(error), path=self.path, hint=error.hint)
-        return self.source.add_location(found) if self.source else found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Scene:
-    """Contents of a scene file.
+    """Contents of a scene file; of a moving scene, at its beginning.
 
     Attributes
     ----------
@@ -72,12 +43,15 @@ class Scene:
         In drawing order.
     notes : tuple of str
         Choices made by the reader, one line each, for people.
+    spans : tuple of PartSpan
+        Items of which a part is shown.
 
     """
 
     size: Grid | None
     items: tuple[SceneItem, ...]
     notes: tuple[str, ...] = ()
+    spans: tuple[PartSpan, ...] = ()
 
     def __repr__(self) -> str:
         size = f" {self.size}" if self.size else ""
@@ -88,38 +62,36 @@ class Scene:
         count = len(self.items)
         return f"<Scene{size}: {count} object{'s' * (count != 1)}{named}>"
 
-    def voxelize(self, **options: Any) -> list[Sequence]:
-        """Return the sequences of all items, which are voxelised together.
+    def voxelize(
+        self, *, clip: tuple[int, int, int] | None = None, **options: Any
+    ) -> list[Sequence | VoxelSet]:
+        """Return the voxels of all items: sequences of curves, sets of bodies.
 
         Parameters
         ----------
+        clip : (int, int, int), optional
+            The grid to which bodies are clipped. By default those that have no end are clipped to
+            the scene's size, and others are not.
         **options
             Of `voxdisplay.voxelize`.
 
         Raises
         ------
         SceneError
-            If a curve cannot be evaluated or drawn; it names the object.
+            If a curve or body cannot be evaluated or drawn; it names the object.
 
         """
-        try:
-            return voxelization.voxelize_many((item.curve for item in self.items), **options)
-        except CurveError:
-            # Voxelised together, they fail together: one by one, to name the object.
-            for item in self.items:
-                try:
-                    voxelization.voxelize(item.curve, **options)
-                except CurveError as error:
-                    raise item.scene_error(error) from error
-            raise
+        grid = Grid.of(clip) if clip is not None else None
+        endless = self.size or DEFAULT_SIZE
+        return shown_voxels(voxelize_items(self.items, grid, endless, **options), self.spans)
 
-    def draw_on(self, frame: Frame, *, fit: Literal["contain", "none"] = "contain") -> Drawing:
+    def draw_on(self, frame: Frame, *, fit: Fit = "contain") -> Drawing:
         """Draw all items on a frame: `Frame.draw` of a scene.
 
         Parameters
         ----------
         frame : Frame
-        fit : {"contain", "none"}
+        fit : {"contain", "none", "content"}
             As of `fitted`.
 
         Returns
@@ -135,17 +107,13 @@ class Scene:
         """
         instance("frame", frame, Frame, "a frame")
         fitted, _ = self.fitted(frame.grid, fit)
-        drawings = [
-            frame.draw(sequence, item.color)
-            for sequence, item in zip(fitted.voxelize(), fitted.items, strict=True)
-        ]
-        return Drawing(
-            voxels=sum(drawing.voxels for drawing in drawings),
-            clipped=sum(drawing.clipped for drawing in drawings),
-            exact_color=all(drawing.exact_color for drawing in drawings),
-            undefined=tuple(point for drawing in drawings for point in drawing.undefined),
-            jumps=tuple(t for drawing in drawings for t in drawing.jumps),
-        )
+        return Drawing.sum(fitted.draw_each(frame))
+
+    def draw_each(self, frame: Frame) -> list[Drawing]:
+        """Draw all items on a frame as they are; return what became of each."""
+        whole = voxelize_items(self.items, frame.grid)
+        drawings, _ = draw_items(frame, self.items, whole, self.spans)
+        return drawings
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks; None without Pillow."""
@@ -153,18 +121,17 @@ class Scene:
         self.draw_on(frame)
         return frame._repr_png_()
 
-    def fitted(
-        self, grid: Grid, mode: Literal["contain", "none"] = "contain"
-    ) -> tuple[Scene, str | None]:
+    def fitted(self, grid: Grid, mode: Fit = "contain") -> tuple[Scene, str | None]:
         """Fit the scene to a display's grid.
 
         Parameters
         ----------
         grid : Grid
             The display's.
-        mode : {"contain", "none"}
+        mode : {"contain", "none", "content"}
             ``"contain"`` scales a scene that was composed for another grid by the same factor in
-            x, y and z, so that all of it is shown, and centres it. ``"none"`` keeps the numbers.
+            x, y and z, so that all of it is shown, and centres it. ``"content"`` does so with what
+            there is in it, so that this fills the grid. ``"none"`` keeps the numbers.
 
         Returns
         -------
@@ -174,15 +141,83 @@ class Scene:
             One line that says what was changed.
 
         """
-        choice("fit", mode, ("contain", "none"))
-        grid = Grid.of(grid)
+        placement, note = self.placement_for(Grid.of(grid), mode)
+        if placement is None:
+            return self, note
+        return self.placed(placement, Grid.of(grid)), note
+
+    def placement_for(self, grid: Grid, mode: Fit) -> tuple[Placement | None, str | None]:
+        """Return the map by which the scene is fitted, and a note on it: see `fitted`."""
+        choice("fit", mode, FITS)
+        if mode == "content":
+            return content_placement(self._moments(), self.size or DEFAULT_SIZE, grid)
         if mode == "none" or self.size is None or self.size == grid:
-            return self, None
+            return None, None
         size, room = np.array(self.size, dtype=np.float64), np.array(grid, dtype=np.float64)
         scale = float((room / size).min())
-        offset = (room - scale * size) / 2
-        items = tuple(
-            replace(item, curve=Transformed(item.curve, scale, offset)) for item in self.items
-        )
         note = f"scene composed for {self.size}, scaled by {scale:.3g} to {grid}"
-        return replace(self, size=grid, items=items), note
+        return Placement.scaling(scale, (room - scale * size) / 2), note
+
+    def placed(self, placement: Placement, grid: Grid) -> Scene:
+        """Return the scene under an affine map, as one that was composed for a grid."""
+        items: list[SceneItem] = []
+        kept: list[int] = []  # before each item, how many of those before it are left
+        for item in self.items:
+            kept.append(len(items))
+            shape = placed(item.shape, placement)
+            if shape is not None:
+                fit = placement.after(item.fit)
+                items.append(replace(item, shape=shape, fit=fit))
+        kept.append(len(items))
+        spans = tuple(
+            span._replace(first=kept[span.first], end=kept[span.end]) for span in self.spans
+        )
+        return replace(self, size=grid, items=tuple(items), spans=spans)
+
+    def _moments(self) -> Iterable[Scene]:
+        """Yield the scene at moments between which it does not become much larger."""
+        yield self
+
+    @property
+    def duration(self) -> float:
+        """Seconds that a moving scene lasts; 0 of a still one."""
+        return 0.0
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of a moving scene."""
+        return DEFAULT_FPS
+
+    @property
+    def loop(self) -> bool:
+        """Whether a moving scene is meant to start again at its end."""
+        return False
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames; 1 of a still scene."""
+        return 1
+
+    def at(self, time: float) -> Scene:  # noqa: ARG002 - for those that move
+        """Return the scene at a time, in seconds since its beginning: a still one is as it is."""
+        return self
+
+    def at_frame(self, number: int) -> Scene:
+        """Return the scene at frame ``number``, from 0 to ``frame_count - 1``, as a still one."""
+        whole_number("number", number, 0, 0)
+        return self
+
+    def show_on(self, blank: Frame, *, fit: Fit = "contain") -> SceneShow:
+        """Return the scene as a show of frames like a blank one.
+
+        Parameters
+        ----------
+        blank : Frame
+            Its copies are drawn on.
+        fit : {"contain", "none", "content"}
+            As of `fitted`.
+
+        """
+        instance("blank", blank, Frame, "a frame")
+        fitted, _ = self.fitted(blank.grid, fit)
+        return SceneShow(fitted, blank)

@@ -12,22 +12,22 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.errors import SceneError, did_you_mean, similar_file
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
-from voxdisplay.raster.color import Color, as_colors
 from voxdisplay.raster.grid import Grid
+from voxdisplay.scene.builder import SceneBuilder
+from voxdisplay.scene.environment import MovingEnvironment, StillEnvironment, ValueTable
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
-from voxdisplay.scene.model import Scene, SceneItem
-from voxdisplay.scene.objects import TYPES, Object, SceneFile, SceneObject
+from voxdisplay.scene.model import Scene
+from voxdisplay.scene.objects import TYPES, Object, SceneFile
+from voxdisplay.scene.scene_object import SceneObject
 from voxdisplay.scene.type_mismatch import MOST_COMPARED, describe_value, find_mismatch
-from voxdisplay.scene.values import MAX_SIDE
+from voxdisplay.scene.values import MAX_SIDE, Track
 
 MAX_BYTES = 16 << 20
 """Largest scene file. Long lists of points fit better in a file of their own."""
@@ -150,20 +150,44 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
         if not isinstance(raw.pop("$schema", ""), str):
             raise SceneError("expected text in double quotes", path="$.$schema")
         scene_object: SceneObject = _convert(raw, Object, source)
-        context = EvaluationContext("$", {}, folder)
-        return Scene(None, _items(scene_object, context, source), tuple(context.notes))
+        environment = StillEnvironment({})
+        built = SceneBuilder([scene_object], ["$"], environment, folder, source).build()
+        return Scene(None, built.items, built.notes, built.spans)
     file: SceneFile = _convert(raw, SceneFile, source)
+    paths = [f"$.objects[{i}]" for i in range(len(file.objects))]
+    notes = () if file.objects else ("the scene has no objects: there is nothing to show",)
+    if file.duration is not None:
+        return _moving_scene(file, paths, folder, source, notes)
+    for key, value, default in (("fps", file.fps, 30.0), ("loop", file.loop, False)):
+        if value != default:
+            hint = 'write "duration", in seconds, beside "objects"'
+            raise SceneError("the scene has no duration", path=f"$.{key}", hint=hint)
     names = _params(file.params)
     size = _size(file.size, names) if file.size else None
-    items: list[SceneItem] = []
-    notes: list[str] = []
-    for i, scene_object in enumerate(file.objects):
-        context = EvaluationContext(f"$.objects[{i}]", names, folder)
-        items += _items(scene_object, context, source)
-        notes += context.notes
-    if not items:
-        notes.append("the scene has no objects: there is nothing to show")
-    return Scene(size, tuple(items), tuple(notes))
+    builder = SceneBuilder(file.objects, paths, StillEnvironment(names), folder, source)
+    built = builder.build()
+    return Scene(size, built.items, (*built.notes, *notes), built.spans)
+
+
+def _moving_scene(
+    file: SceneFile,
+    paths: list[str],
+    folder: Path | None,
+    source: JsonText,
+    notes: tuple[str, ...],
+) -> Scene:
+    # Most scenes are still, and are read sooner without these.
+    from voxdisplay.scene.moving_scene import Film, MovingScene  # noqa: PLC0415
+    from voxdisplay.scene.timeline import Timeline  # noqa: PLC0415
+
+    assert file.duration is not None  # noqa: S101 - see the caller
+    timeline = Timeline(file.duration, file.fps, loop=file.loop, params=file.params)
+    size = _size(file.size, timeline.constants) if file.size else None
+    table = ValueTable(timeline.variables, timeline.values_at)
+    environment = MovingEnvironment(timeline.constants, table)
+    duration = timeline.duration
+    builder = SceneBuilder(file.objects, paths, environment, folder, source, duration)
+    return MovingScene.of_film(Film(timeline, table, builder, source), size, notes)
 
 
 def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
@@ -171,18 +195,24 @@ def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
     return any(did_you_mean(key, [written]) for written in islice(raw, MOST_COMPARED))
 
 
-def _params(params: dict[str, str | float]) -> dict[str, float]:
+def _params(params: dict[str, str | float | Track]) -> dict[str, float]:
     values: dict[str, float] = {}
+    plain: dict[str, str | float] = {}
+    for name, source in params.items():
+        if isinstance(source, Track):
+            hint = 'a track is for scenes that have a "duration"'
+            raise SceneError("the scene has no duration", path=f"$.params.{name}", hint=hint)
+        plain[name] = source
     with as_scene_error("$.params"):
-        order = param_order(params)
+        order = param_order(plain)
     for name in order:
         with as_scene_error(f"$.params.{name}"):
-            values[name] = constant(params[name], values)
+            values[name] = constant(plain[name], values)
     return values
 
 
 def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
-    numbers = EvaluationContext("$", names, None).numbers("size", sides).tolist()
+    numbers = EvaluationContext("$", StillEnvironment(names), None).numbers("size", sides).tolist()
     for i, number in enumerate(numbers):
         if not (number.is_integer() and 1 <= number <= MAX_SIDE):
             problem = f"must be a whole number from 1 to {MAX_SIDE}, not {number:g}"
@@ -191,29 +221,6 @@ def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
     if grid.voxels > MAX_VOXELS:
         raise SceneError(f"{grid} is more than {MAX_VOXELS} voxels", path="$.size")
     return grid
-
-
-def _items(
-    scene_object: SceneObject, context: EvaluationContext, source: JsonText
-) -> tuple[SceneItem, ...]:
-    """Return what an object draws: one item for each strand of points, else one."""
-    with as_scene_error(context.path):
-        strands = scene_object.build_curves(context)
-    kind = str(scene_object.__struct_config__.tag)
-    colors = _colors(scene_object.color, f"{context.path}.color")
-    return tuple([SceneItem(kind, curve, colors, context.path, source) for curve in strands])
-
-
-def _colors(color: Color, path: str) -> NDArray[np.uint8]:
-    """Return the colours of an object, (k, 3)."""
-    try:
-        return as_colors(color)
-    except (TypeError, ValueError) as error:
-        if not isinstance(color, str):
-            for i, one in enumerate(color):
-                if not isinstance(one, int):
-                    _colors(one, f"{path}[{i}]")
-        raise SceneError(str(error), path=path) from None
 
 
 def _convert(raw: Any, kind: Any, source: JsonText) -> Any:

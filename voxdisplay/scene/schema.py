@@ -23,7 +23,19 @@ import msgspec
 
 from voxdisplay.scene.objects import TYPES, SceneFile
 from voxdisplay.scene.type_mismatch import field_types
-from voxdisplay.scene.values import Color, Formula, Number, OneColor, Side, Vector
+from voxdisplay.scene.values import (
+    Color,
+    ColorMap,
+    Formula,
+    Number,
+    OneColor,
+    Param,
+    Side,
+    Track,
+    Transform,
+    TransformStep,
+    Vector,
+)
 
 ID = "urn:voxdisplay:scene"
 
@@ -35,6 +47,14 @@ _SHARED = {
     "Side": Side,
     "OneColor": OneColor,
     "Color": Color,
+    "Param": Param,
+    "Transform": Transform,
+}
+_TITLES: dict[type, str] = {
+    SceneFile: "Scene",
+    ColorMap: "Colour map",
+    Track: "Track",
+    TransformStep: "Step of a transform",
 }
 _SCALARS = {
     bool: {"type": "boolean"},
@@ -64,7 +84,7 @@ def schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": ID,
         "title": "voxdisplay scene",
-        "description": "A scene of curves for a volumetric display, or one object.",
+        "description": "A scene of curves and bodies for a volumetric display, or one object.",
         "type": "object",
         # Offered by editors where a file has neither key yet.
         "properties": {"type": _TYPE_KEY | {"enum": list(TYPES)}},
@@ -106,7 +126,7 @@ def _struct(kind: type[msgspec.Struct]) -> dict[str, Any]:
     """Return the schema of the objects that a Struct is made of."""
     kinds = field_types(kind)
     tag = kind.__struct_config__.tag
-    title = str(tag).replace("_", " ").capitalize() if tag else "Scene"
+    title = _TITLES.get(kind) or str(tag).replace("_", " ").capitalize()
     properties: dict[str, Any] = {"type": _TYPE_KEY | {"const": tag}} if tag else {}
     required = ["type"] if tag else []
     for field in msgspec.structs.fields(kind):
@@ -140,6 +160,8 @@ def _part(kind: Any, *, refer: bool = True) -> dict[str, Any]:
         return _described(_part(get_args(kind)[0]), kind.__metadata__)
     if kind in _SCALARS:
         return dict(_SCALARS[kind])
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return _struct(kind)
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in {Union, UnionType}:
         return _union(arguments)

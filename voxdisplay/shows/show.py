@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
-from voxdisplay.frame import Frame
-
-Fit = Literal["contain", "none"]
+from voxdisplay.frame import Fit, Frame
 
 
 @runtime_checkable
@@ -59,7 +57,7 @@ class ShowSource(Protocol):
         ----------
         blank : Frame
             A blank frame of the display: copies of it are drawn on.
-        fit : {"contain", "none"}
+        fit : {"contain", "none", "content"}
             As of `Frame.draw`.
 
         """

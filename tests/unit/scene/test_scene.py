@@ -87,7 +87,9 @@ class TestMeaning:
         assert np.isfinite(item.curve.position(np.array(item.curve.t_range))).all()
 
     def test_every_type_is_tried(self) -> None:
-        assert {scene_object["type"] for scene_object in ONE_OF_EACH} == set(reader.TYPES)
+        assert {scene_object["type"] for scene_object in ONE_OF_EACH} == set(reader.TYPES) - {
+            "group"
+        }
 
     @pytest.mark.parametrize(
         "scene_object", ONE_OF_EACH, ids=lambda scene_object: scene_object["type"]
@@ -187,7 +189,7 @@ class TestMistakes:
         [
             (SEGMENT | {"colour": "red"}, "$", "unknown key 'colour'", "'color'"),
             ({"objects": [SEGMENT | {"colr": 1}]}, "$.objects[0]", "unknown key 'colr'", "'color'"),
-            (SEGMENT | {"qqq": 1}, "$", "unknown key 'qqq'", "from, to, color, closed"),
+            (SEGMENT | {"qqq": 1}, "$", "unknown key 'qqq'", "from, to, color, transform"),
             ({"objets": []}, "$", "unknown key 'objets'", "'objects'"),
             (SEGMENT | {"params": {}}, "$", "unknown key 'params'", "beside objects"),
             (SEGMENT | {"type": "segmnt"}, "$.type", "unknown type 'segmnt'", "'segment'"),

@@ -1,0 +1,389 @@
+"""Builder of scene items: objects of a file, groups and repeats unfolded, at one time.
+
+What does not depend on the time is built once and kept, so that whoever draws a moving scene can
+tell by identity what has not changed. Must not know JSON text but to name places in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from voxdisplay.bodies import Body
+from voxdisplay.errors import BodyError, CurveError, MissingExtra, SceneError
+from voxdisplay.expressions.params import check_name
+from voxdisplay.expressions.parse import names_in
+from voxdisplay.raster.color import as_colors
+from voxdisplay.raster.color_map import color_map
+from voxdisplay.scene.coloring import WHITE, Coloring, ColorsByValue
+from voxdisplay.scene.environment import MovingEnvironment
+from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error, scene_error
+from voxdisplay.scene.item import PartSpan, SceneItem
+from voxdisplay.scene.objects import Group
+from voxdisplay.scene.placement import Placement, placed, transform_placement
+from voxdisplay.scene.values import ColorMap
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from voxdisplay.compute.array_types import Floats
+    from voxdisplay.curves import Curve
+    from voxdisplay.scene.environment import Environment
+    from voxdisplay.scene.json_text import JsonText
+    from voxdisplay.scene.scene_object import SceneObject
+
+T = TypeVar("T")
+
+MAX_ITEMS = 100_000
+"""Most objects of a scene, repeats counted each."""
+MAX_DEPTH = 32
+"""Deepest nesting of groups."""
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What a scene shows at one time.
+
+    Attributes
+    ----------
+    items : tuple of SceneItem
+        In drawing order.
+    spans : tuple of PartSpan
+        Which of them are shown in part, inner ones first.
+    notes : tuple of str
+        Choices made while they were built, one line each, for people.
+
+    """
+
+    items: tuple[SceneItem, ...]
+    spans: tuple[PartSpan, ...]
+    notes: tuple[str, ...]
+
+
+class SceneBuilder:
+    """Builder of the items of one file.
+
+    Parameters
+    ----------
+    objects : sequence of SceneObject
+    paths : sequence of str
+        Their JSON paths.
+    environment : Environment
+    folder : Path or None
+        Folder of the files that objects may name; None: they may name none.
+    source : JsonText or None
+        The file's text.
+    duration : float, optional
+        Seconds that a moving scene lasts.
+
+    """
+
+    def __init__(
+        self,
+        objects: Sequence[SceneObject],
+        paths: Sequence[str],
+        environment: Environment,
+        folder: Path | None,
+        source: JsonText | None,
+        duration: float | None = None,
+    ) -> None:
+        self._objects = list(zip(paths, objects, strict=True))
+        self._environment = environment
+        self.folder = folder
+        self.source = source
+        self.duration = duration
+        self._kept: dict[tuple[Any, ...], Any] = {}
+        self._placements: dict[tuple[Any, ...], tuple[Placement, Placement, Placement]] = {}
+        self._items: dict[tuple[Any, ...], tuple[tuple[Any, ...], SceneItem]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_kept": {}, "_placements": {}, "_items": {}}
+
+    def build(self, time: float | None = None, fit: Placement | None = None) -> Built:
+        """Return the items.
+
+        Parameters
+        ----------
+        time : float, optional
+            Seconds since a moving scene began; the environment must be at that time.
+        fit : Placement, optional
+            How the scene is fitted to a grid.
+
+        Raises
+        ------
+        SceneError
+            If a value is wrong: ``.path`` is where.
+
+        """
+        run = _Run(self, time, fit)
+        for path, scene_object in self._objects:
+            run.add(scene_object, path, self._environment, fit, None, 0)
+        return Built(tuple(run.items), tuple(run.spans), tuple(dict.fromkeys(run.notes)))
+
+    def once(
+        self,
+        key: tuple[Any, ...],
+        environment: Environment,
+        compute: Callable[..., T],
+        *arguments: Any,
+    ) -> T:
+        """Return ``compute(*arguments)``, which is kept if it does not depend on the time."""
+        if not isinstance(environment, MovingEnvironment):
+            return compute(*arguments)
+        key = (*key, id(environment))
+        if key in self._kept:
+            kept: T = self._kept[key]
+            return kept
+        table = environment.table
+        before, table.touched = table.touched, False
+        value = compute(*arguments)
+        if not table.touched:
+            self._kept[key] = value
+        table.touched |= before
+        return value
+
+    def placement(self, key: tuple[Any, ...], outer: Placement | None, own: Placement) -> Placement:
+        """Return the map ``own``, then ``outer``: the same object as before for the same two."""
+        if outer is None:
+            return own
+        kept = self._placements.get(key)
+        if kept is None or kept[0] is not outer or kept[1] is not own:
+            kept = self._placements[key] = (outer, own, outer.after(own))
+        return kept[2]
+
+    def kept_item(self, key: tuple[Any, ...], parts: tuple[Any, ...]) -> SceneItem | None:
+        """Return the item that was made of the same parts before; None if they are others."""
+        kept = self._items.get(key)
+        if kept is None or any(a is not b for a, b in zip(kept[0], parts, strict=True)):
+            return None
+        return kept[1]
+
+    def keep_item(self, key: tuple[Any, ...], parts: tuple[Any, ...], item: SceneItem) -> None:
+        """Keep an item and the parts it is made of."""
+        self._items[key] = parts, item
+
+
+class _Run:
+    """One run through all objects."""
+
+    def __init__(self, builder: SceneBuilder, time: float | None, fit: Placement | None) -> None:
+        self.builder = builder
+        self.time = time
+        self.fit = fit
+        self.items: list[SceneItem] = []
+        self.spans: list[PartSpan] = []
+        self.notes: list[str] = []
+
+    def add(
+        self,
+        scene_object: SceneObject,
+        path: str,
+        environment: Environment,
+        outer: Placement | None,
+        color: Coloring,
+        depth: int,
+    ) -> None:
+        """Add an object, as often as it is repeated."""
+        if scene_object.repeat is None:
+            self.add_once(scene_object, path, environment, outer, color, depth)
+            return
+        for names in self._repeats(scene_object.repeat, path, environment):
+            nested = environment.nested(names)
+            self.add_once(scene_object, path, nested, outer, color, depth)
+
+    def _repeats(
+        self, repeat: Mapping[str, str | float], path: str, environment: Environment
+    ) -> Iterator[dict[str, float]]:
+        context = EvaluationContext(f"{path}.repeat", environment, None)
+        counts: list[int] = []
+        total = 1
+        for name, source in repeat.items():
+            with as_scene_error(f"{path}.repeat"):
+                check_name(name, "the counter of a repeat")
+            if name in environment.names or self._varies(name, environment):
+                what = f"the name {name!r} has a meaning already"
+                raise SceneError(what, path=f"{path}.repeat", hint="choose another counter")
+            count = context.number(name, source)
+            if not (count.is_integer() and count >= 0):
+                raise context.error(name, f"must be a whole number, 0 or more, not {count:g}")
+            if count * total > MAX_ITEMS:
+                problem = f"{count * total:g} objects are more than {MAX_ITEMS}"
+                raise context.error(name, problem)
+            counts.append(int(count))
+            total *= int(count)
+        for each in product(*map(range, counts)):
+            yield dict(zip(repeat, map(float, each), strict=True))
+
+    @staticmethod
+    def _varies(name: str, environment: Environment) -> bool:
+        return isinstance(environment, MovingEnvironment) and name in environment.table.variables
+
+    def add_once(
+        self,
+        scene_object: SceneObject,
+        path: str,
+        environment: Environment,
+        outer: Placement | None,
+        color: Coloring,
+        depth: int,
+    ) -> None:
+        """Add an object once."""
+        context = EvaluationContext(path, environment, self.builder.folder)
+        if scene_object.during is not None and not self._is_during(scene_object, context):
+            return
+        place = outer
+        if scene_object.transform:
+            key = (path, "transform")
+            own = self.builder.once(
+                key, environment, transform_placement, scene_object.transform, context
+            )
+            assert own is not None  # noqa: S101 - it has steps
+            place = self.builder.placement((path, id(environment)), outer, own)
+        first = len(self.items)
+        if isinstance(scene_object, Group):
+            if depth == MAX_DEPTH:
+                raise SceneError(f"groups are nested more than {MAX_DEPTH} deep", path=path)
+            inner = self._coloring(scene_object, context, color, ())
+            for i, child in enumerate(scene_object.objects):
+                self.add(child, f"{path}.objects[{i}]", environment, place, inner, depth + 1)
+        else:
+            self._add_shapes(scene_object, context, place, color)
+        if scene_object.part is not None:
+            begin, end = context.numbers("part", scene_object.part).tolist()
+            self.spans.append(PartSpan(first, len(self.items), begin, end))
+
+    def _is_during(self, scene_object: SceneObject, context: EvaluationContext) -> bool:
+        """Return whether an object is there at the present time."""
+        duration = self.builder.duration
+        assert scene_object.during is not None  # noqa: S101 - see the caller
+        if duration is None or self.time is None:
+            hint = 'write "duration", in seconds, beside "objects"'
+            raise context.error("during", "the scene has no duration", hint=hint)
+        begin, end = context.numbers("during", scene_object.during).tolist()
+        if not begin < end:
+            raise context.error("during", f"is empty or runs backwards: {begin:g} to {end:g}")
+        if begin >= duration or end <= 0:
+            what = f"{begin:g} to {end:g} s is outside of the scene, which lasts {duration:g} s"
+            raise context.error("during", what)
+        return bool(begin <= self.time < end)
+
+    def _add_shapes(
+        self,
+        scene_object: SceneObject,
+        context: EvaluationContext,
+        place: Placement | None,
+        color: Coloring,
+    ) -> None:
+        builder, environment, path = self.builder, context.environment, context.path
+        shapes, columns = builder.once(
+            (path, "shapes"), environment, _shapes, scene_object, context
+        )
+        self.notes += context.notes
+        if scene_object.color is None:
+            coloring = color
+        else:
+            names = scene_object.value_names
+            if context.wanted_columns and columns:
+                names += tuple(columns[0])
+            coloring = self._coloring(scene_object, context, color, names)
+        if len(self.items) + len(shapes) > MAX_ITEMS:
+            raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
+        for i, shape in enumerate(shapes):
+            parts = (shape, place, coloring)
+            item = (
+                builder.kept_item((path, i, id(environment)), parts) if environment.varies else None
+            )
+            if item is None:
+                image = shape
+                if place is not None:
+                    with as_scene_error(path):
+                        found = placed(shape, place)
+                    if found is None:  # nothing is left of it
+                        continue
+                    image = found
+                item = SceneItem(
+                    str(scene_object.__struct_config__.tag),
+                    image,
+                    WHITE if coloring is None and not isinstance(image, Body) else coloring,
+                    path,
+                    builder.source,
+                    columns[i] if columns else None,
+                    self.fit,
+                )
+                if environment.varies:
+                    builder.keep_item((path, i, id(environment)), parts, item)
+            self.items.append(item)
+
+    def _coloring(
+        self,
+        scene_object: SceneObject,
+        context: EvaluationContext,
+        inherited: Coloring,
+        names: tuple[str, ...],
+    ) -> Coloring:
+        color = scene_object.color
+        if color is None:
+            return inherited
+        path = context.path
+        if isinstance(color, ColorMap):
+            key = (path, "color", names)
+            return self.builder.once(
+                key, context.environment, _colors_by_value, color, context, names
+            )
+        return self.builder.once(
+            (path, "color"), context.environment, read_colors, color, f"{path}.color"
+        )
+
+
+def _shapes(
+    scene_object: SceneObject, context: EvaluationContext
+) -> tuple[list[Curve | Body], list[Mapping[str, Floats]]]:
+    """Return what an object is made of, and the columns of points that each of it has."""
+    context.wanted_columns = _wanted_values(scene_object)
+    try:
+        return scene_object.build(context), context.columns
+    except (CurveError, BodyError) as error:
+        raise scene_error(error, context.path) from error
+    except MissingExtra as error:
+        raise SceneError(str(error), path=context.path, hint=error.hint) from error
+
+
+def _wanted_values(scene_object: SceneObject) -> tuple[str, ...]:
+    """Return the names by which an object is coloured that no object has by itself."""
+    color = scene_object.color
+    if not isinstance(color, ColorMap) or not isinstance(color.by, str):
+        return ()
+    return tuple(dict.fromkeys(names_in(color.by)))
+
+
+def _colors_by_value(
+    color: ColorMap, context: EvaluationContext, names: tuple[str, ...]
+) -> ColorsByValue:
+    path = f"{context.path}.color"
+    try:
+        colors = color_map(color.map)
+    except (TypeError, ValueError, MissingExtra) as error:
+        hint = error.hint if isinstance(error, MissingExtra) else None
+        raise SceneError(str(error), path=f"{path}.map", hint=hint) from None
+    by = context.formula("color.by", color.by, ("x", "y", "z", *names))
+    span: tuple[float, float] | None = None
+    if color.range is not None:
+        low, high = context.numbers("color.range", color.range).tolist()
+        span = low, high
+    return ColorsByValue(colors, by, span)
+
+
+def read_colors(color: Any, path: str) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Return the colours of an object, (k, 3), or raise SceneError at its path."""
+    try:
+        return as_colors(color)
+    except (TypeError, ValueError) as error:
+        if not isinstance(color, str):
+            for i, one in enumerate(color):
+                if not isinstance(one, int):
+                    read_colors(one, f"{path}[{i}]")
+        raise SceneError(str(error), path=path) from None

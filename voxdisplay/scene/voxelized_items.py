@@ -1,0 +1,151 @@
+"""Voxels of scene items, and their drawing on frames.
+
+Curves are voxelised together; what has not changed since the last time is taken from there. Must
+not know files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from voxdisplay import voxelization
+from voxdisplay.bodies import Body
+from voxdisplay.errors import BodyError, CurveError
+from voxdisplay.frame import Drawing, Frame
+from voxdisplay.scene.coloring import Colors, voxel_colors
+from voxdisplay.scene.parts import shown_stretches, stretch_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from collections.abc import Sequence as Items
+
+    from voxdisplay.raster.grid import Grid
+    from voxdisplay.scene.item import PartSpan, SceneItem
+    from voxdisplay.voxelization import Sequence, VoxelSet
+
+Kept = dict[int, tuple["SceneItem", "Sequence | VoxelSet", Colors | None]]
+"""Voxels and colours of items, by the identity of the item, which is held so that it stays its."""
+
+
+def voxelize_items(
+    items: Items[SceneItem],
+    clip: Grid | None,
+    endless: Grid | None = None,
+    *,
+    kept: Mapping[int, tuple[Any, Any, Any]] | None = None,
+    **options: Any,
+) -> list[Sequence | VoxelSet]:
+    """Return the voxels of items, whole.
+
+    Parameters
+    ----------
+    items : sequence of SceneItem
+    clip : Grid or None
+        The grid to which bodies are clipped.
+    endless : Grid, optional
+        The grid to which bodies without an end are clipped, if ``clip`` is None.
+    kept : mapping, optional
+        Voxels of items that need not be voxelised again.
+    **options
+        Of `voxdisplay.voxelize`, for curves; ``certified`` for bodies, too.
+
+    Raises
+    ------
+    SceneError
+        If a curve or body cannot be evaluated or drawn; it names the object.
+
+    """
+    found: dict[int, Sequence | VoxelSet] = {}
+    curves: list[int] = []
+    for i, item in enumerate(items):
+        if kept and id(item) in kept:
+            found[i] = kept[id(item)][1]
+        elif isinstance(item.shape, Body):
+            low, high = item.shape.bounds()
+            ends = np.isfinite(low).all() and np.isfinite(high).all()
+            found[i] = _voxelize_body(item, clip or (None if ends else endless), options)
+        else:
+            curves.append(i)
+    if curves:
+        sequences = _voxelize_curves([items[i] for i in curves], options)
+        found.update(zip(curves, sequences, strict=True))
+    return [found[i] for i in range(len(items))]
+
+
+def _voxelize_body(item: SceneItem, clip: Grid | None, options: Mapping[str, Any]) -> VoxelSet:
+    assert isinstance(item.shape, Body)  # noqa: S101 - see the caller
+    certified = options.get("certified", False)
+    try:
+        return voxelization.voxelize(item.shape, certified=certified, clip=clip)
+    except (CurveError, BodyError) as error:
+        raise item.scene_error(error) from error
+
+
+def _voxelize_curves(items: Items[SceneItem], options: Mapping[str, Any]) -> list[Sequence]:
+    try:
+        return voxelization.voxelize_many((item.curve for item in items), **options)
+    except CurveError:
+        # Voxelised together, they fail together: one by one, to name the object.
+        for item in items:
+            try:
+                voxelization.voxelize(item.curve, **options)
+            except CurveError as error:
+                raise item.scene_error(error) from error
+        raise
+
+
+def shown_voxels(
+    whole: list[Sequence | VoxelSet], spans: Iterable[PartSpan]
+) -> list[Sequence | VoxelSet]:
+    """Return the parts of items that are shown."""
+    stretches = shown_stretches([len(each) for each in whole], spans)
+    return [stretch_of(each, *of) for each, of in zip(whole, stretches, strict=True)]
+
+
+def draw_items(
+    frame: Frame,
+    items: Items[SceneItem],
+    whole: list[Sequence | VoxelSet],
+    spans: Iterable[PartSpan],
+    kept: Mapping[int, tuple[Any, Any, Any]] | None = None,
+) -> tuple[list[Drawing], Kept]:
+    """Draw items on a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+    items : sequence of SceneItem
+    whole : list of Sequence and VoxelSet
+        Their voxels, as of `voxelize_items`.
+    spans : iterable of PartSpan
+    kept : mapping, optional
+        What the last call returned.
+
+    Returns
+    -------
+    drawings : list of Drawing
+    kept : dict
+        Voxels and colours of the items, for the next call.
+
+    """
+    stretches = shown_stretches([len(each) for each in whole], spans)
+    drawings: list[Drawing] = []
+    keep: Kept = {}
+    for item, voxels, (begin, end) in zip(items, whole, stretches, strict=True):
+        old = kept.get(id(item)) if kept else None
+        colors = old[2] if old else _colors_of(item, voxels)
+        keep[id(item)] = item, voxels, colors
+        if colors is not None and len(colors) > 1:
+            colors = colors[begin:end]
+        drawings.append(frame.draw_voxels(stretch_of(voxels, begin, end), colors))
+    return drawings, keep
+
+
+def _colors_of(item: SceneItem, voxels: Sequence | VoxelSet) -> Colors:
+    try:
+        return voxel_colors(item.color, voxels, item.columns or {}, item.fit)
+    except (CurveError, BodyError) as error:
+        raise item.scene_error(error) from error
