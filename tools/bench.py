@@ -4,7 +4,8 @@
 command from a cold start; ``curves`` voxelisation beside other methods; ``link`` the encoders
 beside other codings; ``view`` pictures and the live view; ``ports`` each kind of port beside the
 bare pipe below it; ``stream`` how busy streaming keeps a line; ``goodput`` what bit errors leave
-of one. Each of these is a module in `benchmarks`.
+of one; ``scale`` time and memory by the size of the volume and by what is lit. Each of these is a
+module in `benchmarks`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from benchmarks.goodput import bench_goodput
 from benchmarks.link import bench_link
 from benchmarks.live import bench_live
 from benchmarks.ports import bench_ports
+from benchmarks.scale import bench_scale
 from benchmarks.stream import bench_stream
 from benchmarks.view import bench_view
 
@@ -234,6 +236,7 @@ TABLES = {
     "ports": bench_ports,
     "stream": bench_stream,
     "goodput": bench_goodput,
+    "scale": bench_scale,
 }
 
 

@@ -99,7 +99,7 @@ def crumbs_high_first(patch):
 def chain_start_left_out(patch):
     def walk(old, self, octant, count, raw):
         first = self._cursor
-        before = self._page.memory[first : first + 1] if self._format.size == 1 else None
+        before = self._page.stored.read(first, 1) if self._format.size == 1 else None
         old(self, octant, count, raw)
         if before is not None:
             self._page.put(first, bytes(before))
@@ -289,7 +289,7 @@ def reserved_ops_skipped(patch):
 def run_past_the_end_is_cut(patch):
     def room(_, self, count):
         if self._cursor >= self._grid.volume:
-            raise self._outside("")
+            raise self._outside_error("")
         return min(count, self._grid.volume - self._cursor)
 
     around(patch, Decoder, "_check_room", room)

@@ -54,3 +54,10 @@ def test_the_table_of_goodput_runs():
     command = [sys.executable, str(BENCH), "goodput", "--quick"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert run.stdout.count("\n") == 3
+
+
+def test_the_table_of_scale_runs():
+    command = [sys.executable, str(BENCH), "scale", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    for row in ("\n32^3 mono1 ", "\n48^3 rgb888 ", "\nmoving, spread "):
+        assert row in run.stdout

@@ -49,7 +49,8 @@ def test_verify_says_where_the_page_differs():
     frame.draw([(1, 2, 3), (16, 8, 4)], "red")
     display.present(frame)
     display.verify(frame)
-    pipe.device.memory.front.memory[3 * display.info.grid.index_of(np.array([(1, 2, 3)]))[0]] = 7
+    place = int(display.info.grid.index_of(np.array([(1, 2, 3)]))[0])
+    pipe.device.memory.front.stored.exchange_run(place, bytes((7, 0, 0)))  # its digest stays
     with pytest.raises(vd.DesyncError, match=r"1 voxels differ, the first at \(1, 2, 3\)"):
         display.verify(frame)
 
