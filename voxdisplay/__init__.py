@@ -45,6 +45,7 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     Cylinder            Cylinder with its ends.
     Cone                Cone with its base.
     HeightField         Surface z = f(x, y).
+    Text                Letters of a font, flat or extruded.
     Volume              Samples of real numbers, shown by a colour map.
     VoxelModel          Voxels with colours of their own.
     Implicit            Surface or solid by f(x, y, z).
@@ -98,6 +99,7 @@ if TYPE_CHECKING:
         Plane,
         Sphere,
         SphericalTriangle,
+        Text,
         Volume,
         VoxelModel,
     )
@@ -193,6 +195,7 @@ if TYPE_CHECKING:
         "Sequence",
         "Sphere",
         "SphericalTriangle",
+        "Text",
         "TorusKnot",
         "TransportClosed",
         "TransportError",
@@ -224,6 +227,7 @@ _MODULES = {
         "Plane",
         "Sphere",
         "SphericalTriangle",
+        "Text",
         "Volume",
         "VoxelModel",
     ],

@@ -120,6 +120,8 @@ CALLS = {
     "TransportClosed": {"message": "what", "hint": "do"},
     "TransportError": {"message": "what", "hint": "do"},
     "TransportTimeout": {"message": "what", "hint": "do"},
+    "Text": {"text": "Ab", "at": (1, 2, 3), "height": 9, "direction": (1, 0, 0), "up": (0, 0, 1),
+             "font": None, "depth": 2, "fill": "shell"},
     "Volume": {"array": np.ones((3, 5, 7)), "window": (0, 1), "threshold": 0.5, "map": "magma",
                "spacing": (1, 1, 2), "offset": (1, 2, 3), "labels": False},
     "VoxelModel": {"voxels": [(1, 2, 3), (4, 5, 6)], "colors": [(1, 2, 3), (4, 5, 6)],

@@ -42,6 +42,7 @@ BODIES = {
     "Disc": vd.Disc((5, 5, 5), 3, (1, 2, 3)),
     "Plane": vd.Plane((1, 2, 3), (0, 0, 1)),
     "Box": vd.Box((1, 1, 1), (4, 5, 6), fill="solid"),
+    "Text": vd.Text("Ab", (1, 2, 3), 9, depth=2),
     "Volume": vd.Volume(np.arange(105.0).reshape(7, 5, 3), map="magma", spacing=(1, 1, 2)),
     "VoxelModel": vd.VoxelModel([(1, 2, 3), (4, 5, 6)], [(255, 0, 0), (0, 255, 0)]),
     "Mesh": vd.Mesh(

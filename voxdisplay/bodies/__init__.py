@@ -13,6 +13,7 @@ from voxdisplay.bodies.primitives import (
     Sphere,
     SphericalTriangle,
 )
+from voxdisplay.bodies.text import Text
 from voxdisplay.bodies.volume import Volume, VoxelModel
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Plane",
     "Sphere",
     "SphericalTriangle",
+    "Text",
     "TransformedBody",
     "Volume",
     "VoxelModel",
