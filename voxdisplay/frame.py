@@ -26,11 +26,12 @@ from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values
-from voxdisplay.raster.pixel_map import contains, without
+from voxdisplay.raster.pixel_map import without
 from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.voxelization.body_voxelization import voxelize_body
 from voxdisplay.voxelization.voxel_box import VoxelBox
 from voxdisplay.wire import spec
+from voxdisplay.wire.differences import PageDifference, encode_difference
 from voxdisplay.wire.digest import digest, page_digest, palette_digest
 from voxdisplay.wire.encoding_selection import PageUpdate, encode_raw_if_faster, encode_update
 from voxdisplay.wire.features import feature_bits
@@ -467,17 +468,9 @@ class Frame:
         """
         config = self._encoder_config(max_payload, features)
         changed = self.changed_indices(base)
-        ordered = self._ordered()
-        rest = changed
-        if ordered:  # items without any change are on the page already
-            fresh = contains(changed, ordered.index)
-            ordered = ordered.select(np.bincount(ordered.item, fresh)[ordered.item] > 0)
-            rest = changed[without(changed, ordered.index)]
-        content = PageUpdate(ordered, rest, self._raster.at)
         old = base._palette.colors if base._palette else DEFAULT
-        return list(
-            chain.from_iterable(encode_update(content, config, self._palette_blocks(old, config)))
-        )
+        content = PageDifference(changed, self._ordered(), base._ordered(), self._raster.at)
+        return encode_difference(content, config, self._palette_blocks(old, config))
 
     def changed_indices(self, base: Frame) -> NDArray[np.int64]:
         """Return the scan-order indices, ascending, of voxels that differ from another frame."""
