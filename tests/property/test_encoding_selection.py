@@ -246,7 +246,7 @@ def test_no_coder_alone_takes_fewer_bytes(device, seed):
     config = frame._encoder_config(most, features)
     values = format_.values(frame.array())
     assert size <= sum(map(len, encode_spans(values, config)))
-    items = frame._raster.visible
+    items = frame._raster.ordered
     if not frame._raster.page and items:
         items = items.select(items.values != 0)
         voxels = grid.voxels_at(items.index)

@@ -124,6 +124,6 @@ def test_what_is_drawn_again_and_again_is_kept_once_by_a_copy(format_):
     for _ in range(9):
         frame.draw(np.argwhere(np.ones((3, 5, 7))), "red")
     copy = frame.copy()
-    assert len(copy._raster.visible) == len(frame._raster.visible) == 105
+    assert len(copy._raster._drawn) == len(frame._raster._drawn) == 105
     assert copy == frame
     assert copy.array().any(axis=-1).all()

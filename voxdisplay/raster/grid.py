@@ -1,6 +1,6 @@
 """Voxel grid of a display: sizes, scan order, and the change from (x, y, z) to ``[z, y, x]``.
 
-Only this module and ``frame.py`` change the order of axes. Must not know curves or colours.
+Only this module and `frame` change the order of axes. Must not know curves or colours.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from voxdisplay.raster.display_list import DisplayList, DrawnVoxels, Kind
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
-from voxdisplay.raster.pixel_map import PixelMap, contains
+from voxdisplay.raster.pixel_map import PixelMap, contains, without
 
 # With more drawn voxels for each one left, a copy forgets their order.
 _OVERDRAW_LIMIT = 4
@@ -101,9 +101,22 @@ class SparseRaster:
         return self._drawn.pixels
 
     @property
-    def visible(self) -> DrawnVoxels | None:
-        """Drawn voxels, dark ones included, that no later item covers; None if none were drawn."""
-        return self._drawn.visible
+    def ordered(self) -> DrawnVoxels | None:
+        """Visible voxels, dark ones included, of items that may have an order; None without any."""
+        drawn = self._drawn.visible
+        if drawn is None or not (drawn.kinds == Kind.SET).any():
+            return drawn
+        return drawn.select((drawn.kinds != Kind.SET)[drawn.item])
+
+    def lit_parts(self) -> tuple[DrawnVoxels | None, NDArray[np.int64]]:
+        """Return the lit voxels of `ordered`, and the indices, ascending, of all other lit ones."""
+        ordered, index = self.ordered, self.lit.index
+        if ordered is None:
+            return None, index
+        on = ordered.select(ordered.values != 0)
+        if not self.page and ordered is self._drawn.visible:
+            return on, index[:0]
+        return on, index[without(index, on.index)]
 
     @property
     def lit(self) -> PixelMap:
@@ -121,9 +134,11 @@ class SparseRaster:
         self._drawn.pixels.write_to(found, index)
         return found
 
-    def pixels(self) -> Pixels:
-        """Return all pixels in scan order, (V,) or (V, 3) for rgb888: a copy."""
+    def pixels(self, *, writable: bool = True) -> Pixels:
+        """Return all pixels in scan order, (V,) or (V, 3) for rgb888: a copy if writable."""
         drawn = self._drawn.pixels
+        if self.page and not len(drawn) and not writable:
+            return self.page.pixels
         if self.page is None:
             shape = self.format.shape((self.grid.voxels,))
             array: Pixels = np.zeros(shape, dtype=self.format.dtype)

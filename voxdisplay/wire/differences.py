@@ -6,70 +6,48 @@ had been drawn. Must not know frames.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
 from voxdisplay.raster.display_list import DrawnVoxels, concatenate_drawn
 from voxdisplay.raster.pixel_map import contains, without
+from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.wire import spec
 from voxdisplay.wire.encoding_selection import PageUpdate, encode_update
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
 from voxdisplay.wire.payload_splitting import OpBlocks
-from voxdisplay.wire.spans import PixelLookup
 
 _STEPS_PER_BYTE = 4
 # Whole items are tried beside their changed parts if they have at most so many times the voxels.
 _WHOLE_FACTOR = 2
 
 
-@dataclass(frozen=True)
-class PageDifference:
-    """Changes from one page to another.
-
-    Attributes
-    ----------
-    changed : (n,) int64 array
-        Scan-order indices, ascending, of the voxels that differ.
-    drawn, vanished : DrawnVoxels or None
-        Visible voxels of the items of the new and of the old page that may have an order, dark ones
-        included.
-    pixels_at : PixelLookup
-        Function from indices to the pixel values of the new page.
-
-    """
-
-    changed: Ints
-    drawn: DrawnVoxels | None
-    vanished: DrawnVoxels | None
-    pixels_at: PixelLookup
-
-
 def encode_difference(
-    difference: PageDifference, config: EncoderConfig, first: OpBlocks | None = None
+    new: SparseRaster, old: SparseRaster, config: EncoderConfig, first: OpBlocks | None = None
 ) -> list[bytes]:
-    """Return the payloads that turn the old page into the new one, in whatever order they arrive.
+    """Return the payloads that turn one page into another, in whatever order they arrive.
 
     Parameters
     ----------
-    difference : PageDifference
+    new, old : SparseRaster
+        What is to be shown, and what is.
     config : EncoderConfig
     first : OpBlocks, optional
         Blocks to be sent as well, such as palette entries.
 
     """
-    changed, pixels_at = difference.changed, difference.pixels_at
-    drawn = _items_with(changed, difference.drawn)
+    changed, pixels_at = new.differing(old), new.at
+    drawn = _items_with(changed, new.ordered)
     parts: list[DrawnVoxels] = []
     rest = changed
     if drawn is not None:
         parts.append(_changed_parts(drawn, changed, config))
         rest = rest[without(rest, parts[0].index)]
-    vanished = _items_with(rest, difference.vanished)
+    vanished = _items_with(rest, old.ordered)
     if vanished is not None:
-        values = np.asarray(pixels_at(vanished.index), dtype=np.uint32)
-        redrawn = replace(vanished, values=values)
+        redrawn = replace(vanished, values=pixels_at(vanished.index))
         parts.append(_changed_parts(redrawn, rest, config))
         rest = rest[without(rest, parts[-1].index)]
     best = _encode(

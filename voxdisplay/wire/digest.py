@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values, is_lit
+from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.wire import spec
 
 # Added to a palette entry's colour, so that it differs from every pixel value.
@@ -58,6 +59,24 @@ def page_digest(page: Pixels, format_: PixelFormat) -> int:
             index, pixels = index[on], pixels[on]
         found += _block_digest(index, format_.values(pixels))
     return found & 0xFFFFFFFF
+
+
+def raster_digest(raster: SparseRaster) -> int:
+    """Return the digest of a frame with the default palette.
+
+    Parameters
+    ----------
+    raster : SparseRaster
+        Its pixels.
+
+    """
+    page, drawn = raster.page, raster.drawn
+    if page is None:
+        return digest(drawn.index, drawn.values)
+    # In a page, much may be lit; a digest is a sum, to which what was drawn is added.
+    below = digest(drawn.index, page.at(drawn.index))
+    whole = page_digest(page.pixels, raster.format)
+    return (whole - below + digest(drawn.index, drawn.values)) & 0xFFFFFFFF
 
 
 def _block_digest(index: Values, values: NDArray[np.integer]) -> int:

@@ -11,13 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.raster.display_list import DrawnVoxels, Kind
-from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.raster.pixel_map import contains
 from voxdisplay.wire import range_coded_chains, spans, spec, voxel_sets
 from voxdisplay.wire.array_order import items_that_are_sets
@@ -25,7 +23,6 @@ from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
 from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout, concatenate_blocks, no_blocks
-from voxdisplay.wire.raw_pixels import encode_raw, is_incompressible
 
 # With more colours, voxels that mostly differ from the next in their row make no bricks.
 _MANY_COLORS = 16
@@ -44,8 +41,6 @@ _LONE_FRACTION = 16  # unless one voxel in so many is isolated
 _LEAST_STEP_BITS, _LEAST_SET_STEP_BITS = 0.5, 2.0
 # Bytes of a typical set for each byte of its lower bound.
 _TYPICAL_FACTOR = 1.5
-# Line rate, bytes/s, from which incompressible pages are sent raw rather than parsed.
-_RAW_FROM = 2_400_000
 
 
 @dataclass(frozen=True)
@@ -123,30 +118,6 @@ def _with_known_order(update: PageUpdate, config: EncoderConfig) -> PageUpdate:
     if len(rest):  # what two items drew with one value is sent once
         sets = sets[~contains(np.sort(rest.index), sets)]
     return PageUpdate(rest if len(rest) else None, _union(sets, index), update.pixels_at)
-
-
-def encode_raw_if_faster(
-    page: Pixels, config: EncoderConfig, first: OpBlocks | None = None
-) -> Iterator[list[bytes]] | None:
-    """Return raw payloads of a page, if finding a shorter encoding would take longer than sending.
-
-    Parameters
-    ----------
-    page : ndarray
-        The display's memory in scan order: (V,), or (V, 3) for rgb888.
-    config, first
-        As of `encode_update`.
-
-    Returns
-    -------
-    iterator or None
-        As of `encode_update`; None if that should be used.
-
-    """
-    if config.bytes_per_s < _RAW_FROM or not is_incompressible(page, config):
-        return None
-    before = PayloadLayout(first, config).payloads if first else []
-    return chain([before], encode_raw(page, config))
 
 
 def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> Iterator[Ints]:

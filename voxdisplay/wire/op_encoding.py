@@ -5,13 +5,17 @@ Shared by all encoders of ops. Must not know what an op draws, nor in which payl
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import whole_number
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.wire import spec
+from voxdisplay.wire.features import feature_bits
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -46,6 +50,19 @@ class EncoderConfig:
     max_payload: int
     features: int = 0
     bytes_per_s: float = 0.0
+
+    @classmethod
+    def of_device(
+        cls,
+        grid: Grid,
+        format: PixelFormat,  # noqa: A002 - as the attribute
+        max_payload: int,
+        features: Collection[str],
+        bytes_per_s: float = 0.0,
+    ) -> EncoderConfig:
+        """Return the properties of a device whose features are names; raise if one is none."""
+        whole_number("max_payload", max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
+        return cls(grid, format, max_payload, feature_bits(features), bytes_per_s)
 
     def has(self, feature: int) -> bool:
         """Return whether the device announced a feature, ``spec.FEATURE_...``."""

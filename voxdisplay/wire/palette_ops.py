@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.raster.palette import Colors, Palette
 from voxdisplay.wire import spec
 from voxdisplay.wire.op_encoding import EncoderConfig, Ints
 from voxdisplay.wire.payload_splitting import ANY, OpBlocks, no_blocks
@@ -38,6 +39,15 @@ def color_blocks(entries: Ints, palette: NDArray[np.uint8], config: EncoderConfi
     body = np.frombuffer(b"".join(ops), dtype=np.uint8)
     no_chains = np.zeros(len(ops), dtype=np.bool_)
     return OpBlocks(body, size, anything, anything, anything, anything, no_chains)
+
+
+def changed_color_blocks(
+    palette: Palette | None, old: Colors, config: EncoderConfig
+) -> OpBlocks | None:
+    """Return the op blocks that set the entries which differ from other colours, or None."""
+    if palette is None or not len(entries := palette.entries_differing(old)):
+        return None
+    return color_blocks(entries, palette.colors, config)
 
 
 def _runs(entries: list[int]) -> list[range]:

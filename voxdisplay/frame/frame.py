@@ -1,14 +1,15 @@
 """One picture of a display: display list in drawing order, and its raster.
 
 A frame turns curves into voxels and colours into pixels of the display's grid and format. It must
-not know packets in flight, and leaves the encoding to `wire.encoding_selection`.
+not know packets in flight, holds no array of the grid's size that it was not given, and leaves the
+encoding to `wire`.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from typing import Any, Literal, Protocol, runtime_checkable
 
@@ -16,73 +17,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
-from voxdisplay.argument_checks import flag, instance, whole_number, wrong_kind
+from voxdisplay.argument_checks import flag, instance, wrong_kind
 from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
-from voxdisplay.curves.singular_points import SingularPoint
+from voxdisplay.frame.drawing import Drawing
 from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
-from voxdisplay.raster.color import Color, as_colors, colors_at, interpolate_colors
-from voxdisplay.raster.display_list import DrawnVoxels, Kind
+from voxdisplay.raster.color import Color, as_colors, colors_at
+from voxdisplay.raster.coloring import Coloring
+from voxdisplay.raster.display_list import Kind
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values
-from voxdisplay.raster.pixel_map import without
 from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.voxelization.body_voxelization import voxelize_body
+from voxdisplay.voxelization.corner_rows import corner_rows
 from voxdisplay.voxelization.voxel_box import VoxelBox
 from voxdisplay.wire import spec
-from voxdisplay.wire.differences import PageDifference, encode_difference
-from voxdisplay.wire.digest import digest, page_digest, palette_digest
-from voxdisplay.wire.encoding_selection import PageUpdate, encode_raw_if_faster, encode_update
-from voxdisplay.wire.features import feature_bits
+from voxdisplay.wire.differences import encode_difference
+from voxdisplay.wire.digest import palette_digest, raster_digest
 from voxdisplay.wire.op_encoding import EncoderConfig
-from voxdisplay.wire.palette_ops import color_blocks
-from voxdisplay.wire.payload_splitting import OpBlocks
+from voxdisplay.wire.palette_ops import changed_color_blocks
+from voxdisplay.wire.raster_encoding import encode_raster
 
 Fit = Literal["contain", "none", "content"]
 FITS = ("contain", "none", "content")
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Result of drawing one object.
-
-    Attributes
-    ----------
-    voxels : int
-        Number of its voxels, inside the grid or not.
-    clipped : int
-        Number of those outside, which are not shown.
-    exact_color : bool
-        True if the display can show its colours as they are.
-    undefined : tuple of SingularPoint
-        Parameters at which a curve has no value and is drawn with the limits of both sides.
-    jumps : tuple of float
-        Parameters at which a curve jumps: nothing is drawn across.
-    notes : tuple of str
-        What was wrong with a body or left out, for people.
-
-    """
-
-    voxels: int
-    clipped: int
-    exact_color: bool
-    undefined: tuple[SingularPoint, ...] = ()
-    jumps: tuple[float, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @classmethod
-    def sum(cls, drawings: Iterable[Drawing]) -> Drawing:
-        """Return the result of drawing several objects."""
-        drawings = list(drawings)
-        return cls(
-            voxels=sum(drawing.voxels for drawing in drawings),
-            clipped=sum(drawing.clipped for drawing in drawings),
-            exact_color=all(drawing.exact_color for drawing in drawings),
-            undefined=tuple(point for drawing in drawings for point in drawing.undefined),
-            jumps=tuple(t for drawing in drawings for t in drawing.jumps),
-            notes=tuple(note for drawing in drawings for note in drawing.notes),
-        )
 
 
 @runtime_checkable
@@ -244,7 +202,7 @@ class Frame:
         if isinstance(voxels, voxelization.VoxelSet):
             drawing = self._add_set(voxels.voxels, colors)
             return replace(drawing, notes=voxels.notes)
-        drawing = self._add(voxels.voxels, colors, Kind.CURVE, _corner_rows(voxels))
+        drawing = self._add(voxels.voxels, colors, Kind.CURVE, corner_rows(voxels))
         return replace(drawing, undefined=voxels.undefined, jumps=voxels.jumps)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
@@ -281,23 +239,13 @@ class Frame:
         kind: Kind,
         corners: NDArray[np.int64] | None = None,
     ) -> Drawing:
-        # A single colour is looked up once.
-        each = len(colors) in {1, len(voxels)}
-        rgb = colors if each else interpolate_colors(colors, len(voxels))
-        found = self._palette.nearest(rgb) if self._palette else self.format.nearest(rgb)
-        exact = np.array_equal(self._colors_of(found), rgb)
-        values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
-        inside = self.grid.inside(voxels)
-        at_corner = np.zeros(len(voxels), dtype=np.bool_)
-        if corners is not None:
-            at_corner[corners] = True
-        # Voxels outside have meaningless indices; they are removed here.
-        item = DrawnVoxels.of_item(self.grid.index_of(voxels), values, at_corner, kind)
-        self._raster.draw(item.select(inside))
-        return Drawing(len(inside), int(len(inside) - inside.sum()), bool(exact))
+        item, clipped, exact = self._coloring.item(voxels, colors, kind, corners)
+        self._raster.draw(item)
+        return Drawing(len(voxels), clipped, exact)
 
-    def _colors_of(self, values: NDArray[np.integer]) -> NDArray[np.uint8]:
-        return self._palette.rgb(values) if self._palette else self.format.rgb(values)
+    @property
+    def _coloring(self) -> Coloring:
+        return Coloring(self.grid, self.format, self._palette)
 
     def set(self, array: NDArray[np.generic]) -> None:
         """Replace the picture by an array. The palette stays as it is.
@@ -387,10 +335,9 @@ class Frame:
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the colours shown, (nz, ny, nx, 3) uint8, whatever the format."""
-        index, values = self.lit()
-        colors = np.empty((self.grid.voxels, 3), dtype=np.uint8)
-        colors[:] = self._colors_of(np.zeros(1, dtype=np.uint32))  # palettes may show the dark
-        colors[index] = self._colors_of(values)
+        lit = self._raster.lit
+        colors = np.zeros((self.grid.voxels, 3), dtype=np.uint8)
+        colors[lit.index] = self._coloring.colors_of(lit.values)
         return colors.reshape(*self.grid.array_shape, 3)
 
     def lit(self) -> tuple[NDArray[np.int64], Values]:
@@ -400,18 +347,10 @@ class Frame:
 
     def digest(self) -> int:
         """Return the digest that a display reports when it shows this frame (section 8)."""
-        found = self._raster_digest()
+        found = raster_digest(self._raster)
         if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
         return found & 0xFFFFFFFF
-
-    def _raster_digest(self) -> int:
-        if not (page := self._raster.page):
-            return digest(*self.lit())
-        # In a page, much may be lit; a digest is a sum, to which what was drawn is added.
-        drawn = self._raster.drawn
-        found = page_digest(page.pixels, self.format)
-        return found - digest(drawn.index, page.at(drawn.index)) + digest(drawn.index, drawn.values)
 
     def payloads(self, max_payload: int, features: Collection[str] = ()) -> list[bytes]:
         """Return payloads that draw the frame on a dark page, in whatever order they arrive.
@@ -443,15 +382,8 @@ class Frame:
 
         """
         config = self._encoder_config(max_payload, features, bytes_per_s)
-        colors = self._palette_blocks(DEFAULT, config)
-        if self._raster.page and (
-            plain := encode_raw_if_faster(self._raster.pixels(), config, colors)
-        ):
-            yield from plain
-            return
-        ordered, index = self._visible_parts()
-        yield []
-        yield from encode_update(PageUpdate(ordered, index, self._raster.at), config, colors)
+        first = changed_color_blocks(self._palette, DEFAULT, config)
+        yield from encode_raster(self._raster, config, first)
 
     def difference(
         self, base: Frame, max_payload: int, features: Collection[str] = ()
@@ -467,65 +399,29 @@ class Frame:
 
         """
         config = self._encoder_config(max_payload, features)
-        changed = self.changed_indices(base)
+        self._check_comparable(base)
         old = base._palette.colors if base._palette else DEFAULT
-        content = PageDifference(changed, self._ordered(), base._ordered(), self._raster.at)
-        return encode_difference(content, config, self._palette_blocks(old, config))
+        first = changed_color_blocks(self._palette, old, config)
+        return encode_difference(self._raster, base._raster, config, first)
 
     def changed_indices(self, base: Frame) -> NDArray[np.int64]:
         """Return the scan-order indices, ascending, of voxels that differ from another frame."""
+        self._check_comparable(base)
+        return self._raster.differing(base._raster)
+
+    def _check_comparable(self, base: Frame) -> None:
         instance("base", base, Frame, "a frame")
         if (base.grid, base.format) != (self.grid, self.format):
             raise ValueError(
                 f"base: expected a frame of {self.grid} {self.format.value}, found {base}"
             )
-        return self._raster.differing(base._raster)
 
     def _encoder_config(
         self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
     ) -> EncoderConfig:
-        whole_number("max_payload", max_payload, spec.LIMIT_MIN_PAYLOAD, spec.LIMIT_MAX_PAYLOAD)
-        bits = feature_bits(features)
-        config = EncoderConfig(self.grid, self.format, max_payload, bits, bytes_per_s)
+        config = EncoderConfig.of_device(self.grid, self.format, max_payload, features, bytes_per_s)
         if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
             raise ValueError(
                 "the frame has a palette of its own, and the device cannot set its palette"
             )
         return config
-
-    def _visible_parts(self) -> tuple[DrawnVoxels | None, NDArray[np.int64]]:
-        """Return the lit voxels of items that may have an order, and the indices of all others."""
-        ordered = self._ordered()
-        index = self.lit()[0]
-        if ordered is None:
-            return None, index
-        lit = ordered.select(ordered.values != 0)
-        if not self._raster.page and ordered is self._raster.visible:
-            return lit, index[:0]
-        return lit, index[without(index, lit.index)]
-
-    def _ordered(self) -> DrawnVoxels | None:
-        """Return the visible voxels, dark ones included, of items that may have an order."""
-        drawn = self._raster.visible
-        if drawn and (drawn.kinds == Kind.SET).any():
-            drawn = drawn.select((drawn.kinds != Kind.SET)[drawn.item])
-        return drawn
-
-    def _palette_blocks(self, old: NDArray[np.uint8], config: EncoderConfig) -> OpBlocks | None:
-        """Return op blocks that set the entries that differ from another palette, or None."""
-        if self._palette and len(entries := self._palette.entries_differing(old)):
-            return color_blocks(entries, self._palette.colors, config)
-        return None
-
-
-_NO_INDICES = np.empty(0, dtype=np.int64)
-
-
-def _corner_rows(sequence: voxelization.Sequence) -> NDArray[np.int64]:
-    """Return the rows of voxels at which a curve has its corners."""
-    breaks = sequence.curve.breaks
-    if not len(breaks) or len(sequence) < 2:
-        return _NO_INDICES
-    behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
-    before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)
-    return np.unique(behind - before)
