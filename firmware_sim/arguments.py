@@ -2,9 +2,10 @@
 
 import argparse
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from firmware_sim.config import (
     FEATURES,
@@ -18,7 +19,7 @@ from firmware_sim.config import (
 )
 from firmware_sim.faults import KINDS, forms, parse_faults
 from firmware_sim.memory import FORMATS
-from firmware_sim.quoting import excerpt
+from firmware_sim.quoting import excerpt, printable
 
 _EXAMPLES: Final = """\
 examples:
@@ -46,6 +47,28 @@ faults (--fault), joined by commas:
   up. limits a fault to the direction to the device, or from it: up.lose=0.01. Without it a fault
   applies to both directions, but reboot and unplug to that to the device.
 """
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that reports help which cannot be written, and whose messages steer no terminal."""
+
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; exit with code 2 if it cannot be written."""
+        out = sys.stdout if file is None else file
+        if out is None:  # the process was started without one
+            return
+        try:
+            out.write(self.format_help())
+            out.flush()
+        except BrokenPipeError:  # whoever reads it has seen enough
+            sys.stdout = None
+        except (OSError, ValueError) as error:
+            sys.stdout = None  # or what it still holds would be written at the end, and fail again
+            self.error(f"the help cannot be written: {getattr(error, 'strerror', None) or error}")
+
+    def error(self, message: str) -> NoReturn:
+        """Print a message and exit with code 2."""
+        super().error(printable(message))
 
 
 def parse_arguments(argv: list[str] | None) -> tuple[argparse.ArgumentParser, argparse.Namespace]:
@@ -87,7 +110,7 @@ def format_address(address: tuple[Any, ...]) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     default = Config()
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="voxdisplay-sim",
         usage="%(prog)s [OPTION]...",
         description="Emulate a volumetric display.\n\nThe first line of output is a JSON object "

@@ -17,6 +17,7 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
 from firmware_sim.npy import write_npy
+from firmware_sim.quoting import printable
 from firmware_sim.serve import (
     listen_tcp,
     open_pty,
@@ -157,4 +158,4 @@ def _announce(place: dict[str, str]) -> None:
 def _note(text: str) -> None:
     if sys.stderr is not None:
         with contextlib.suppress(OSError, ValueError):
-            sys.stderr.write(f"voxdisplay-sim: {text}\n")
+            sys.stderr.write(f"voxdisplay-sim: {printable(text)}\n")

@@ -108,3 +108,15 @@ def test_an_endless_curve_is_refused(run, scene):
     done = run("push", scene(helix), "--port", "sim:?size=16x16x16")
     assert done.returncode == 2
     assert "too long" in done.stderr
+
+
+def test_a_view_notes_what_the_other_commands_note(run, scene):
+    """In a terminal, where a view ends at once: this is none."""
+    done = run("view", "--terminal", scene(scene_of("30 + 20*sin(t)/t", [-6, 6])))
+    assert "$.objects[1]" in done.stderr
+    assert "y has no value at t = 0.0, and is drawn with its limit there" in done.stderr
+    done = run("view", "--terminal", scene(scene_of("30 + 20*t/abs(t)", [-6, 6])))
+    assert "jumps" in done.stderr
+    done = run("view", "--terminal", scene(scene_of("30 + 1/(t - 0.25)", [-6, 6])))
+    assert done.returncode == 2
+    assert "shorten the range of t" in done.stderr

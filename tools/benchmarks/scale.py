@@ -47,8 +47,12 @@ def knot(side: int) -> dict[str, Any]:
     }
 
 
-def pushed(side: int, pixels: str, repeats: int) -> tuple[float, int, int, int]:
-    """Push a knot cold; return median seconds, and peak bytes: together, driver, and emulator."""
+def pushed(side: int, pixels: str, repeats: int) -> tuple[float, float, int, int, int]:
+    """Push a knot cold.
+
+    Returns medians in seconds by the clock and of the processor, and peak memory in bytes: of both
+    in one process, of the driver, and of the emulator.
+    """
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder, "knot.json")
         scene.write_text(json.dumps(knot(side)))
@@ -59,15 +63,19 @@ def pushed(side: int, pixels: str, repeats: int) -> tuple[float, int, int, int]:
         with subprocess.Popen(command, stdout=subprocess.PIPE) as emulator:
             assert emulator.stdout is not None  # noqa: S101 - it is a pipe
             try:
-                _, driver = measured_push(scene, json.loads(emulator.stdout.readline())["port"])
+                *_, driver = measured_push(scene, json.loads(emulator.stdout.readline())["port"])
                 other = peak_of(emulator.pid)
             finally:
                 emulator.terminate()
-    return statistics.median(run[0] for run in runs), max(run[1] for run in runs), driver, other
+    seconds, work_s, peaks = zip(*runs, strict=True)
+    return statistics.median(seconds), statistics.median(work_s), max(peaks), driver, other
 
 
-def measured_push(scene: Path, port: str) -> tuple[float, int]:
-    """Push a scene in a process of its own; return seconds and its peak memory in bytes."""
+def measured_push(scene: Path, port: str) -> tuple[float, float, int]:
+    """Push a scene in a process of its own.
+
+    Returns seconds by the clock and of the processor, and peak memory in bytes.
+    """
     command = [sys.executable, "-m", "voxdisplay", "push", str(scene), "--port", port]
     began_s = time.perf_counter()
     # wait4 reports the memory of this child alone; what it says goes to our stderr.
@@ -77,7 +85,7 @@ def measured_push(scene: Path, port: str) -> tuple[float, int]:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise RuntimeError(f"push to {port} ended with {process.returncode}")
-    return seconds, usage.ru_maxrss << 10
+    return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss << 10
 
 
 def peak_of(process: int) -> int:
@@ -117,11 +125,11 @@ def frames(
     def watched(method: Any) -> Any:
         def timed(*arguments: Any) -> Any:
             nonlocal in_emulator
-            began_s = time.perf_counter()
+            began_s = time.process_time()
             try:
                 return method(*arguments)
             finally:
-                in_emulator += time.perf_counter() - began_s
+                in_emulator += time.process_time() - began_s
 
         return timed
 
@@ -130,12 +138,12 @@ def frames(
     whole, emulator = [], []
     with vd.open(f"sim:?size={side}x{side}x{side}&format={pixels}&refresh=0") as display:
         for number in range(count + 2):
-            in_emulator, began_s = 0.0, time.perf_counter()
+            in_emulator, began_s = 0.0, time.process_time()
             frame = display.frame()
             for voxels in curves:
                 frame.draw(voxels + number % _MOVES, "orange")
             display.present(frame)
-            whole.append(time.perf_counter() - began_s)
+            whole.append(time.process_time() - began_s)
             emulator.append(in_emulator)
     return {
         "voxels": sum(map(len, curves)),
@@ -156,17 +164,17 @@ def frames_apart(*case: object) -> dict[str, float]:
 def bench_scale(repeats: int, *, quick: bool = False) -> None:
     """Print the tables."""
     sides, lits = ((32, 48), (200,)) if quick else (SIDES, LIT)
-    head = f"{'push from a cold start':<24}{'s':>7}{'ratio':>7}{'peak MB':>9}"
+    head = f"{'push from a cold start':<24}{'s':>7}{'work s':>8}{'ratio':>7}{'peak MB':>9}"
     print(f"{head}{'driver':>8}{'emulator':>10}")
     for pixels in FORMATS:
         first = 0.0
         for side in sides:
-            seconds, *peaks = pushed(side, pixels, 1 if quick else repeats)
-            first = first or seconds
+            seconds, work_s, *peaks = pushed(side, pixels, 1 if quick else repeats)
+            first = first or work_s
             both, driver, emulator = (peak / _MEGABYTE for peak in peaks)
             print(
-                f"{f'{side}^3 {pixels}':<24}{seconds:7.2f}{seconds / first:7.2f}{both:9.0f}"
-                f"{driver:8.0f}{emulator:10.0f}",
+                f"{f'{side}^3 {pixels}':<24}{seconds:7.2f}{work_s:8.2f}{work_s / first:7.2f}"
+                f"{both:9.0f}{driver:8.0f}{emulator:10.0f}",
                 flush=True,
             )
     for spread in (False, True):

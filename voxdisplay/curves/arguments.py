@@ -114,7 +114,8 @@ def points(name: str, value: ArrayLike, *, least: int) -> Floats:
     empty = isinstance(value, list | tuple) and not value
     numbers = array(name, np.empty((0, 3)) if empty else value, (None, 3))
     if len(numbers) < least:
-        raise ArgumentError(name, f"has {len(numbers)} of at least {least} points")
+        found = "1 point" if len(numbers) == 1 else f"{len(numbers)} points"
+        raise ArgumentError(name, f"has {found}, at least {least} are needed")
     return numbers
 
 

@@ -254,7 +254,8 @@ class Frame:
         ----------
         array : ndarray
             The display's memory, indexed [z, y, x]: (nz, ny, nx) uint8 for mono1 and index8,
-            uint16 for rgb565; (nz, ny, nx, 3) uint8 for rgb888.
+            uint16 for rgb565; (nz, ny, nx, 3) uint8 for rgb888. Lists of whole numbers are taken
+            if they fit.
 
         Raises
         ------
@@ -262,7 +263,9 @@ class Frame:
             If shape, type or a mono1 value is another; the message says what is wanted.
 
         """
-        array = as_array("array", array)
+        given, array = array, as_array("array", array)
+        if not hasattr(given, "dtype"):
+            array = self.format.from_integers(array)
         self.format.validate(array, self.grid.array_shape)
         pixels: Pixels = np.array(array, order="C").reshape(self.format.shape((self.grid.voxels,)))
         self._raster.set(pixels)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import enum
 import reprlib
+from collections.abc import Hashable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,17 @@ Values = NDArray[np.uint32]
 Pixels = NDArray[np.uint8 | np.uint16]
 
 
-class PixelFormat(enum.Enum):
+class _PixelFormatType(enum.EnumMeta):
+    """Lookup by value that never compares arrays with names."""
+
+    def __call__(cls, value: object, *names: Any, **settings: Any) -> Any:
+        """Return the member of a value; see `enum.EnumMeta.__call__`."""
+        if not isinstance(value, Hashable):  # an array, whose comparison is no truth value
+            cls._missing_(value)
+        return super().__call__(value, *names, **settings)
+
+
+class PixelFormat(enum.Enum, metaclass=_PixelFormatType):
     """Pixel format of a display; values are the names of the command line."""
 
     MONO1 = "mono1"
@@ -156,6 +168,21 @@ class PixelFormat(enum.Enum):
         if self is PixelFormat.MONO1 and (array.astype(np.uint8) > 1).any():
             raise ValueError("a mono1 frame has only 0 and 1: write (array > 0).astype('uint8')")
 
+    def from_integers(self, array: NDArray[np.generic]) -> NDArray[np.generic]:
+        """Return integers or truth values as elements of this format, where all of them fit.
+
+        For numbers that have no width of their own, such as those of a list. Others are returned
+        as they are.
+        """
+        return array.astype(self.dtype) if self._holds(array) else array
+
+    def _holds(self, array: NDArray[np.generic]) -> bool:
+        """Return whether all elements of an array are integers that this format can hold."""
+        if array.dtype.kind not in "iub":
+            return False
+        top = 1 if self is PixelFormat.MONO1 else int(np.iinfo(self.dtype).max)
+        return not array.size or 0 <= int(array.min()) <= int(array.max()) <= top
+
     def _fitting(self, array: NDArray[np.generic], array_shape: tuple[int, int, int]) -> str:
         """Return how an array of another shape becomes pixels of this format, if it is a volume."""
         if array.ndim != 3 or array.dtype.kind not in "fiub":
@@ -165,10 +192,7 @@ class PixelFormat(enum.Enum):
 
     def _conversion(self, array: NDArray[np.generic]) -> str:
         """Return how an array of another type becomes pixels of this format."""
-        top = 1 if self is PixelFormat.MONO1 else int(np.iinfo(self.dtype).max)
-        if array.dtype.kind in "iub" and (
-            not array.size or 0 <= int(array.min()) <= int(array.max()) <= top
-        ):
+        if self._holds(array):
             return f"convert it with array.astype('{self.dtype.__name__}')"
         if self is PixelFormat.MONO1:
             return (

@@ -55,6 +55,15 @@ def as_open_error(port: str, error: BaseException) -> OpenError:
         return _url_error(port, error)
     number = _errno(error)
     path = _device_path(port)
+    for cause in _causes(error):
+        file = getattr(cause, "filename", None)
+        if "://" in port and isinstance(file, str) and file != path:  # the one that spy:// writes
+            reason = getattr(cause, "strerror", cause)
+            return OpenError(
+                f"{port} cannot be opened: {file} cannot be written: {reason}",
+                port=port,
+                hint="take another path behind file=",
+            )
     if number in {errno.EACCES, errno.EPERM}:
         return _permission_error(port, path)
     if number in {errno.EBUSY, errno.EAGAIN} or "PermissionError" in str(error):

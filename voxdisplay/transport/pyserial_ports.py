@@ -100,7 +100,11 @@ def open_port(port: str, *, baud: int, timeout_s: float, reset: bool) -> Any:
         line.exclusive = True
     if not reset:
         _keep_modem_lines(line)
-    line.open()
+    try:
+        line.open()
+    except BaseException:
+        close_port(line)  # the file of spy:// is open
+        raise
     _OPEN_PORTS.add(line)
     if not reset and isinstance(line, serial.Serial) and sys.platform != "win32":
         with contextlib.suppress(*LIBRARY_ERRORS):

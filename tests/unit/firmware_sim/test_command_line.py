@@ -1,6 +1,8 @@
 """``voxdisplay-sim``: output, arguments, signals, and a hostile environment."""
 
 import contextlib
+import errno
+import io
 import json
 import os
 import resource
@@ -289,6 +291,70 @@ sys.exit(main())
 def test_closed_output_does_not_stop_the_program(redirection: str) -> None:
     done = run_with(redirection, "--size", "3x5x7")
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["--nosuch\x1b[2J\x07"], 2, "unrecognized arguments: --nosuch\\x1b[2J\\x07"),
+        (["--link", "/nowhere/\x1b[2J\nx"], 2, "link /nowhere/\\x1b[2J\n"),
+        (["--dump", "/nowhere/\x9b2J\u202e"], 2, "/nowhere/\\x9b2J\\u202e cannot be written"),
+        (["--size", "\x1b]0;title\x07"], 2, "\\x1b]0;title"),
+        (["--tcp", "\x1b[2J:99"], 2, "x1b[2J"),
+    ],
+)
+def test_words_of_the_command_line_steer_no_terminal(
+    words: list[str], code: int, said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(words) == code
+    told = capfd.readouterr().err
+    assert said in told
+    assert all(c.isprintable() or c == "\n" for c in told)
+
+
+class Pipe(io.StringIO):
+    """An output that takes nothing."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self.error = error
+
+    def flush(self) -> None:
+        raise self.error
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), 2, "No space left on device"),
+        (ValueError("I/O operation on closed file"), 2, "I/O operation on closed file"),
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), 0, ""),
+    ],
+)
+def test_help_that_cannot_be_written(
+    error: Exception,
+    code: int,
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, "stdout", Pipe(error))
+    assert exit_code(["--help"]) == code
+    told = capsys.readouterr().err
+    assert (f"the help cannot be written: {said}" in told) if said else not told
+
+
+def test_help_without_an_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    assert exit_code(["--help"]) == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no /dev/full here")
+def test_help_to_a_full_disk_fails() -> None:
+    done = run_with(">/dev/full", "--help")
+    assert done.returncode == 2
+    assert done.stderr.endswith("the help cannot be written: No space left on device\n")
+    assert "Exception ignored" not in done.stderr
 
 
 @pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no /dev/full here")

@@ -6,6 +6,7 @@ import document
 import numpy as np
 import pytest
 
+import voxdisplay as vd
 from voxdisplay.raster.pixel_format import PixelFormat
 
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)
@@ -103,3 +104,33 @@ def test_mono1_has_only_0_and_1():
     array[1, 2, 0] = 2
     with pytest.raises(ValueError, match="only 0 and 1"):
         PixelFormat.MONO1.validate(array, (7, 5, 3))
+
+
+def test_no_array_is_a_format():
+    for value in (np.zeros(3), [1], {"mono1"}, 5, (np.zeros(3),)):
+        with pytest.raises(ValueError, match="expected one of mono1, index8, rgb565, rgb888"):
+            PixelFormat(value)
+    assert PixelFormat(np.str_("mono1")) is PixelFormat.MONO1
+
+
+@FORMATS
+def test_lists_of_numbers_that_fit_are_pixels(format_):
+    frame = vd.Frame((3, 5, 7), format_)
+    top = np.iinfo(format_.dtype).max if format_ is not PixelFormat.MONO1 else 1
+    picture = np.zeros(format_.shape((7, 5, 3)), dtype=int)
+    picture[6, 0, 2] = top
+    frame.set(picture.tolist())
+    assert frame.array().dtype == format_.dtype
+    assert (frame.array() == picture).all()
+    frame.set(tuple(map(tuple, (picture > 0).tolist())))
+    assert (frame.array() == (picture > 0)).all()
+    for wrong in (top + 1, -1, 0.5, 1 << 70):
+        spoilt = picture.tolist()
+        if format_ is PixelFormat.RGB888:
+            spoilt[0][0][0][1] = wrong
+        else:
+            spoilt[0][0][0] = wrong
+        with pytest.raises(ValueError, match="the array is"):
+            frame.set(spoilt)
+    with pytest.raises(ValueError, match="convert it"):
+        frame.set(picture)  # whoever chose a type is told that it is another

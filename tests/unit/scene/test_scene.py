@@ -252,7 +252,7 @@ class TestMistakes:
             ),
             ({"type": "points"}, "$", "either the key 'points' or the key 'file'", None),
             ({"type": "points", "points": [], "file": "a.csv"}, "$", "either", None),
-            ({"type": "points", "points": []}, "$.points", "0 of at least 1", None),
+            ({"type": "points", "points": []}, "$.points", "0 points, at least 1", None),
             ({"type": "points", "file": "a.csv"}, "$.file", "no folder", None),
             ({"objects": [], "params": {"a": "b"}}, "$.params.a", "unknown name 'b'", None),
             ({"objects": [], "params": {"a": None}}, "$.params.a", "a number", None),

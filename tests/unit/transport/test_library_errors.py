@@ -182,6 +182,20 @@ def test_names_that_the_libraries_stumble_over(port):
     assert refused.value.port == port
 
 
+def test_the_file_that_spy_cannot_write_is_named(tmp_path):
+    """It is not the port that is missing."""
+    with Plug(tmp_path / "port") as plug:
+        plug.plug()
+        port = f"spy://{plug.path}?file={tmp_path}/none/traffic.txt"
+        with pytest.raises(OpenError, match=r"none/traffic\.txt cannot be written: No such file"):
+            open_transport(port)
+        with pytest.raises(OpenError, match="cannot be written: Is a directory") as refused:
+            open_transport(f"spy://{plug.path}?file={tmp_path}")
+    assert refused.value.hint == "take another path behind file="
+    with pytest.raises(OpenError, match="does not exist"):
+        open_transport(f"spy://{plug.path}-none?file={tmp_path}/traffic.txt")
+
+
 @pytest.mark.parametrize("port", ["rfc2217://", "rfc2217://h", "rfc2217://h:x", "rfc2217://:4000"])
 def test_a_url_without_host_or_port(port):
     with pytest.raises(OpenError, match="does not name a host and a port") as refused:
