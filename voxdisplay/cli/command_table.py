@@ -27,7 +27,7 @@ class TableEntry(NamedTuple):
 # In the order of the help, by heading.
 COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
     "Show on a display": {
-        "push": TableEntry("push", "push", "Show a scene and prove that it is shown."),
+        "push": TableEntry("push", "push", "Show a scene or model and prove that it is shown."),
         "test-pattern": TableEntry(
             "test_pattern", "test_pattern", "Show a pattern that tells the axes apart."
         ),
@@ -39,7 +39,7 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
             "device_commands", "info", "Print size, format and features of a display."
         ),
         "read": TableEntry(
-            "device_commands", "read", "Save what a display shows as a numpy array."
+            "device_commands", "read", "Save what a display shows as a file of voxels."
         ),
         "view": TableEntry("view", "view", "Show a display live, in a browser or this terminal."),
         "bench": TableEntry("bench", "bench", "Measure the speed of this machine and a port."),
@@ -47,6 +47,9 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
     "Work without a display": {
         "voxelize": TableEntry("voxelize", "voxelize", "Write the voxels of a scene's curves."),
         "preview": TableEntry("preview", "preview", "Draw a scene as a picture or a film."),
+        "convert": TableEntry(
+            "convert", "convert", "Write the voxels of a scene or model for other programs."
+        ),
         "plan": TableEntry("plan", "plan_command", "Print bytes and frames per second of a scene."),
         "schema": TableEntry(
             "document_paths", "schema", "Print the path of the JSON Schema of scenes."

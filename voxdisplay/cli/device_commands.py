@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from voxdisplay.cli.image_output import cannot_write
 from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
 from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout
 
@@ -81,7 +80,7 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
     epilog="""\b
     Examples:
       voxdisplay read --port /dev/ttyUSB0 -o page.npy
-      voxdisplay read --port usb: -o page.npy --json
+      voxdisplay read --port usb: -o page.vox --json
     """
 )
 @port_options
@@ -90,25 +89,22 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
     "--output",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE.npy",
-    help="File to write: a numpy array, indexed [z, y, x].",
+    metavar="FILE",
+    help="File to write: .npy, a numpy array indexed [z, y, x]; .npz, voxels and colors; .vox, "
+    "for voxel editors; or .ply, a mesh.",
 )
 @quiet_option
 @json_option
 def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_json: bool) -> None:
     """Save what a display shows, read back from its memory."""
-    import numpy as np  # noqa: PLC0415 - help starts without it
+    from voxdisplay.cli.voxel_output import check_suffix, save_voxels  # noqa: PLC0415 - help starts without numpy
 
-    if output.suffix != ".npy":
-        raise click.BadParameter(f"{output} should end in .npy", param_hint="--output")
+    check_suffix(output)
     with open_display(port, baud, timeout_s) as display:
         array = display.read()
         device, name = device_json(display.info), display.port
-    try:
-        np.save(output, array)
-    except OSError as failure:
-        raise cannot_write(output, failure) from failure
-    lit = int(np.count_nonzero(array.any(axis=-1) if array.ndim == 4 else array))
+        format_ = display.info.format
+    lit = save_voxels(output, array, format_)
     if as_json:
         print_json({"port": name, "device": device, "output": str(output), "voxels": lit})
     else:

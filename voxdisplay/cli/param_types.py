@@ -35,6 +35,43 @@ _MIN_SIDE_PX, _MAX_SIDE_PX = 16, 4096
 _MAX_SIDE: Final = 0xFFFF  # voxels, protocol.md, section 2
 
 
+class NumbersType(ParamType[tuple[float, ...]]):
+    """Numbers that are separated by commas.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    example : str
+        A value that is allowed.
+    kind : type
+        int or float.
+
+    """
+
+    name = "numbers"
+
+    def __init__(self, count: int, example: str, kind: type[float]) -> None:
+        self._count = count
+        self._example = example
+        self._kind = kind
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Return a tuple of numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(self._kind(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != self._count:
+            self.fail(f"{value!r} should be {self._count} numbers, such as {self._example}",
+                      param, ctx)  # fmt: skip
+        return numbers
+
+
 class RangeType(ParamType[float]):
     """A number within limits, which are named in errors alone: help texts name them where needed.
 

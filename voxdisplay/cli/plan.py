@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.model_files import ModelOptions, load_shown, model_options
 from voxdisplay.cli.options import (
     DEFAULT_SIZE_TEXT,
     baud_option,
@@ -70,6 +71,7 @@ _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what
     "none.  [default: the port's, else all]",
 )
 @fit_option
+@model_options
 @quiet_option
 @json_option
 def plan_command(
@@ -81,6 +83,7 @@ def plan_command(
     format_: str | None,
     features: tuple[str, ...] | None,
     fit: Fit,
+    model: ModelOptions,
     as_json: bool,
 ) -> None:
     """Print how many packets and bytes SCENE takes, and how many frames per second a line carries.
@@ -91,7 +94,7 @@ def plan_command(
     from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415 - as in push
     from voxdisplay.display.plan import COMMON_LINES, Line, Receiver, plan  # noqa: PLC0415
 
-    loaded = vd.load_scene(scene)
+    loaded = load_shown(scene, model)
     grid, kind, receiver = loaded.size or vd.Grid(128, 128, 128), "rgb888", Receiver()
     if port:
         info, baud = _ask(port, baud)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.model_files import ModelOptions, load_shown, model_options
 from voxdisplay.cli.options import (
     DEFAULT_SIZE_TEXT,
     display_size_option,
@@ -76,6 +77,7 @@ _MAX_PIXELS: Final = 1 << 29
     help="Pixel format of the display.  [default: rgb888]",
 )
 @fit_option
+@model_options
 @click.option(
     "--seconds",
     type=RangeType("seconds", 0.1, 60, "4"),
@@ -102,6 +104,7 @@ def preview(
     size: Grid | None,
     format_: str,
     fit: Fit,
+    model: ModelOptions,
     seconds: float,
     fps: float,
     plain: bool,
@@ -122,7 +125,7 @@ def preview(
             "smaller, or fewer by --fps or --seconds",
             param_hint="--pixels",
         )
-    fitted, grid = load_fitted_scene(scene, size, fit)
+    fitted, grid = load_fitted_scene(load_shown(scene, model), size, fit)
     frame = vd.Frame(grid, format_)
     draw_scene(fitted, frame)
     options = RenderOptions(size=size_px, glow=not plain, axes=not plain)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TextIO
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.model_files import ModelOptions, load_shown, model_options
 from voxdisplay.cli.options import (
     capture_option,
     fit_option,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 @scene_argument()
 @port_options
 @fit_option
+@model_options
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
 @image_file_option(
     "--preview",
@@ -64,6 +66,7 @@ def push(
     baud: Baud,
     timeout_s: float,
     fit: Fit,
+    model: ModelOptions,
     verify: bool,
     preview: Path | None,
     reconnect_s: float,
@@ -82,7 +85,7 @@ def push(
 
     if preview:
         import voxdisplay.view.picture  # noqa: F401, PLC0415 - an extra: missed before all else
-    loaded = vd.load_scene(scene)
+    loaded = load_shown(scene, model)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
     with close_on_exit(display, on_exit):
         fitted = fit_scene(loaded, display.info.grid, fit)

@@ -9,6 +9,7 @@ import voxdisplay as vd
 from voxdisplay.cli.output import note
 
 if TYPE_CHECKING:
+    from voxdisplay.cli.model_files import ModelFile
     from voxdisplay.frame import Fit
     from voxdisplay.scene.item import SceneItem
 
@@ -74,14 +75,13 @@ def _remarks(found: vd.Sequence | vd.VoxelSet | vd.Drawing) -> Iterator[str]:
 
 
 def load_fitted_scene(
-    path: str, grid: vd.Grid | None, fit: Fit = "contain"
+    scene: vd.Scene | ModelFile, grid: vd.Grid | None, fit: Fit = "contain"
 ) -> tuple[vd.Scene, vd.Grid]:
-    """Read a scene and fit it to a grid.
+    """Fit a scene to a grid.
 
     Parameters
     ----------
-    path : str
-        A file, or ``-`` for stdin.
+    scene : Scene or ModelFile
     grid : Grid or None
         None: the size for which the scene was composed, else 128x128x128.
     fit : {"contain", "none", "content"}
@@ -92,12 +92,11 @@ def load_fitted_scene(
     grid : Grid
 
     """
-    scene = vd.load_scene(path)
     grid = grid or scene.size or vd.Grid(128, 128, 128)
     return fit_scene(scene, grid, fit), grid
 
 
-def fit_scene(scene: vd.Scene, grid: vd.Grid, fit: Fit) -> vd.Scene:
+def fit_scene(scene: vd.Scene | ModelFile, grid: vd.Grid, fit: Fit) -> vd.Scene:
     """Fit a scene to a grid, and note the change."""
     fitted, remark = scene.fitted(grid, fit)
     if remark:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 import voxdisplay as vd
+from voxdisplay.cli.model_files import ModelOptions, load_shown
 from voxdisplay.cli.options import (
     display_size_option,
     open_display,
@@ -185,7 +186,7 @@ class _ReadbackDisplay:
 def _scene_frame(scene: str, size: vd.Grid | None) -> vd.Frame:
     from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
 
-    fitted, grid = load_fitted_scene(scene, size)
+    fitted, grid = load_fitted_scene(load_shown(scene, ModelOptions()), size)
     frame = vd.Frame(grid)
     draw_scene(fitted, frame)
     return frame
