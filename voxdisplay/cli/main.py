@@ -17,6 +17,7 @@ from voxdisplay.cli.signals import (
     report_termination,
 )
 from voxdisplay.errors import (
+    BodyError,
     CurveError,
     MissingExtra,
     ProtocolError,
@@ -35,6 +36,7 @@ EXIT_INTERNAL: Final = 70
 _EXIT_CODES: tuple[tuple[type[VoxDisplayError], int], ...] = (
     (SceneError, EXIT_USAGE),
     (CurveError, EXIT_USAGE),
+    (BodyError, EXIT_USAGE),
     (MissingExtra, EXIT_USAGE),
     (TransportError, EXIT_PIPE),
     (ProtocolError, EXIT_PROTOCOL),

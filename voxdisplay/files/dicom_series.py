@@ -38,7 +38,7 @@ class _Slice(NamedTuple):
     window: tuple[float, float] | None
 
 
-def read_dicom(files: Iterable[tuple[str, bytes]]) -> VolumeSamples:
+def read_dicom(files: Iterable[tuple[str, bytes]], place: str = "the folder") -> VolumeSamples:
     """Read the slices of one series; of several series, that of the first file.
 
     Parameters
@@ -46,6 +46,8 @@ def read_dicom(files: Iterable[tuple[str, bytes]]) -> VolumeSamples:
     files : iterable of (str, bytes)
         Names and contents. Of several files those of other series, and those that are no images,
         are left out.
+    place : str
+        Where they are, for errors.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def read_dicom(files: Iterable[tuple[str, bytes]]) -> VolumeSamples:
     if unread:
         notes.append(f"{unread} other files in the folder left out")
     if not slices:
-        raise BodyError("there is no DICOM file")
+        raise BodyError(f"{place} is a directory without a DICOM image")
     return _stacked(slices, notes)
 
 

@@ -190,7 +190,7 @@ def _read_samples(
     if suffix == ".dcm":
         from voxdisplay.files.dicom_series import read_dicom  # noqa: PLC0415 - as is said above
 
-        return read_dicom(_series(path))
+        return read_dicom(_series(path), short_name(path))
     data = read_file(path)
     if suffix in {".nrrd", ".nhdr"}:
         from voxdisplay.files.nrrd_volume import read_nrrd  # noqa: PLC0415

@@ -102,13 +102,22 @@ def read_vox(name: str, data: bytes) -> ModelVoxels:
     return ModelVoxels(voxels.astype(np.int32), colors, tuple(notes))
 
 
-def _read_chunk(reader: ByteReader, contents: _Contents) -> None:
+def _next_chunk(reader: ByteReader) -> tuple[bytes, ByteReader]:
+    """Return the kind and the content of the next chunk, and move behind its content."""
     kind = reader.bytes(4, "the kind of a chunk")
     length, children = reader.integers(2, "the length of a chunk")
     what = f"chunk {kind.decode('latin-1')!a}"
     if children < 0:
         raise reader.error(f"{what} with children of {children} bytes")
     chunk = reader.part(length, what)
+    # The children of MAIN follow its own content, which is empty: they are read as its successors.
+    if kind == b"MAIN" and children > reader.left:
+        raise reader.error(f"all chunks are {children} bytes, of which {reader.left} are left,")
+    return kind, chunk
+
+
+def _read_chunk(reader: ByteReader, contents: _Contents) -> None:
+    kind, chunk = _next_chunk(reader)
     if kind == b"SIZE":
         size = np.array(chunk.integers(3, "the size of a model"), dtype=np.int64)
         if not ((size > 0) & (size <= _MAX_SIDE)).all():
@@ -128,7 +137,6 @@ def _read_chunk(reader: ByteReader, contents: _Contents) -> None:
         contents.nodes[number] = _NODES[kind](chunk, attributes.get("_hidden") == "1")
         if len(contents.nodes) > _MAX_NODES:
             raise reader.error(f"more than {_MAX_NODES} nodes")
-    # The children of MAIN follow its own content, which is empty: they are read as its successors.
 
 
 def _read_model(chunk: ByteReader, size: NDArray[np.int64] | None) -> _Model:

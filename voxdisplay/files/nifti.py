@@ -65,7 +65,14 @@ def read_nifti(name: str, data: bytes) -> VolumeSamples:
         with np.errstate(over="ignore", invalid="ignore"):
             raw *= float(slope or 1)
             raw += float(shift or 0)
-    affine = guarded(name, "its orientation", lambda: np.asarray(header.get_best_affine()))
+    # Without a code the axes are of no known orientation: as they are.
+    known = int(header["sform_code"]) or int(header["qform_code"])
+    sides = np.diag([*(float(side) or 1.0 for side in header.get_zooms()[:3]), 1.0])
+    affine = (
+        guarded(name, "its orientation", lambda: np.asarray(header.get_best_affine()))
+        if known
+        else sides
+    )
     turned, spacing, note = guarded(name, "its orientation",
                                     lambda: to_canonical(raw, affine[:3, :3]))  # fmt: skip
     notes = [note] if note else []

@@ -133,7 +133,7 @@ def read_binvox(name: str, data: bytes) -> ModelVoxels:
     if not 0 < cells <= 1 << 31:
         raise BodyError(f"{name}: {nx} x {nz} x {ny} cells")
     reader = ByteReader(name, data, len(head) + len(mark))
-    runs = reader.array(reader.left // 2, "u1", "runs").reshape(-1, 2)
+    runs = reader.array(reader.left // 2 * 2, "u1", "runs").reshape(-1, 2)
     ends = np.cumsum(runs[:, 1], dtype=np.int64)
     total = int(ends[-1]) if len(ends) else 0
     if total != cells or reader.left:

@@ -17,25 +17,25 @@ class ForeignFile(NamedTuple):
 
 
 _SCENES = "a scene is a JSON file; examples/ has some"
-_MESH = "a scene is a JSON file of objects; meshes are not among them"
+_MESH = "it is shown as it is if its name ends in %s"
 _POINTS = 'a scene of one object shows it: {"type": "points", "file": "%s"}'
 _BY_FIRST_BYTES = (
-    (b"glTF", "a glTF mesh", _MESH),
-    (b"ply\n", "a PLY mesh", _MESH),
-    (b"ply\r", "a PLY mesh", _MESH),
-    (b"OFF\n", "an OFF mesh", _MESH),
-    (b"OFF\r", "an OFF mesh", _MESH),
+    (b"glTF", "a glTF mesh", _MESH % ".glb"),
+    (b"ply\n", "a PLY mesh", _MESH % ".ply"),
+    (b"ply\r", "a PLY mesh", _MESH % ".ply"),
+    (b"OFF\n", "an OFF mesh", _MESH % ".off"),
+    (b"OFF\r", "an OFF mesh", _MESH % ".off"),
     (b"\x93NUMPY", "a numpy array", _POINTS % "points.npy"),
-    (b"VOX ", "a voxel model (.vox)", _SCENES),
-    (b"#binvox", "a voxel model (.binvox)", _SCENES),
-    (b"NRRD", "a volume (.nrrd)", _SCENES),
+    (b"VOX ", "a voxel model (.vox)", _MESH % ".vox"),
+    (b"#binvox", "a voxel model (.binvox)", _MESH % ".binvox"),
+    (b"NRRD", "a volume (.nrrd)", _MESH % ".nrrd"),
     (b"PK\x03\x04", "a ZIP archive (such as .3mf, .npz or .xlsx)", _SCENES),
     (b"\x1f\x8b", "compressed by gzip", "unpack it first"),
     (b"\x89PNG", "a picture", _SCENES),
     (b"\xff\xd8\xff", "a picture", _SCENES),
     (b"GIF8", "a picture", _SCENES),
-    (b"II*\0", "a TIFF picture", _SCENES),
-    (b"MM\0*", "a TIFF picture", _SCENES),
+    (b"II*\0", "a TIFF picture", _MESH % ".tif"),
+    (b"MM\0*", "a TIFF picture", _MESH % ".tif"),
     (b"%PDF", "a PDF document", _SCENES),
     (b"\x7fELF", "a program", _SCENES),
     (b"MZ", "a program", _SCENES),
@@ -61,9 +61,9 @@ def recognise(data: bytes) -> ForeignFile | None:
         return None
     faces = int.from_bytes(data[80:84], "little")
     if _STL.match(head) or (len(data) >= 84 and len(data) == 84 + 50 * faces):
-        return ForeignFile("an STL mesh", _MESH)
+        return ForeignFile("an STL mesh", _MESH % ".stl")
     if _OBJ.match(head):
-        return ForeignFile("an OBJ mesh", _MESH)
+        return ForeignFile("an OBJ mesh", _MESH % ".obj")
     if b"\0" in head:
         return ForeignFile("a binary file", _SCENES)
     if _NUMBERS.match(head):
