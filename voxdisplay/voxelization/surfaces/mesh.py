@@ -1,24 +1,24 @@
-"""Voxeliser of triangle meshes: shells by crossings with mid-lines, solids by columns along z."""
+"""Voxeliser of triangle meshes: shells by crossings with mid-lines, solids by columns."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from voxdisplay.voxelization.surfaces.midline_crossings import (
-    NEAR_FACE,
-    Crossings,
-    midline_crossings,
-)
-from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, SnappedMesh, snap
+from voxdisplay.voxelization.surfaces.lit_mask import lit_mask
+from voxdisplay.voxelization.surfaces.mesh_shell import mark_shell
+from voxdisplay.voxelization.surfaces.mesh_solid import solid_index
+from voxdisplay.voxelization.surfaces.mesh_topology import Topology, analyse
+from voxdisplay.voxelization.surfaces.snapped_mesh import snap
+from voxdisplay.voxelization.surfaces.thin_parts import mark_thin_parts
+from voxdisplay.voxelization.voxel_box import Triple, VoxelBox
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:
     from voxdisplay.bodies.body import Body
     from voxdisplay.bodies.geometry import TriangleMesh
-    from voxdisplay.compute.array_types import Bools, Ints
-    from voxdisplay.voxelization.voxel_box import VoxelBox
+    from voxdisplay.compute.array_types import Ints
 
 
 def voxelize_mesh(
@@ -30,50 +30,40 @@ def voxelize_mesh(
 ) -> VoxelSet:
     """Return the voxels of a mesh inside a box: see `body_voxelization.Voxeliser`."""
     mesh = snap(geometry, box)
-    mask = _solid(mesh, box) if body.kind == "solid" else _shell(mesh, box)
-    return VoxelSet(box, np.flatnonzero(mask), body.kind)
+    topology = analyse(mesh)
+    notes = list(_topology_notes(topology))
+    if body.kind == "solid":
+        index, more = solid_index(topology)
+        notes += more
+    else:
+        index = shell_index(topology, box.sides)
+    return VoxelSet(box, index, body.kind, notes=tuple(notes))
 
 
-def _shell(mesh: SnappedMesh, box: VoxelBox) -> Bools:
-    """Return the voxels nearest to the crossings with all mid-lines: (size,) bool."""
-    mask = np.zeros(box.size, dtype=bool)
-    stride = np.array([1, box.sides[0], box.sides[0] * box.sides[1]])
-    for axis in range(3):
-        along_u, along_v = (axis + 1) % 3, (axis + 2) % 3
-        side = box.sides[axis]
-        for crossings in midline_crossings(mesh, axis, box.sides):
-            level = _voxel_below(crossings)
-            inside = (level >= 0) & (level < side)
-            index = crossings.i * stride[along_u] + crossings.j * stride[along_v]
-            index += level * stride[axis]
-            mask[index[inside]] = True
-    return mask
+def _topology_notes(topology: Topology) -> Iterator[str]:
+    """Yield what is wrong with a mesh."""
+    if topology.doubled:
+        yield f"{topology.doubled} triangles that occur more than once were left out"
+    if topology.open_edges:
+        yield f"the mesh is not closed: {topology.open_edges} open edges"
+    elif not topology.oriented:
+        yield "the triangles do not agree on an outside"
 
 
-def _voxel_below(crossings: Crossings) -> Ints:
-    """Return floor(depth), exactly."""
-    depth = crossings.depth()
-    nearest = np.rint(depth)
-    level = np.floor(depth).astype(np.int64)
-    near = np.flatnonzero(np.abs(depth - nearest) < NEAR_FACE)
-    if near.size:
-        face = nearest[near].astype(np.int64)
-        level[near] = face - (crossings.side_of(face << SHIFT, near) < 0)
-    return level
-
-
-def _solid(mesh: SnappedMesh, box: VoxelBox) -> Bools:
-    """Return the voxels whose centres have a winding number other than 0: (size,) bool."""
-    nx, ny, nz = box.sides
-    change = np.zeros((nz + 1, ny, nx), dtype=np.int32)
-    for crossings in midline_crossings(mesh, 2, box.sides, half_open=True):
-        depth = crossings.depth() - 0.5
-        nearest = np.rint(depth)
-        level = np.ceil(depth).astype(np.int64)
-        near = np.flatnonzero(np.abs(depth - nearest) < NEAR_FACE)
-        if near.size:
-            face = nearest[near].astype(np.int64)
-            level[near] = face + (crossings.side_of((face << SHIFT) + HALF, near) > 0)
-        sign = np.where(crossings.upward, -1, 1)
-        np.add.at(change, (np.clip(level, 0, nz), crossings.j, crossings.i), sign)
-    return np.asarray(np.cumsum(change, axis=0)[:nz] != 0).reshape(-1)
+def shell_index(topology: Topology, sides: Triple) -> Ints:
+    """Return the scan-order indices, ascending, of the voxels of a shell in its mesh's box."""
+    if topology.mesh.is_within():
+        mask = lit_mask(sides)
+        mark_shell(mask, topology, sides)
+        mark_thin_parts(mask, topology)
+        return mask.index()
+    # Beyond the box too, so that clipping commutes with the search for thin parts.
+    nx, ny, nz = sides
+    topology = replace(topology, mesh=topology.mesh.expanded(1))
+    mask = lit_mask(topology.mesh.sides)
+    mark_shell(mask, topology, (nx + 1, ny + 1, nz + 1))
+    mark_thin_parts(mask, topology)
+    margin = VoxelBox((-1, -1, -1), (nx + 1, ny + 1, nz + 1))
+    voxels = margin.voxels_at(mask.index())
+    box = VoxelBox.of_grid(sides)
+    return box.index_of(voxels[box.inside(voxels)])

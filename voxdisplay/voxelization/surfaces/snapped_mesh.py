@@ -5,21 +5,24 @@ Must not know which voxels are lit.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from voxdisplay.bodies.geometry import TriangleMesh
-from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.compute.array_types import Bools, Ints
 from voxdisplay.errors import BodyError
-from voxdisplay.voxelization.voxel_box import VoxelBox
+from voxdisplay.voxelization.voxel_box import Triple, VoxelBox
 
 SHIFT = 16
-"""Binary digits of a voxel: products of three coordinates' differences fit into int64."""
+"""Binary digits of a voxel: products of two differences of coordinates fit into int64."""
 UNIT = 1 << SHIFT
 HALF = UNIT >> 1
-LIMIT = 1 << 14
+LIMIT = (1 << 14) - 2
 """Coordinates that are further than this from the box, in voxels, are refused."""
+TRIANGLES_PER_BLOCK = 1 << 13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,15 +31,39 @@ class SnappedMesh:
 
     Attributes
     ----------
-    points : (3, V) int64 array
+    points : (3, V) int32 array
         Rows x, y, z, in units of 2^-16 voxel, from the low corner of the box.
-    faces : (3, F) int64 array
+    faces : (F, 3) int64 array
         Indices of the three corners of each triangle.
+    sides : (int, int, int)
+        Numbers of voxels of the box along x, y and z.
 
     """
 
-    points: Ints
+    points: NDArray[np.int32]
     faces: Ints
+    sides: Triple
+
+    def blocks(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the number of the first triangle, and the corners, (3, n), of all in blocks."""
+        for begin in range(0, len(self.faces), TRIANGLES_PER_BLOCK):
+            yield begin, self.faces[begin : begin + TRIANGLES_PER_BLOCK].T.copy()
+
+    def is_within(self) -> bool:
+        """Return whether all vertices are inside the box or on its walls."""
+        return all(
+            int(row.min()) >= 0 and int(row.max()) <= side << SHIFT
+            for row, side in zip(self.points, self.sides, strict=True)
+        )
+
+    def expanded(self, margin: int) -> SnappedMesh:
+        """Return the mesh relative to a box with so many more voxels on all sides."""
+        nx, ny, nz = (side + 2 * margin for side in self.sides)
+        return SnappedMesh(self.points + np.int32(margin << SHIFT), self.faces, (nx, ny, nz))
+
+    def without(self, dropped: Bools) -> SnappedMesh:
+        """Return the mesh without some triangles, by a mask (F,)."""
+        return SnappedMesh(self.points, self.faces[~dropped], self.sides)
 
 
 def snap(mesh: TriangleMesh, box: VoxelBox) -> SnappedMesh:
@@ -48,15 +75,17 @@ def snap(mesh: TriangleMesh, box: VoxelBox) -> SnappedMesh:
         If a vertex is further than `LIMIT` voxels from the box's low corner.
 
     """
-    scaled: Floats = (mesh.vertices - np.array(box.low)) * UNIT
-    if scaled.size and np.abs(scaled).max() >= LIMIT * UNIT:
-        far = int(np.argmax(np.abs(scaled).max(axis=1)))
-        x, y, z = mesh.vertices[far].tolist()
-        raise BodyError(
-            f"vertex {far} at ({x:.6g}, {y:.6g}, {z:.6g}) is more than {LIMIT} voxels away",
-            hint="scale the mesh, or fit it into the display",
-        )
-    return SnappedMesh(
-        np.ascontiguousarray(np.rint(scaled).astype(np.int64).T),
-        np.ascontiguousarray(mesh.faces.T),
-    )
+    points = np.empty((3, len(mesh.vertices)), dtype=np.int32)
+    for axis in range(3):
+        scaled = mesh.vertices[:, axis] - box.low[axis]
+        scaled *= UNIT
+        np.rint(scaled, out=scaled)
+        if max(-scaled.min(), scaled.max()) > LIMIT * UNIT:
+            far = int(np.argmax(np.abs(scaled)))
+            x, y, z = mesh.vertices[far].tolist()
+            raise BodyError(
+                f"vertex {far} at ({x:.6g}, {y:.6g}, {z:.6g}) is more than {LIMIT} voxels away",
+                hint="scale the mesh, or fit it into the display",
+            )
+        points[axis] = scaled
+    return SnappedMesh(points, mesh.faces, box.sides)

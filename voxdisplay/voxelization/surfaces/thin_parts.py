@@ -1,0 +1,296 @@
+"""Voxels for parts of a mesh that pass between all mid-lines: tubes, needles, grains.
+
+The crossings with mid-lines alone lose what is thinner than a voxel. A dual face is a unit square
+between four voxel centres, a dual cell a unit cube between eight. Where an edge of the mesh meets a
+dual face without a lit corner, the corner nearest to such a meeting is lit; where all of a part is
+inside a dual cell without a lit corner, the corner nearest to its middle. Then every point of the
+mesh is in a dual cell with a lit corner, so within 1 of its centre in max norm, and the voxels of
+each connected part are 26-connected. Edges between coplanar triangles do not count, so that it does
+not matter how flat parts are cut into triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.voxelization.surfaces.lit_mask import LitMask
+from voxdisplay.voxelization.surfaces.mesh_topology import Topology
+from voxdisplay.voxelization.surfaces.midline_crossings import TriangleBlock, triangle_blocks
+from voxdisplay.voxelization.surfaces.repeats import Repeats
+from voxdisplay.voxelization.surfaces.shape_edges import is_shape_edge
+from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, UNIT
+
+# Distances that differ by less are the same.
+SAME = 1e-9
+_AFTER = [1, 2, 0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EdgeCrossings:
+    """Crossings of edges with mid-planes of one axis.
+
+    Attributes
+    ----------
+    triangle, corner : (n,) int64 array
+        A triangle, and at which of its corners the edge begins.
+    plane : (n,) int64 array
+        Number of the mid-plane.
+
+    """
+
+    triangle: Ints
+    corner: Ints
+    plane: Ints
+
+
+def mark_thin_parts(mask: LitMask, topology: Topology) -> None:
+    """Light voxels for the parts of a mesh that its triangles' crossings miss.
+
+    Parameters
+    ----------
+    mask : LitMask
+        With the voxels of the triangles: see `mesh_shell.mark_shell`.
+    topology : Topology
+
+    """
+    dark: list[list[EdgeCrossings]] = [[], [], []]
+    for block in triangle_blocks(topology.mesh):
+        for axis in range(3):
+            found = dark_edge_crossings(mask, topology, block, axis)
+            if len(found.plane):
+                dark[axis].append(found)
+    places = [
+        place
+        for axis in range(3)
+        if dark[axis]
+        for place in _faces_to_light(mask, topology, axis, _joined(dark[axis]))
+    ]
+    for place in places:
+        mask.mark(place)
+    for block in triangle_blocks(topology.mesh):
+        if (grains := _grains(mask, block)) is not None:
+            mask.mark(_cells_to_light(mask, topology, *grains))
+
+
+def _joined(parts: list[EdgeCrossings]) -> EdgeCrossings:
+    return EdgeCrossings(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(parts[0])
+        )
+    )
+
+
+def dark_edge_crossings(
+    mask: LitMask, topology: Topology, block: TriangleBlock, axis: int
+) -> EdgeCrossings:
+    """Return the crossings of edges with mid-planes in dual faces whose nearest corner is dark."""
+    rows = np.flatnonzero(block.first[axis] <= block.last[axis])
+    u, v, w = (block.corners[(axis + k) % 3].take(rows, axis=1) for k in (1, 2, 0))
+    start, end = w, w[_AFTER]
+    low, high = start, end
+    if not topology.has_inside:  # else each edge ascends in one of its triangles
+        low, high = np.minimum(start, end), np.maximum(start, end)
+    first = np.maximum((low + (UNIT - 1 - HALF)) >> SHIFT, 0)
+    last = np.minimum((high - HALF) >> SHIFT, mask.sides[axis] - 1)
+    edge = np.flatnonzero((first <= last) & (low < high))
+    repeats = Repeats((last - first + 1).take(edge).astype(np.int64))
+    plane = repeats.ranges(first.take(edge).astype(np.int64))
+    begin = start.take(edge).astype(np.float64)
+    rise = end.take(edge) - begin
+    # From where the edge begins, so that steep slopes do no harm.
+    run = plane * float(UNIT) + repeats.of(HALF - begin)
+    columns = []
+    for each in (u, v):
+        base = each.take(edge).astype(np.float64)
+        slope = (each[_AFTER].take(edge) - base) / rise
+        found = run * repeats.of(slope)
+        found += repeats.of(base - HALF)
+        found *= 1 / UNIT
+        columns.append(np.rint(found).astype(np.int64))
+    dark = np.flatnonzero(~_is_lit(mask, axis, columns[0], columns[1], plane))
+    source = repeats.of(edge)[dark]
+    corner = source // len(rows) if len(rows) else source
+    triangle = rows.take(source - corner * len(rows)) + block.begin
+    return EdgeCrossings(triangle, corner, plane[dark])
+
+
+def _faces_to_light(
+    mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
+) -> Iterator[Ints]:
+    """Yield places of the corners to light in dual faces without a lit corner."""
+    mesh = topology.mesh
+    along_u, along_v = (axis + 1) % 3, (axis + 2) % 3
+    a = mesh.faces[crossings.triangle, crossings.corner]
+    b = mesh.faces[crossings.triangle, (crossings.corner + 1) % 3]
+    rise = mesh.points[axis].take(b).astype(np.int64) - mesh.points[axis].take(a)
+    run = (crossings.plane << SHIFT) + HALF - mesh.points[axis].take(a)
+    run, rise = np.where(rise < 0, -run, run), np.abs(rise)
+    i, s = _cell_and_fraction(mesh.points[along_u], a, b, run, rise)
+    j, t = _cell_and_fraction(mesh.points[along_v], a, b, run, rise)
+    corners = list(_corners(i, j, s, t))
+    lit = np.zeros(len(i), dtype=bool)
+    for p, q, _, exists in corners:
+        lit |= exists & _is_lit(mask, axis, p, q, crossings.plane)
+    rows = np.flatnonzero(~lit)
+    if not len(rows):
+        return
+    rows = rows[is_shape_edge(mesh, a[rows], b[rows])]
+    if not len(rows):
+        return
+    # A dual face has a number; edges and corners of it count as others.
+    key = np.stack((crossings.plane, i, j, s == 0, t == 0))[:, rows]
+    group = _groups(key)
+    distance = np.stack([np.where(exists, d, np.inf)[rows] for _, _, d, exists in corners])
+    yield from _nearest_corners(
+        mask, topology, axis, group, distance,
+        [p[rows] for p, _, _, _ in corners], [q[rows] for _, q, _, _ in corners],
+        crossings.plane[rows],
+    )  # fmt: skip
+
+
+def _cell_and_fraction(
+    coordinates: NDArray[np.int32], a: Ints, b: Ints, run: Ints, rise: Ints
+) -> tuple[Ints, Floats]:
+    """Return the number of the centre below a crossing, and how far above it that is, 0 to 1."""
+    start = coordinates.take(a).astype(np.int64)
+    whole = (start - HALF) * rise + (coordinates.take(b) - start) * run
+    unit = rise << SHIFT
+    cell = whole // unit
+    return cell, (whole - cell * unit) / unit
+
+
+def _corners(i: Ints, j: Ints, s: Floats, t: Floats) -> Iterator[tuple[Ints, Ints, Floats, Bools]]:
+    """Yield the corners of dual faces, the squared distances from them, and whether they exist.
+
+    At a crossing on an edge of a dual face, only that edge's corners count.
+    """
+    for up_u in (0, 1):
+        for up_v in (0, 1):
+            distance = (s - up_u) ** 2 + (t - up_v) ** 2
+            exists = ((s > 0) if up_u else np.ones(len(s), dtype=bool)) & ((t > 0) | (not up_v))
+            yield i + up_u, j + up_v, distance, exists
+
+
+def _is_lit(mask: LitMask, axis: int, i: Ints, j: Ints, level: Ints) -> Bools:
+    """Return which voxels are in the box and lit."""
+    nu, nv, nw = (mask.sides[(axis + k) % 3] for k in (1, 2, 0))
+    lit = (i >= 0) & (i < nu) & (j >= 0) & (j < nv) & (level >= 0) & (level < nw)
+    if lit.all():
+        return mask.lit(mask.locate(axis, i, j, level))
+    rows = np.flatnonzero(lit)
+    lit[rows] = mask.lit(mask.locate(axis, i[rows], j[rows], level[rows]))
+    return np.asarray(lit)
+
+
+def _groups(key: Ints) -> Ints:
+    """Return numbers, (n,), that are equal where all rows of a key, (k, n), are."""
+    order = np.lexsort(key)
+    ordered = key[:, order]
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.cumsum(np.append(0, (ordered[:, 1:] != ordered[:, :-1]).any(axis=0)))[
+        : len(order)
+    ]
+    return group
+
+
+def _nearest_corners(
+    mask: LitMask,
+    topology: Topology,
+    axis: int,
+    group: Ints,
+    distance: Floats,
+    i: list[Ints],
+    j: list[Ints],
+    level: Ints,
+) -> Iterator[Ints]:
+    """Yield places of the corners that are nearest in their group.
+
+    Of several that are as near, closed and oriented meshes light all, so that mirrored meshes have
+    mirrored voxels; others the upper one, as on the faces of voxels.
+    """
+    least = np.full(int(group.max()) + 1, np.inf)
+    for each in distance:
+        np.minimum.at(least, group, each)
+    done = np.zeros(len(least), dtype=bool)
+    for k in reversed(range(len(distance))):
+        near = distance[k] <= least[group] + SAME
+        if not topology.has_inside:
+            near &= ~done[group]
+        rows = np.flatnonzero(near)
+        done[group[rows]] = True
+        nu, nv = mask.sides[(axis + 1) % 3], mask.sides[(axis + 2) % 3]
+        p, q = i[k][rows], j[k][rows]
+        inside = (p >= 0) & (p < nu) & (q >= 0) & (q < nv)
+        inside &= (level[rows] >= 0) & (level[rows] < mask.sides[axis])
+        yield mask.locate(axis, p[inside], q[inside], level[rows][inside])
+
+
+def _grains(mask: LitMask, block: TriangleBlock) -> tuple[Ints, Ints] | None:
+    """Return the bounds, (3, n) and (3, n), of triangles inside of dual cells without a lit corner.
+
+    None if there are none. Those in a wall between cells belong to the wall.
+    """
+    sides = np.array(mask.sides)[:, None]
+    low, high = block.corners.min(axis=1), block.corners.max(axis=1)
+    first, last = (low + (UNIT - 1 - HALF)) >> SHIFT, (high - HALF) >> SHIFT
+    inner = ((first > last) | (low == high)).all(axis=0)
+    inner &= ((low >> SHIFT) < sides).all(axis=0) & (low >= 0).all(axis=0)
+    rows = np.flatnonzero(inner)
+    if not len(rows):
+        return None
+    x, y, z = block.corners[:, 0, rows].astype(np.int64) >> SHIFT
+    rows = rows[~_is_lit(mask, 2, x, y, z)]
+    if not len(rows):
+        return None
+    low, high = low[:, rows].astype(np.int64), high[:, rows].astype(np.int64)
+    cell, on_wall = _dual_cells(low)
+    lit = np.zeros(len(rows), dtype=bool)
+    for up in np.ndindex(2, 2, 2):
+        corner = cell + np.array(up)[:, None]
+        exists = ~(on_wall & np.array(up, dtype=bool)[:, None]).any(axis=0)
+        lit |= exists & _is_lit(mask, 2, *corner)
+    lit |= _zero_area(block.corners[:, :, rows].astype(np.int64))
+    return None if lit.all() else (low[:, ~lit], high[:, ~lit])
+
+
+def _zero_area(corners: Ints) -> Bools:
+    """Return which triangles, (3, 3, n) by axis and corner, have no area."""
+    along, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(
+        (along[_AFTER] * other[[2, 0, 1]] == along[[2, 0, 1]] * other[_AFTER]).all(axis=0)
+    )
+
+
+def _dual_cells(point: Ints) -> tuple[Ints, Bools]:
+    """Return the centres below points, (3, n), and whether points are level with them."""
+    return (point - HALF) >> SHIFT, (point - HALF) & (UNIT - 1) == 0
+
+
+def _cells_to_light(mask: LitMask, topology: Topology, low: Ints, high: Ints) -> Ints:
+    """Return places of the corners nearest to the middle of what is in each dual cell."""
+    cell, on_wall = _dual_cells(low)
+    group = _groups(np.concatenate((cell, on_wall)))
+    size = int(group.max()) + 1
+    bounds = np.full((2, 3, size), np.iinfo(np.int64).max)
+    for axis in range(3):
+        np.minimum.at(bounds[0, axis], group, low[axis])
+        np.minimum.at(bounds[1, axis], group, -high[axis])
+    middle = bounds[0] - bounds[1]  # twice that
+    # On a voxel's face both sides are as near.
+    level, tied = middle >> (SHIFT + 1), middle & (2 * UNIT - 1) == 0
+    places = []
+    for down in np.ndindex(2, 2, 2):
+        if any(down) and not topology.has_inside:
+            break
+        rows = (tied | (np.array(down) == 0)[:, None]).all(axis=0)
+        x, y, z = (level - np.array(down)[:, None])[:, rows]
+        inside = (x >= 0) & (x < mask.sides[0]) & (y >= 0) & (y < mask.sides[1])
+        inside &= (z >= 0) & (z < mask.sides[2])
+        places.append(mask.locate(2, x[inside], y[inside], z[inside]))
+    return np.concatenate(places)
