@@ -22,7 +22,7 @@ from voxdisplay.files.library_calls import guarded
 
 _DESCR = re.compile(rb"'descr' *: *'([<>|=]?[fiub][1248])'")
 _ORDER = re.compile(rb"'fortran_order' *: *(True|False)")
-_SHAPE = re.compile(rb"'shape' *: *\(([0-9, ]{0,90})\)")
+_SHAPE = re.compile(rb"'shape' *: *\(((?: *\d{1,18} *,){0,9}(?: *\d{1,18} *)?)\)")
 _MAX_MEMBERS = 1000
 _HEADER_BYTES = 1 << 16
 

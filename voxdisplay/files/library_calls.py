@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from voxdisplay.errors import BodyError, MissingExtra
 
 
@@ -15,7 +17,8 @@ def guarded(name: str, what: str, call: Callable[[], Any]) -> Any:
     Warnings of the library are not shown: what matters is checked here.
     """
     try:
-        with warnings.catch_warnings():
+        # Users may have told numpy to raise.
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return call()
     except (BodyError, MissingExtra):

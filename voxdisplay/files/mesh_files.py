@@ -140,11 +140,10 @@ def read_mesh(
     except ModuleNotFoundError:
         raise _missing(name) from None
     beside = _Folder(name, folder)
-    as_written = {"process": False, "maintain_order": True}
 
     def parts_of_scene() -> list[Part]:
         file = io.BytesIO(data)
-        scene = trimesh.load_scene(file, file_type=kind, resolver=beside, **as_written)
+        scene = trimesh.load_scene(file, file_type=kind, resolver=beside, process=False)
         return _parts_of(name, scene, trimesh)
 
     try:

@@ -126,24 +126,40 @@ def _scene_graph(places: list[NDArray[np.integer]]) -> list[bytes]:
 def _palette(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8], str | None]:
     """Return colour indices, 1 to 255, the palette, (256, 4), and a remark if it lacks colours."""
     found, index = np.unique(colors, axis=0, return_inverse=True)
+    index = index.reshape(-1)
     remark = None
-    for bits in range(7, 2, -1):
-        if len(found) <= _COLORS:
-            break
-        remark = f"its palette has {_COLORS} colours: {bits} bits of each channel are kept"
-        top = (1 << bits) - 1
-        coarse = (colors.astype(np.uint16) * top + 127) // 255
-        found, index = np.unique((coarse * 255 + top // 2) // top, axis=0, return_inverse=True)
-    if len(found) > _COLORS:  # 3, 3 and 2 bits are 256 colours, of which black is none
-        remark = f"its palette has {_COLORS} colours: the nearest are kept"
-        levels = np.array([7, 7, 3])
-        coarse = (colors.astype(np.int64) * levels + 127) // 255
-        coarse[(coarse == 0).all(axis=1), 2] = 1
-        found, index = np.unique(coarse * 255 // levels, axis=0, return_inverse=True)
+    if len(found) > _COLORS:
+        remark = f"its palette has {_COLORS} colours, of {len(found)}: the nearest are kept"
+        group = _groups(found, _COLORS)
+        index = group[index]
+        count = np.bincount(index, minlength=_COLORS)
+        sums = [np.bincount(index, colors[:, channel], _COLORS) for channel in range(3)]
+        found = np.rint(np.stack(sums, axis=1) / count[:, None]).astype(np.uint8)
     palette = np.zeros((256, 4), dtype=np.uint8)
     palette[:, 3] = 255
     palette[: len(found), :3] = found
-    return (index.reshape(-1) + 1).astype(np.uint8), palette, remark
+    return (index + 1).astype(np.uint8), palette, remark
+
+
+def _groups(colors: NDArray[np.uint8], count: int) -> Ints:
+    """Return a number below `count` for each of more distinct colours.
+
+    The group with the longest side is halved along it (after Heckbert's median cut, 1982).
+    """
+    groups = [np.arange(len(colors))]
+    sides = [np.ptp(colors, axis=0)]
+    while len(groups) < count:
+        widest = int(np.argmax([side.max() for side in sides]))
+        rows, channel = groups[widest], int(np.argmax(sides[widest]))
+        values = colors[rows, channel].astype(np.int64)
+        upper = values > (values.min() + values.max()) // 2
+        halves = [rows[~upper], rows[upper]]
+        groups[widest : widest + 1] = halves
+        sides[widest : widest + 1] = [np.ptp(colors[half], axis=0) for half in halves]
+    number = np.empty(len(colors), dtype=np.int64)
+    for i, rows in enumerate(groups):
+        number[rows] = i
+    return number
 
 
 def _write_ply(file: BinaryIO, page: LitPage) -> None:

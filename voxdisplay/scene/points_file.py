@@ -114,7 +114,7 @@ def _names_in(folder: Path) -> list[str]:
 # numpy's own reader makes an array of whatever shape the header claims, and evaluates the header.
 _NPY_DESCR = re.compile(rb"'descr' *: *'([<>|=]?[fiu][1248])'")
 _NPY_ORDER = re.compile(rb"'fortran_order' *: *(True|False)")
-_NPY_SHAPE = re.compile(rb"'shape' *: *\(([0-9, ]{0,60})\)")
+_NPY_SHAPE = re.compile(rb"'shape' *: *\(((?: *\d{1,18} *,){0,9}(?: *\d{1,18} *)?)\)")
 
 
 def _parse_npy(name: str, data: bytes) -> NDArray[np.float64]:
