@@ -15,9 +15,10 @@ from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.digest import digest, palette_digest
-from voxdisplay.wire.encoding_selection import PageUpdate, encode_update
+from voxdisplay.wire.encoding_selection import encode_update
 from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.packet_stream import PacketStream
+from voxdisplay.wire.page_update import PageUpdate
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import PayloadLayout
 from voxdisplay.wire.range_coded_chains import encode_range_coded

@@ -12,7 +12,7 @@ import voxdisplay as vd
 from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.wire import encoding_selection, raw_pixels
+from voxdisplay.wire import encoding_selection, page_update, raw_pixels
 from voxdisplay.wire.chains import encode_chains
 from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.spans import encode_spans
@@ -114,9 +114,11 @@ def test_whatever_the_line_carries_and_wherever_it_is_cut(device, seed, bytes_pe
     frame = random_frame(np.random.default_rng(seed), device)
     frame.device = device
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(encoding_selection, "_LARGE_SET", 100)
-        patch.setattr(encoding_selection, "_SLAB_VOXELS", 1)
-        patch.setattr(encoding_selection, "_PARSED_VOXELS", 150)
+        patch.setattr(page_update, "_LARGE_SET", 100)
+        patch.setattr(page_update, "_SLAB_VOXELS", 1)
+        patch.setattr(page_update, "_PARSED_VOXELS", 150)
+        patch.setattr(page_update, "_HUGE_SET", 300)
+        patch.setattr(page_update, "_CHAINED_VOXELS", 50)
         patch.setattr(raw_pixels, "_SLAB_VOXELS", 160)
         portions = list(frame.iter_payloads(*device[2:], bytes_per_s))
     assert_draws([payload for portion in portions for payload in portion], frame)
@@ -132,13 +134,13 @@ def test_what_is_dense_comes_in_slabs_and_noise_in_portions():
         return len(list(filter(None, frame.iter_payloads(1024, (), rate))))
 
     assert portions(11_520) == 1, "in one piece it is shorter, and the line is busy for seconds"
-    assert portions(1.2e6) == voxels // encoding_selection._PARSED_VOXELS
+    assert portions(1.2e6) == voxels // page_update._PARSED_VOXELS
     assert portions(1e9) == voxels // raw_pixels._SLAB_VOXELS
     solid = Frame((128, 128, 32), "index8")
     solid.set(np.full((32, 128, 128), 7, dtype=np.uint8))
     assert (
         len(list(filter(None, solid.iter_payloads(1024, (), 1e9))))
-        == voxels // encoding_selection._SLAB_VOXELS
+        == voxels // page_update._SLAB_VOXELS
     )
     solid.draw([(1, 2, 3)], "red")
     solid.device = (solid.grid, solid.format, 1024, frozenset())

@@ -77,6 +77,13 @@ class DrawnVoxels:
     def __len__(self) -> int:
         return len(self.values)
 
+    def part(self, begin: int, end: int) -> DrawnVoxels:
+        """Return the voxels of some consecutive rows; items keep their numbers."""
+        rows = slice(begin, end)
+        return DrawnVoxels(
+            self.index[rows], self.values[rows], self.item[rows], self.corners[rows], self.kinds
+        )
+
     def select(self, kept: NDArray[np.bool_]) -> DrawnVoxels:
         """Return the voxels where a mask, (n,), is set; items keep their numbers."""
         if kept.all():

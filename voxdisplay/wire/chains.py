@@ -98,9 +98,8 @@ def build_chains(
     n = len(voxels)
     spots = np.ascontiguousarray(voxels.T, dtype=np.int32)  # axis first: long rows are faster
     steps = spots[:, 1:] - spots[:, :-1]
-    value = pens.astype(np.int64)
     jump = np.abs(steps).max(axis=0, initial=0) != 1
-    jump |= value[1:] != value[:-1]
+    jump |= pens[1:] != pens[:-1]
     ends, mains, falls = _longest_octant_runs(steps, jump)
     if corners is not None and config.has(spec.FEATURE_LINE) and corners.any():
         ends = _break_at_corners(ends, np.flatnonzero(corners))
@@ -110,18 +109,22 @@ def build_chains(
     begin, count, lines = _split_long(begin, count, lines, longest)
 
     at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step and no octant
-    octant = 8 * mains[at] + falls[at] if n > 1 else np.zeros(n, dtype=np.int64)
+    octant = np.zeros(n, dtype=np.int64)
+    if n > 1:
+        octant = 8 * mains[at].astype(np.int64) + falls[at]
     body, size = _encode_ops(spots, steps, begin, count, octant, lines, config)
     index = config.grid.index_of(voxels) if index is None else index
     lone = count == 0
-    pen = value[begin]
+    pen = pens[begin].astype(np.int64)
     blocks = OpBlocks(
         body, size, pen, index[begin], pen, index[begin + count] + lone, ~lone & ~lines
     )
     return Chains(blocks, begin, count)
 
 
-def _longest_octant_runs(steps: Offsets, jump: Bools) -> tuple[Ints, Ints, Ints]:
+def _longest_octant_runs(
+    steps: Offsets, jump: Bools
+) -> tuple[Ints, NDArray[np.int8], NDArray[np.int8]]:
     """Return for each step the end of the longest segment from there, its main axis and signs.
 
     A run of steps fits an octant if some axis moves in all of them and no axis moves both ways.
@@ -140,8 +143,12 @@ def _longest_octant_runs(steps: Offsets, jump: Bools) -> tuple[Ints, Ints, Ints]
     ends = np.minimum(np.maximum(rise, fall).min(axis=0), next_where(jump))
     longest = np.maximum(np.maximum(still[0], still[1]), still[2])
     ends = np.minimum(ends, longest)
-    main = np.where(still[0] == longest, 0, np.where(still[1] == longest, 1, 2))
-    falls = (fall[0] < ends) + 2 * (fall[1] < ends) + 4 * (fall[2] < ends)
+    main = np.full(m, 2, dtype=np.int8)
+    for axis in (1, 0):
+        main[still[axis] == longest] = axis
+    falls = np.zeros(m, dtype=np.int8)
+    for axis in range(3):
+        falls |= (fall[axis] < ends).astype(np.int8) << np.int8(axis)
     return ends, main, falls
 
 

@@ -15,8 +15,9 @@ from voxdisplay.raster.display_list import DrawnVoxels, concatenate_drawn
 from voxdisplay.raster.pixel_map import contains, without
 from voxdisplay.raster.sparse_raster import SparseRaster
 from voxdisplay.wire import spec
-from voxdisplay.wire.encoding_selection import PageUpdate, encode_update
+from voxdisplay.wire.encoding_selection import encode_update
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
+from voxdisplay.wire.page_update import PageUpdate
 from voxdisplay.wire.payload_splitting import OpBlocks
 
 _STEPS_PER_BYTE = 4
@@ -39,24 +40,20 @@ def encode_difference(
 
     """
     changed, pixels_at = new.differing(old), new.at
-    drawn = _items_with(changed, new.ordered)
-    parts: list[DrawnVoxels] = []
-    rest = changed
+    drawn, parts, rest = _items_with(changed, new.ordered), None, changed
     if drawn is not None:
-        parts.append(_changed_parts(drawn, changed, config))
-        rest = rest[without(rest, parts[0].index)]
+        parts = _changed_parts(drawn, changed, config)
+        rest = changed[without(changed, parts.index)]
+    best = _encode(PageUpdate(parts, rest, pixels_at), config, first)
     vanished = _items_with(rest, old.ordered)
     if vanished is not None:
-        redrawn = replace(vanished, values=pixels_at(vanished.index))
-        parts.append(_changed_parts(redrawn, rest, config))
-        rest = rest[without(rest, parts[-1].index)]
-    best = _encode(
-        PageUpdate(concatenate_drawn(parts) if parts else None, rest, pixels_at), config, first
-    )
-    if drawn is not None and _may_pay(drawn, parts[0], best, config):
+        gone = _changed_parts(replace(vanished, values=pixels_at(vanished.index)), rest, config)
+        chained = gone if parts is None else concatenate_drawn([parts, gone])
+        left = rest[without(rest, gone.index)]
+        best = min(best, _encode(PageUpdate(chained, left, pixels_at), config, first), key=_size)
+    if drawn is not None and parts is not None and _may_pay(drawn, parts, best, config):
         rest = changed[without(changed, drawn.index)]
-        whole = _encode(PageUpdate(drawn, rest, pixels_at), config, first)
-        best = min(best, whole, key=_size)
+        best = min(best, _encode(PageUpdate(drawn, rest, pixels_at), config, first), key=_size)
     return best
 
 

@@ -22,18 +22,9 @@ from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
+from voxdisplay.wire.page_update import PageUpdate, is_incompressible, partition
 from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout, concatenate_blocks, no_blocks
 
-# With more colours, voxels that mostly differ from the next in their row make no bricks.
-_MANY_COLORS = 16
-_SAMPLE = 512  # voxels in which colours are counted first
-# Larger sets are cut into slabs of whole bricks with about so many voxels each; incompressible
-# slabs further, into parts for the parser.
-_LARGE_SET = 1 << 16
-_SLAB_VOXELS = 1 << 18
-_PARSED_VOXELS = 1 << 17
-# Line rate, bytes/s, from which sets are cut: in one piece, which is shorter, the line would idle.
-_SLABS_FROM = 100_000
 # Line rate, bytes/s, from which chains are sent without trying whether sets are shorter.
 _CHAINS_FROM = 800_000
 _LONE_FRACTION = 16  # unless one voxel in so many is isolated
@@ -41,26 +32,6 @@ _LONE_FRACTION = 16  # unless one voxel in so many is isolated
 _LEAST_STEP_BITS, _LEAST_SET_STEP_BITS = 0.5, 2.0
 # Bytes of a typical set for each byte of its lower bound.
 _TYPICAL_FACTOR = 1.5
-
-
-@dataclass(frozen=True)
-class PageUpdate:
-    """Voxels to be drawn.
-
-    Attributes
-    ----------
-    ordered : DrawnVoxels or None
-        Voxels with a drawing order.
-    unordered : (n,) int64 array
-        Scan-order indices of all others, ascending, each once.
-    pixels_at : PixelLookup
-        Function from indices to the pixel values of the finished page.
-
-    """
-
-    ordered: DrawnVoxels | None
-    unordered: Ints
-    pixels_at: spans.PixelLookup
 
 
 def encode_update(
@@ -86,23 +57,15 @@ def encode_update(
     """
     chained = None if len(update.unordered) else update.ordered
     update = _with_known_order(update, config)
-    ordered, index = update.ordered, update.unordered
-    if len(index) > _LARGE_SET and config.bytes_per_s >= _SLABS_FROM:
-        for slab in _slabs(index, update.pixels_at, config):
-            best = _BestLayout(config, first or no_blocks())
-            yield from _with_pauses(
-                _offer_encodings(best, PageUpdate(None, slab, update.pixels_at))
-            )
-            yield best.payloads
-            first = None
-        if not ordered:
-            return
-        update = replace(update, unordered=index[:0])
-    best = _BestLayout(config, first or no_blocks())
-    yield from _with_pauses(_offer_encodings(best, update))
-    if chained and config.bytes_per_s < _CHAINS_FROM:
-        _offer_range_coded(best, chained, len(update.unordered) / max(1, len(chained)))
-    yield best.payloads
+    for part in partition(update, config):
+        best = _BestLayout(config, first or no_blocks())
+        first = None
+        yield from _with_pauses(_offer_encodings(best, part))
+        if part is not update:
+            chained = None if len(part.unordered) else part.ordered
+        if chained and config.bytes_per_s < _CHAINS_FROM:
+            _offer_range_coded(best, chained, len(part.unordered) / max(1, len(chained)))
+        yield best.payloads
 
 
 def _with_known_order(update: PageUpdate, config: EncoderConfig) -> PageUpdate:
@@ -118,19 +81,6 @@ def _with_known_order(update: PageUpdate, config: EncoderConfig) -> PageUpdate:
     if len(rest):  # what two items drew with one value is sent once
         sets = sets[~contains(np.sort(rest.index), sets)]
     return PageUpdate(rest if len(rest) else None, _union(sets, index), update.pixels_at)
-
-
-def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> Iterator[Ints]:
-    """Yield slabs of voxels, cut along z between bricks; incompressible ones are cut further."""
-    layer = config.grid.nx * config.grid.ny
-    side = 1 << spec.LIMIT_MAX_LEVEL
-    thick = max(1, _SLAB_VOXELS // (layer * side)) * side
-    cuts = np.arange(thick, config.grid.nz, thick) * layer
-    for slab in np.split(index, np.searchsorted(index, cuts)):
-        parsed = len(slab) and _is_incompressible(slab, pixels_at(slab))
-        for part in np.array_split(slab, -(-len(slab) // _PARSED_VOXELS)) if parsed else [slab]:
-            if len(part):
-                yield part
 
 
 def _offer_encodings(best: _BestLayout, update: PageUpdate) -> Incremental[None]:
@@ -312,7 +262,7 @@ def _offer_set_encodings(
 ) -> Incremental[None]:
     """Offer blocks together with each encoding of a set of voxels, n >= 1; incrementally."""
     config, values = best.config, pixels_at(index)
-    if voxel_sets.has_set_ops(config) and not _is_incompressible(index, values):
+    if voxel_sets.has_set_ops(config) and not is_incompressible(index, values):
         if tried and np.array_equal(tried.index, index):
             encoded = tried.encoded
         else:
@@ -330,15 +280,6 @@ def _offer_set_encodings(
         rows = yield from spans.encode_span_set(index, values, pixels_at, config)
         yield
         best.offer(kept, rows)
-
-
-def _is_incompressible(index: Ints, values: NDArray[np.integer]) -> bool:
-    """Return whether bricks cannot pay: many colours, and few voxels that equal the next."""
-    alike = (index[1:] - index[:-1] == 1) & (values[1:] == values[:-1])
-    if 2 * int(np.count_nonzero(alike)) >= len(index):
-        return False
-    sample = values[:: -(-len(values) // _SAMPLE)]
-    return len(np.unique(sample)) > _MANY_COLORS or len(np.unique(values)) > _MANY_COLORS
 
 
 def _cheaper_as_spans(

@@ -56,7 +56,9 @@ def build_leaves(
     A key is, from the highest digit: rank of the pixel value, brick of the top level in scan order,
     and the path to the node inside it, three bits a level.
     """
-    if ranks == 1 and _DENSE_RATIO * len(index) > config.grid.voxels:
+    bricks = BRICK_SIDE * config.grid.nx * config.grid.ny
+    layers = int(index[-1]) // bricks - int(index[0]) // bricks + 1
+    if ranks == 1 and _DENSE_RATIO * len(index) > layers * bricks:
         return _leaves_of_page(index, bricks_per_axis, config)
     x, y, z = config.grid.voxels_at(index).T
     bx, by, bz = bricks_per_axis
@@ -75,22 +77,25 @@ def _leaves_of_page(
     index: Ints, bricks_per_axis: list[int], config: EncoderConfig
 ) -> tuple[Ints, Bytes]:
     """Return as `build_leaves` for a dense set of one pixel value: by a page, without sorting."""
-    nx, ny, nz = config.grid
-    bx, by, bz = bricks_per_axis
-    page = np.zeros((bz * BRICK_SIDE, by * BRICK_SIDE, bx * BRICK_SIDE), dtype=np.uint8)
-    inside = np.zeros(config.grid.voxels, dtype=np.uint8)
-    inside[index] = 1
-    page[:nz, :ny, :nx] = inside.reshape(config.grid.array_shape)
+    nx, ny, _ = config.grid
+    bx, by, _ = bricks_per_axis
+    layer = nx * ny
+    low, high = int(index[0]) // (layer * BRICK_SIDE), int(index[-1]) // (layer * BRICK_SIDE) + 1
+    page = np.zeros(((high - low) * BRICK_SIDE, by * BRICK_SIDE, bx * BRICK_SIDE), dtype=np.uint8)
+    layers = min((high - low) * BRICK_SIDE, config.grid.nz - low * BRICK_SIDE)
+    inside = np.zeros(layers * layer, dtype=np.uint8)
+    inside[index - low * layer * BRICK_SIDE] = 1
+    page[:layers, :ny, :nx] = inside.reshape(layers, ny, nx)
     mask = np.zeros([side // 2 for side in page.shape], dtype=np.uint8)
     for child in range(8):
         mask |= page[child >> 2 :: 2, child >> 1 & 1 :: 2, child & 1 :: 2] << np.uint8(child)
     halves = [2] * (TOP_LEVEL - 1)
-    parts = mask.reshape(bz, *halves, by, *halves, bx, *halves)
+    parts = mask.reshape(high - low, *halves, by, *halves, bx, *halves)
     # Axes of bricks first, then of each level: z, y, x.
     axes = np.arange(3 * TOP_LEVEL).reshape(3, TOP_LEVEL).T.reshape(-1)
     ordered = parts.transpose(axes).reshape(-1)
     key = np.flatnonzero(ordered)
-    return key, ordered[key]
+    return key + (low * by * bx << _LEAF_BITS - 3), ordered[key]
 
 
 def build_levels(key: Ints, mask: Bytes, config: EncoderConfig) -> list[Level]:

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from voxdisplay.raster.sparse_raster import SparseRaster
-from voxdisplay.wire.encoding_selection import PageUpdate, encode_update
+from voxdisplay.wire.encoding_selection import encode_update
 from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.page_update import PageUpdate
 from voxdisplay.wire.payload_splitting import OpBlocks, PayloadLayout
 from voxdisplay.wire.raw_pixels import encode_raw, is_incompressible
 
