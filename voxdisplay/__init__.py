@@ -13,6 +13,8 @@ Displays and frames: ``help(voxdisplay.Display)`` and so on says more of each.
     Display             An open display: frames in, proof of what is shown out.
     DeviceInfo          What a device announced: grid, format, features.
     Receipt             Figures of a frame that was shown.
+    PlayReport          Figures of a show that was played.
+    load_show           Read a scene or a playlist to play.
     Frame               One picture: draw on it, set it, save it, present it.
     Drawing             Voxel counts of one drawn object.
     Grid                Size of a display in voxels.
@@ -144,6 +146,8 @@ if TYPE_CHECKING:
     from voxdisplay.raster.pixel_format import PixelFormat
     from voxdisplay.raster.volume_pixels import volume_pixels
     from voxdisplay.scene import Scene, load_scene, read_scene
+    from voxdisplay.shows.loading import load_show
+    from voxdisplay.shows.play_report import PlayReport
     from voxdisplay.voxelization import Report, Sequence, VoxelSet, voxelize, voxelize_many
 
     __version__: str
@@ -183,6 +187,7 @@ if TYPE_CHECKING:
         "Parametric",
         "PixelFormat",
         "Plane",
+        "PlayReport",
         "Points",
         "Polyline",
         "ProtocolError",
@@ -205,6 +210,7 @@ if TYPE_CHECKING:
         "VoxelModel",
         "VoxelSet",
         "load_scene",
+        "load_show",
         "open",
         "read_scene",
         "volume_pixels",
@@ -292,6 +298,12 @@ _MODULES = {
         "load_scene",
         "read_scene",
     ],
+    "voxdisplay.shows.loading": [
+        "load_show",
+    ],
+    "voxdisplay.shows.play_report": [
+        "PlayReport",
+    ],
     "voxdisplay.voxelization": [
         "Report",
         "Sequence",
@@ -302,7 +314,17 @@ _MODULES = {
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 # Modules that are attributes of the package without an import of their own.
-_SUBMODULES = ("bodies", "curves", "display", "errors", "frame", "raster", "scene", "voxelization")
+_SUBMODULES = (
+    "bodies",
+    "curves",
+    "display",
+    "errors",
+    "frame",
+    "raster",
+    "scene",
+    "shows",
+    "voxelization",
+)
 
 _PUBLIC = sorted(_MODULE_OF)
 _FUNCTIONS = [name for name in _PUBLIC if name.islower()]

@@ -58,6 +58,7 @@ def test_completion_of_commands_loads_no_command():
     modules, text = loaded_by([], **shell)
     assert text.split() == [
         "plain,push",
+        "plain,play",
         "plain,ports",
         "plain,preview",
         "plain,plan",

@@ -28,6 +28,7 @@ class TableEntry(NamedTuple):
 COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
     "Show on a display": {
         "push": TableEntry("push", "push", "Show a scene or model and prove that it is shown."),
+        "play": TableEntry("play", "play", "Play moving scenes, recordings and playlists."),
         "test-pattern": TableEntry(
             "test_pattern", "test_pattern", "Show a pattern that tells the axes apart."
         ),

@@ -6,8 +6,8 @@ Blocks in the caller's thread, and needs no other. Must not know bytes, threads 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Literal, NoReturn, overload
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Literal, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,12 @@ from voxdisplay.link import LinkCounters
 from voxdisplay.raster.pixel_format import Pixels
 
 __all__ = ["Display", "Receipt"]
+
+if TYPE_CHECKING:
+    from voxdisplay.display.player import Late, Pacing, Player
+    from voxdisplay.frame import Fit
+    from voxdisplay.shows.binding import Playable
+    from voxdisplay.shows.play_report import PlayReport
 
 _MAX_TURN_S = 0.02  # of a wait: other threads may use the display in between
 
@@ -235,11 +241,6 @@ class Display(SharedDisplay):
             Seconds on the clock of the display: ``time.monotonic``, unless it was opened with
             another.
 
-        Raises
-        ------
-        TransportError, DeviceError, DesyncError
-            As of `present`.
-
         """
         when = finite("when", when)
         while True:
@@ -272,15 +273,6 @@ class Display(SharedDisplay):
         TransportError, DeviceError, DesyncError
             As of `present`.
 
-        Examples
-        --------
-        >>> import voxdisplay as vd
-        >>> with vd.open("sim:?size=16x16x16") as display:
-        ...     for frame_time in display.clock(fps=30, seconds=0.1):
-        ...         frame = display.frame()
-        ...         frame.draw([(int(30 * frame_time), 1, 2)])
-        ...         display.present(frame, wait=False)
-
         """
         fps = positive("fps", fps)
         length_s = math.inf if seconds is None else duration("seconds", seconds)
@@ -295,6 +287,68 @@ class Display(SharedDisplay):
             yield number / fps
             number = max(number + 1, math.floor((self._clock() - began_s) * fps))
         self.wait_until(began_s + length_s)
+
+    def play(
+        self,
+        show: Playable,
+        *,
+        speed: float = 1.0,
+        start: float = 0.0,
+        until: float | None = None,
+        loop: bool | None = None,
+        clock: Pacing = "device",
+        late: Late = "drop",
+        fit: Fit = "contain",
+        observer: Callable[[Player], None] | None = None,
+    ) -> PlayReport:
+        """Play a show: a moving scene, a recording, a playlist, or any `Show`.
+
+        Each frame's digest is known before it is displayed, and compared. Frames that take long to
+        draw are prepared by another process.
+
+        Parameters
+        ----------
+        show : Show, Scene, Playlist or Frame
+        speed : float
+            Seconds of the show per second.
+        start, until : float
+            Where it begins and ends, in seconds of the show.
+        loop : bool, optional
+            Whether it is repeated until `observer` stops it, or Ctrl-C. By default, what the show
+            says of itself.
+        clock : {"device", "host"}
+            ``"device"`` gives each refresh tick a frame, so that swaps are as regular as ticks can
+            be; a line that cannot carry that many, or a device without ticks, is paced by the clock
+            of this machine.
+        late : {"drop", "delay"}
+            ``"drop"`` leaves frames out when a newer one is due; ``"delay"`` shows every frame, and
+            takes longer.
+        fit : {"contain", "none", "content"}
+            As of `Frame.draw`, for scenes.
+        observer : callable, optional
+            Called with the `Player` at least every 20 ms; it may pause, seek and stop it.
+
+        Returns
+        -------
+        PlayReport
+
+        Raises
+        ------
+        DesyncError
+            If the display shows something else than a frame twice in a row.
+        TransportError, DeviceError
+            As of `present`.
+        SceneError, CurveError
+            If a frame cannot be drawn.
+
+        """
+        from voxdisplay.display.playing import play_show  # noqa: PLC0415 - push needs none of it
+
+        return play_show(
+            show, self.frame(), self._turn, self._check_frame, self._clock, speed=speed,
+            start=start, until=until, loop=loop, pacing=clock, late=late, fit=fit,
+            observer=observer,
+        )  # fmt: skip
 
     def clear(self) -> Receipt:
         """Make the display dark."""

@@ -66,6 +66,21 @@ class DisplayOperations:
     def _counters(self) -> LinkCounters:
         return self._connection.link.counters
 
+    @property
+    def refresh_hz(self) -> float:
+        """Refresh ticks per second; 0 if there are none."""
+        return self._connection.info.refresh_hz
+
+    @property
+    def reconnects(self) -> int:
+        """How often the device was gone and has come back."""
+        return self._connection.reconnects
+
+    @property
+    def wire_bytes(self) -> int:
+        """Bytes sent so far."""
+        return self._counters.wire_bytes
+
     def can(self, feature: str) -> bool:
         """Return whether the device has announced a feature."""
         return feature in self._connection.info.features

@@ -7,9 +7,10 @@ not wait, read back, or know bytes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
+from typing import TypeAlias
 
 from voxdisplay.display.connection import Connection
 from voxdisplay.display.playback import PlaybackMeter
@@ -17,6 +18,7 @@ from voxdisplay.display.receipt import WRONG_TWICE_HINT, describe_wrong_digest
 from voxdisplay.errors import DesyncError
 from voxdisplay.frame import Frame
 from voxdisplay.link import PictureId
+from voxdisplay.shows.show import EncodedFrame
 from voxdisplay.wire.features import UNKNOWN_BYTES_PER_S, select_features
 
 # With so many lit voxels for each byte of the difference, the full frame surely takes more bytes.
@@ -24,6 +26,8 @@ _LIT_PER_DIFFERENCE_BYTE = 64
 # One frame that the device shows at its next refresh tick, and one behind it.
 _MAX_UNSHOWN = 2
 _NO_PICTURE: PictureId = (0, 0)  # is never displayed
+
+Picture: TypeAlias = Frame | EncodedFrame
 
 
 class FrameQueue:
@@ -40,30 +44,36 @@ class FrameQueue:
         Number of frames that have been displayed.
     playback : PlaybackMeter
         Counts what is presented, shown and dropped.
+    on_shown : callable
+        Called with ticket and time when a frame is displayed that nobody waits for.
 
     """
 
     def __init__(self, connection: Connection) -> None:
         self.frames = 0
         self.playback = PlaybackMeter()
+        self.on_shown: Callable[[int, float], None] = _ignore_shown
         self._connection = connection
         self._link = connection.link
-        self._last: Frame | None = None  # that was displayed
+        self._last: Picture | None = None  # that was displayed
         self._shown: dict[int, int | None] = {}  # ticket -> digest
-        self._unwaited: dict[int, Frame] = {}  # ticket -> a copy of the frame
+        self._unwaited: dict[int, Picture] = {}  # ticket -> a copy of the frame
+        self._repeats: set[int] = set()  # tickets of frames that show what the one before shows
         self._displayed: tuple[Frame, PictureId] | None = None
-        self._pending: Frame | None = None  # handed over, and not started
+        self._pending: Picture | None = None  # handed over, and not started
         self._encoder: _Encoder | None = None
         self._wrong_in_a_row = 0  # of unwaited frames
 
     # -- in
 
-    def enqueue(self, frame: Frame) -> int:
+    def enqueue(self, frame: Picture) -> int:
         """Start a frame and return its ticket.
 
         It is sent in full, or as its difference from what is displayed, whichever is shorter. It
         must not change until it is displayed.
         """
+        if isinstance(frame, EncodedFrame):
+            return self._link.present(list(frame.payloads))
         link, displayed = self._link, self.displayed
         if displayed and not link.backlog:
             full_payloads = cache(partial(self.payloads, frame))
@@ -81,11 +91,35 @@ class FrameQueue:
 
     def replace_pending(self, frame: Frame) -> None:
         """Have a copy of a frame started when the line needs one, unless a newer one follows."""
-        copy = frame.copy()
+        copy = frame.copy()  # before anything changes: it may be interrupted
         if self._pending is not None and self._pending is not self._last:
             self.playback.note_dropped()
         self._pending = copy
         self.playback.note_presented()
+
+    def start_unwaited(self, picture: Picture) -> int:
+        """Start a frame that nobody waits for at once, and return its ticket."""
+        ticket = self.enqueue(picture)
+        self._unwaited[ticket] = picture
+        self.playback.note_presented()
+        return ticket
+
+    def repeat(self, ticket: int, picture: Picture) -> int:
+        """Start a frame that shows what the one started last shows; return its ticket.
+
+        Parameters
+        ----------
+        ticket : int
+            Of the frame started last.
+        picture : Picture
+            What it shows.
+
+        """
+        base = self._link.counters.sessions, ticket
+        again = self._link.present_difference(base, [], partial(self.payloads, picture))
+        self._unwaited[again] = picture
+        self._repeats.add(again)
+        return again
 
     def restart_playback(self) -> None:
         """Count anew, from the frames that are still on their way."""
@@ -93,13 +127,20 @@ class FrameQueue:
         waiting = sum(frame is not None and frame is not self._last for frame in handed_over)
         self.playback = PlaybackMeter(waiting)
 
-    def payloads(self, frame: Frame) -> list[bytes]:
+    def payloads(self, frame: Picture) -> list[bytes]:
         """Return a frame encoded for this device and its line."""
+        if isinstance(frame, EncodedFrame):
+            return list(frame.payloads)
         return frame.payloads(self._link.payload_bytes, self._features)
 
     @property
     def _bytes_per_s(self) -> float:
         return self._connection.bytes_per_s or UNKNOWN_BYTES_PER_S
+
+    @property
+    def encoding_for(self) -> tuple[int, tuple[str, ...], float]:
+        """Arguments of `Frame.iter_payloads` for this device and its line."""
+        return self._link.payload_bytes, self._features, self._bytes_per_s
 
     @property
     def _features(self) -> tuple[str, ...]:
@@ -125,13 +166,13 @@ class FrameQueue:
     @property
     def has_work(self) -> bool:
         """True if `encode` would encode something."""
-        return self.encoding or (self._pending is not None and self._may_start)
+        return self.encoding or (self._pending is not None and self.may_start)
 
     def encode(self) -> None:
         """Encode a portion of a frame; start the pending one if the line needs it."""
         if not self._encoder:  # after an interrupt, nobody supplies the rest of an open frame
             self._link.abandon_open_frame()
-        if self._pending and not self._encoder and self._may_start:
+        if self._pending and not self._encoder and self.may_start:
             frame, self._pending = self._pending, None
             self._unwaited[self.enqueue(frame)] = frame
         if encoder := self._encoder:
@@ -145,9 +186,19 @@ class FrameQueue:
                 self._encoder = None
 
     @property
-    def _may_start(self) -> bool:
+    def may_start(self) -> bool:
         """True if another frame keeps the line busy, and the display does not lag behind by it."""
-        return self._link.ready and self._link.backlog < _MAX_UNSHOWN and self._link.needs_frame
+        return self.backlog < _MAX_UNSHOWN and self.line_is_free
+
+    @property
+    def line_is_free(self) -> bool:
+        """True if the line will run idle unless another frame is started now."""
+        return self._link.ready and not self._encoder and self._link.needs_frame
+
+    @property
+    def backlog(self) -> int:
+        """Number of frames that were started and are not displayed yet."""
+        return self._link.backlog
 
     # -- displayed
 
@@ -173,9 +224,10 @@ class FrameQueue:
         self.playback.note_shown(1, now)
         self._set_shown(frame, ticket, digest)
 
-    def _set_shown(self, frame: Frame, ticket: int, digest: int | None) -> None:
-        picture = self._link.counters.sessions, ticket
-        self._displayed = None if digest is None else (frame, picture)
+    def _set_shown(self, frame: Picture, ticket: int, digest: int | None) -> None:
+        self._displayed = None
+        if digest is not None and isinstance(frame, Frame):
+            self._displayed = frame, (self._link.counters.sessions, ticket)
 
     # -- events
 
@@ -204,18 +256,25 @@ class FrameQueue:
     def _note_unwaited_shown(self, ticket: int, digest: int | None, now: float) -> None:
         """Record that an unwaited frame is displayed, and all before it are finished."""
         frame = self._unwaited[ticket]
-        again = frame is self._last  # after a reconnect, or because it was displayed wrongly
+        # After a reconnect, because it was displayed wrongly, or to fill a tick.
+        again = frame is self._last
         # A device begins no frame before it displays the one before: their ACKs were lost.
-        overtaken = sum(
-            earlier < ticket and f is not self._last for earlier, f in self._unwaited.items()
-        )
+        before = [each for earlier, each in self._unwaited.items() if earlier < ticket]
+        overtaken = len({id(each) for each in before} - {id(self._last), id(frame)})
+        is_repeat = ticket in self._repeats
+        self._repeats = {later for later in self._repeats if later > ticket}
         self._last, self._displayed = frame, None
         self._unwaited = {later: f for later, f in self._unwaited.items() if later > ticket}
         self.frames += not again
         self.playback.note_shown(overtaken + (not again), now)
-        if digest is None or digest == (expected := frame.digest()):
+        self.on_shown(ticket, now)
+        expected = frame.digest if isinstance(frame, EncodedFrame) else frame.digest()
+        if digest is None or digest == expected:
+            self.playback.note_right()
             self._wrong_in_a_row = 0
             self._set_shown(frame, ticket, digest)
+            return
+        if is_repeat and self._wrong_in_a_row:  # it copies a page that is known to be wrong
             return
         self._wrong_in_a_row += 1
         self.playback.note_wrong()
@@ -239,6 +298,11 @@ class FrameQueue:
             sum(frame is not self._last for frame in self._unwaited.values())
         )
         self._unwaited.clear()
+        self._repeats.clear()
+
+
+def _ignore_shown(ticket: int, now: float) -> None:
+    del ticket, now
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ class Playback:
         Seconds between swaps, as the device's reports have come; of the last 1000.
     wrong : int
         Frames that nobody waited for whose digest was not theirs.
+    repaired : int
+        How often the display was right again after that.
 
     """
 
@@ -38,6 +40,7 @@ class Playback:
     fps: float
     intervals_s: tuple[float, ...]
     wrong: int
+    repaired: int
 
 
 class PlaybackMeter:
@@ -52,7 +55,8 @@ class PlaybackMeter:
 
     def __init__(self, presented: int = 0) -> None:
         self._presented = presented
-        self._shown = self._dropped = self._wrong = 0
+        self._shown = self._dropped = self._wrong = self._repaired = 0
+        self._is_wrong = False
         self._first_s = self._last_s = 0.0
         self._before_first = 0
         self._intervals_s: deque[float] = deque(maxlen=_KEPT_INTERVALS)
@@ -68,6 +72,12 @@ class PlaybackMeter:
     def note_wrong(self) -> None:
         """Count a frame that is displayed wrongly."""
         self._wrong += 1
+        self._is_wrong = True
+
+    def note_right(self) -> None:
+        """Record that the display shows what it should."""
+        self._repaired += self._is_wrong
+        self._is_wrong = False
 
     def note_shown(self, count: int, now: float) -> None:
         """Count frames that were displayed since the last report; it names the last of them."""
@@ -90,4 +100,5 @@ class PlaybackMeter:
             fps=(self._shown - self._before_first) / seconds if seconds else 0.0,
             intervals_s=tuple(self._intervals_s),
             wrong=self._wrong,
+            repaired=self._repaired,
         )

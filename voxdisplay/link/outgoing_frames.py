@@ -159,13 +159,13 @@ class OutgoingFrames:
         Parameters
         ----------
         base : PictureId
-            The picture.
+            The picture, which is on display, or is the frame queued last.
         payloads : list of bytes
             Ops that turn the picture into the frame.
         full_payloads : callable
-            Returns the payloads that draw the frame from the dark. They are sent instead if the
-            picture is not displayed any more when the frame's turn comes, if packets are
-            outstanding then, or if the session ends before the frame is displayed.
+            Returns the payloads that draw the frame from the dark. They are sent instead if, when
+            the frame's turn comes, the frame right before it is not the picture, nor is that what
+            is displayed while no packet is outstanding; and so if the session ended meanwhile.
 
         """
         return self._add(
@@ -221,8 +221,13 @@ class OutgoingFrames:
             The displayed picture; None while packets are outstanding that may change it.
 
         """
-        applies = frame.base == displayed and frame is self._queue[0]
-        if frame.base is not None and not applies:
+        if frame.base is None:
+            return
+        if frame is self._queue[0]:
+            applies = frame.base == displayed
+        else:  # the device begins it when it displays the one before
+            applies = self._queue[self._queue.index(frame) - 1].ticket == frame.base[1]
+        if not applies:
             frame.payloads, frame.clear, frame.base = frame.full_payloads() or [b""], True, None
             frame.reset()
 

@@ -1,0 +1,75 @@
+"""`Display.play`: checks of its arguments, and a player with what it needs.
+
+Must not know how a frame is paced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from voxdisplay.argument_checks import choice, duration, flag, function, positive
+from voxdisplay.display.connection import Clock
+from voxdisplay.display.player import Late, Pacing, Player, Turn
+from voxdisplay.frame import FITS, Fit, Frame
+from voxdisplay.shows.binding import Playable, bind_timeline
+from voxdisplay.shows.play_report import PlayReport
+from voxdisplay.shows.preparing import FrameSource
+
+
+def play_show(
+    show: Playable,
+    blank: Frame,
+    turn: Turn,
+    check_frame: Callable[[Frame], None],
+    clock: Clock,
+    *,
+    speed: float,
+    start: float,
+    until: float | None,
+    loop: bool | None,
+    pacing: Pacing,
+    late: Late,
+    fit: Fit,
+    observer: Callable[[Player], None] | None,
+) -> PlayReport:
+    """Play a show: see `Display.play`.
+
+    Parameters
+    ----------
+    blank : Frame
+        A blank frame of the display.
+    turn : callable
+        As of `Player`.
+    check_frame : callable
+        Raises if a frame is not of the display's kind.
+    clock : callable
+        Returns seconds.
+    pacing : {"device", "host"}
+        ``clock`` of `Display.play`.
+
+    """
+    choice("clock", pacing, ("device", "host"))
+    choice("late", late, ("drop", "delay"))
+    choice("fit", fit, FITS)
+    function("observer", observer)
+    speed = positive("speed", speed)
+    start_s = duration("start", start)
+    timeline = bind_timeline(
+        show,
+        blank,
+        fit=fit,
+        loop=None if loop is None else flag("loop", loop),
+        until_s=None if until is None else positive("until", until),
+    )
+    if timeline.slot_at(start_s) is None:
+        raise ValueError(f"start: the show ends at {timeline.duration_s:g} s")
+    shows = [segment.show for segment in timeline.segments]
+    source = FrameSource(shows, check=check_frame, clock=clock)
+    try:
+        player = Player(
+            turn, clock, timeline, source, start_s=start_s, speed=speed, pacing=pacing, late=late,
+            observer=observer,
+        )  # fmt: skip
+        return player.run()
+    finally:
+        source.close()

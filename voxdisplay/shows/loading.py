@@ -1,0 +1,95 @@
+"""Loading of what can be played, by the name of its file: scenes and playlists.
+
+Must not know displays.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from voxdisplay.errors import SceneError
+from voxdisplay.scene.json_text import JsonText
+from voxdisplay.scene.reader import load_scene
+from voxdisplay.shows.binding import Playable
+from voxdisplay.shows.playlist import Playlist, PlaylistEntry, PlaylistFile, check_playlist
+
+_MAX_PLAYLIST_BYTES = 1 << 22
+_MAX_ENTRIES = 10_000  # of a playlist with those that it includes
+
+
+def load_show(path: str | os.PathLike[str]) -> Playable:
+    """Read a scene or a playlist.
+
+    Parameters
+    ----------
+    path : str or path
+        ``"-"`` is a scene on standard input.
+
+    Raises
+    ------
+    SceneError
+        If it cannot be read, or a playlist includes itself. Files of a playlist that are missing or
+        wrong are left out, and stand in `Playlist.notes`.
+
+    """
+    data = None if str(path) == "-" else _playlist_data(Path(path))
+    if data is None:
+        return load_scene(path)
+    notes: list[str] = []
+    root = _read_playlist(Path(path), data)
+    entries = _entries(root, (_identity(Path(path)),), notes)
+    if not entries:
+        why = f": {notes[0]}" if notes else ""
+        raise SceneError(f"nothing of the playlist can be played{why}", file=str(path))
+    return Playlist(tuple(entries), root.repeat, root.shuffle, tuple(notes))
+
+
+def _playlist_data(path: Path) -> str | None:
+    """Return the text of a playlist; None if the file is something else, or cannot be read."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_PLAYLIST_BYTES + 1)
+    except (OSError, ValueError):
+        return None
+    if b'"playlist"' not in data or len(data) > _MAX_PLAYLIST_BYTES:
+        return None
+    return data.decode("utf-8", "replace")
+
+
+def _read_playlist(path: Path, text: str) -> PlaylistFile:
+    return check_playlist(JsonText(text, str(path)).parse(), str(path))
+
+
+def _identity(path: Path) -> Path:
+    return path.resolve()
+
+
+def _entries(file: PlaylistFile, chain: tuple[Path, ...], notes: list[str]) -> list[PlaylistEntry]:
+    """Return the entries of a playlist, with those of the playlists that it includes."""
+    found: list[PlaylistEntry] = []
+    for item in file.items:
+        path = chain[-1].parent / item.show
+        identity = _identity(path)
+        if identity in chain:
+            raise SceneError(
+                f"the playlist includes itself, by {item.show!r}",
+                path=item.path,
+                file=str(chain[-1]),
+                hint='take that entry out; for ever is "repeat": 0',
+            )
+        text = _playlist_data(path)
+        if text is not None:
+            inner = _read_playlist(path, text)
+            found += item.repeat * _entries(inner, (*chain, identity), notes) * (inner.repeat or 1)
+        else:
+            try:
+                found.append(PlaylistEntry(item, load_scene(path)))
+            except SceneError as error:
+                notes.append(f"left out of the playlist: {error}")
+        if len(found) > _MAX_ENTRIES:
+            raise SceneError(
+                f"the playlist has more than {_MAX_ENTRIES} entries with those that it includes",
+                file=str(chain[0]),
+            )
+    return found
