@@ -40,6 +40,7 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     Mesh                Triangles between vertices.
     Box                 Box along the axes.
     Plane               Plane, as far as the display goes.
+    Scatter             Points without an order, each in its voxel.
     Disc                Flat disc.
     Sphere              Sphere or ball.
     Ellipsoid           Ellipsoid along the axes.
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
         Implicit,
         Mesh,
         Plane,
+        Scatter,
         Sphere,
         SphericalTriangle,
         Text,
@@ -194,6 +196,7 @@ if TYPE_CHECKING:
         "Receipt",
         "RemoteProtocolError",
         "Report",
+        "Scatter",
         "Scene",
         "SceneError",
         "Segment",
@@ -231,6 +234,7 @@ _MODULES = {
         "Implicit",
         "Mesh",
         "Plane",
+        "Scatter",
         "Sphere",
         "SphericalTriangle",
         "Text",

@@ -19,7 +19,7 @@ PUSH_KEYS = {
 }  # fmt: skip
 OBJECT_KEYS = {
     "object", "type", "voxels", "closed", "pieces", "e_max", "e_av", "gaps", "contacts", "clipped",
-    "seconds", "certified", "undefined", "jumps",
+    "seconds", "certified", "undefined", "jumps", "kind",
 }  # fmt: skip
 PAPER = "examples/paper-curve.json"
 

@@ -77,6 +77,7 @@ CALLS = {
     "Sphere": {"center": (5, 5, 5), "radius": 3, "fill": "solid"},
     "Disc": {"center": (5, 5, 5), "radius": 3, "normal": (0, 0, 1)},
     "Plane": {"point": (1, 2, 3), "normal": (0, 1, 1)},
+    "Scatter": {"points": [[1, 2, 3]]},
     "Box": {"start": (1, 1, 1), "end": (4, 5, 6), "fill": "solid"},
     "Mesh": {"vertices": POINTS, "faces": [(0, 1, 2)], "fill": "shell", "vertex_colors": None,
              "face_colors": [(1, 2, 3)], "uv": [(0, 0)] * 4,

@@ -41,6 +41,7 @@ BODIES = {
     "Sphere": vd.Sphere((5, 5, 5), 3, fill="solid"),
     "Disc": vd.Disc((5, 5, 5), 3, (1, 2, 3)),
     "Plane": vd.Plane((1, 2, 3), (0, 0, 1)),
+    "Scatter": vd.Scatter([[1, 2, 3], [4, 5, 6]], {"value": [1, 2]}),
     "Box": vd.Box((1, 1, 1), (4, 5, 6), fill="solid"),
     "Text": vd.Text("Ab", (1, 2, 3), 9, depth=2),
     "Volume": vd.Volume(np.arange(105.0).reshape(7, 5, 3), map="magma", spacing=(1, 1, 2)),

@@ -13,6 +13,7 @@ from voxdisplay.bodies.primitives import (
     Sphere,
     SphericalTriangle,
 )
+from voxdisplay.bodies.scatter import Scatter
 from voxdisplay.bodies.text import Text
 from voxdisplay.bodies.volume import Volume, VoxelModel
 
@@ -27,6 +28,7 @@ __all__ = [
     "Implicit",
     "Mesh",
     "Plane",
+    "Scatter",
     "Sphere",
     "SphericalTriangle",
     "Text",

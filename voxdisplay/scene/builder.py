@@ -28,12 +28,12 @@ from voxdisplay.scene.values import ColorMap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.curves import Curve
     from voxdisplay.scene.environment import Environment
     from voxdisplay.scene.json_text import JsonText
+    from voxdisplay.scene.scene_files import SceneFiles
     from voxdisplay.scene.scene_object import SceneObject
 
 T = TypeVar("T")
@@ -73,8 +73,8 @@ class SceneBuilder:
     paths : sequence of str
         Their JSON paths.
     environment : Environment
-    folder : Path or None
-        Folder of the files that objects may name; None: they may name none.
+    files : SceneFiles
+        The files that objects may name.
     source : JsonText or None
         The file's text.
     duration : float, optional
@@ -87,13 +87,13 @@ class SceneBuilder:
         objects: Sequence[SceneObject],
         paths: Sequence[str],
         environment: Environment,
-        folder: Path | None,
+        files: SceneFiles,
         source: JsonText | None,
         duration: float | None = None,
     ) -> None:
         self._objects = list(zip(paths, objects, strict=True))
         self._environment = environment
-        self.folder = folder
+        self.files = files
         self.source = source
         self.duration = duration
         self._kept: dict[tuple[Any, ...], Any] = {}
@@ -176,6 +176,7 @@ class _Run:
         self.fit = fit
         self.items: list[SceneItem] = []
         self.spans: list[PartSpan] = []
+        self._count = 0
         self.notes: list[str] = []
 
     def add(
@@ -198,7 +199,7 @@ class _Run:
     def _repeats(
         self, repeat: Mapping[str, str | float], path: str, environment: Environment
     ) -> Iterator[dict[str, float]]:
-        context = EvaluationContext(f"{path}.repeat", environment, None)
+        context = EvaluationContext(f"{path}.repeat", environment, self.builder.files)
         counts: list[int] = []
         total = 1
         for name, source in repeat.items():
@@ -232,7 +233,10 @@ class _Run:
         depth: int,
     ) -> None:
         """Add an object once."""
-        context = EvaluationContext(path, environment, self.builder.folder)
+        self._count += 1  # groups, too: they may be empty, and many
+        if self._count > MAX_ITEMS:
+            raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
+        context = EvaluationContext(path, environment, self.builder.files)
         if scene_object.during is not None and not self._is_during(scene_object, context):
             return
         place = outer

@@ -6,12 +6,14 @@ Knows how other programs name coordinates; it must not know rows or separators.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 AXES = "xyz"
 
 _LONGEST = 64  # as much of a name is looked at
 
 _UNIT = re.compile(r"\s*(?:[\[(].*|/.*|\bin\b.*)")
+_NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _WORDS = re.compile(r"[a-z]+|\d+")
 _AFFIXES = re.compile(r"(?:pos|coord|point|p|t)?([xyz])(?:pos|coord)?")
 # Words that only say that a column is a coordinate.
@@ -56,3 +58,23 @@ def _axis_with_words(name: str) -> str | None:
     axes = [match[1] for word in words if (match := _AFFIXES.fullmatch(word))]
     others = [word for word in words if not _AFFIXES.fullmatch(word)]
     return axes[0] if len(axes) == 1 and (_FILLERS | _UNITS).issuperset(others) else None
+
+
+def value_columns(names: list[str], wanted: Sequence[str]) -> dict[str, int]:
+    """Return the columns of some names, as far as there are such columns.
+
+    Parameters
+    ----------
+    names : list of str
+        As in the file: perhaps with units, or with characters that no name in expressions has.
+    wanted : sequence of str
+        Names in expressions.
+
+    """
+    found: dict[str, int] = {}
+    for spelling in (str.strip, lambda name: _NO_NAME.sub("_", _UNIT.sub("", name.strip()))):
+        spelt = [spelling(name) for name in names]
+        for name in wanted:
+            if name not in found and name in spelt:
+                found[name] = spelt.index(name)
+    return found

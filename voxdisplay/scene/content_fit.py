@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.raster.grid import Grid
     from voxdisplay.scene.item import PartSpan, SceneItem
+    from voxdisplay.voxelization import Sequence, VoxelSet
 
 _SAMPLES = 1025  # of a curve, for a first guess
 _ROUNDS = 4  # each finds the extent to half a voxel of the round before
@@ -66,7 +67,7 @@ def content_placement(
     guess = _joined([_rough_box(item, size) for scene in scenes for item in scene.items])
     if guess is None:
         return None, "nothing to fit: the scene shows nothing"
-    placement = _onto(guess, grid)
+    placement = _onto(guess, grid, margin=1)
     for _ in range(_ROUNDS):
         found = _joined([_voxel_box(scene.placed(placement, grid), grid) for scene in scenes])
         if found is None:
@@ -86,21 +87,23 @@ def _rough_box(item: SceneItem, size: Grid) -> Box | None:
         points = points[:, np.isfinite(points).all(axis=0)]
         return (points.min(axis=1), points.max(axis=1)) if points.size else None
     low, high = item.shape.bounds()
-    endless = np.array(size, dtype=np.float64)
-    low = np.where(np.isfinite(low), low, 0.0)
-    high = np.where(np.isfinite(high), high, endless)
-    return (low, high) if (low <= high).all() else None
+    if np.isfinite(low).all() and np.isfinite(high).all():
+        return low, high
+    (voxels,) = voxelize_items([item], size)
+    return _box_of(voxels)
+
+
+def _box_of(voxels: Sequence | VoxelSet) -> Box | None:
+    if not len(voxels):
+        return None
+    low, high = voxels.voxels.min(axis=0), voxels.voxels.max(axis=0)
+    return low.astype(np.float64), high + np.float64(1)
 
 
 def _voxel_box(scene: Content, grid: Grid) -> Box | None:
     """Return the box of all voxels that a scene shows."""
     whole = voxelize_items(scene.items, grid)
-    boxes = [
-        (each.voxels.min(axis=0).astype(float), each.voxels.max(axis=0) + 1.0)
-        for each in shown_voxels(whole, scene.spans)
-        if len(each)
-    ]
-    return _joined(boxes)
+    return _joined([_box_of(each) for each in shown_voxels(whole, scene.spans)])
 
 
 def _joined(boxes: Iterable[Box | None]) -> Box | None:
@@ -110,12 +113,12 @@ def _joined(boxes: Iterable[Box | None]) -> Box | None:
     return np.min([low for low, _ in found], axis=0), np.max([high for _, high in found], axis=0)
 
 
-def _onto(box: Box, grid: Grid) -> Placement:
+def _onto(box: Box, grid: Grid, margin: int = 0) -> Placement:
     """Return the uniform map of a box into the middle of a grid."""
     low, high = box
     room = np.array(grid, dtype=np.float64)
     extent = np.maximum(high - low, 1e-9)
-    scale = float((room / extent).min())
+    scale = float((np.maximum(room - 2 * margin, 1.0) / extent).min())
     if not np.isfinite(scale) or extent.max() <= 1e-9:
         scale = 1.0
     return Placement.scaling(scale, room / 2 - scale * (low + high) / 2)

@@ -332,4 +332,11 @@ class Points(CurveObject, tag="points", frozen=True):
             raise CurveError("points needs either the key 'points' or the key 'file'")
         found = context.points_from_file("file", self.file, split=self.gaps == "split")
         strands = np.split(found.points, found.starts[1:])
+        if found.columns:
+            values = {
+                name: np.split(each, found.starts[1:]) for name, each in found.columns.items()
+            }
+            context.columns = [
+                {name: each[i] for name, each in values.items()} for i in range(len(strands))
+            ]
         return [curves.Points(strand, closed=self.closed) for strand in strands]

@@ -17,14 +17,12 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.content_fit import content_placement
 from voxdisplay.scene.item import PartSpan, SceneItem
 from voxdisplay.scene.placement import Placement, placed
+from voxdisplay.scene.scene_files import DEFAULT_SIZE
 from voxdisplay.scene.show import SceneShow
 from voxdisplay.scene.voxelized_items import draw_items, shown_voxels, voxelize_items
 
 if TYPE_CHECKING:
     from voxdisplay.voxelization import Sequence, VoxelSet
-
-DEFAULT_SIZE = Grid(128, 128, 128)
-"""Size of the picture of a scene that names none."""
 
 DEFAULT_FPS = 30.0
 

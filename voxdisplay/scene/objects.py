@@ -8,6 +8,19 @@ from typing import Annotated, get_args
 from msgspec import Meta, Struct, field
 
 from voxdisplay.expressions.params import MAX_PARAMS
+from voxdisplay.scene.body_objects import (
+    Box,
+    Cone,
+    Cylinder,
+    Disc,
+    Ellipsoid,
+    HeightField,
+    Implicit,
+    Plane,
+    Scatter,
+    Sphere,
+    SphericalTriangle,
+)
 from voxdisplay.scene.curve_objects import (
     Arc,
     Bezier,
@@ -23,6 +36,7 @@ from voxdisplay.scene.curve_objects import (
     Segment,
     TorusKnot,
 )
+from voxdisplay.scene.model_objects import Mesh, Text, Volume
 from voxdisplay.scene.scene_object import SceneObject
 from voxdisplay.scene.values import Number, Param, Size
 
@@ -55,6 +69,20 @@ Object = (
     | BSpline
     | CatmullRom
     | Points
+    | HeightField
+    | Implicit
+    | Plane
+    | Disc
+    | Sphere
+    | Ellipsoid
+    | SphericalTriangle
+    | Box
+    | Cylinder
+    | Cone
+    | Mesh
+    | Volume
+    | Text
+    | Scatter
     | Group
 )
 TYPES = {str(scene_object.__struct_config__.tag): scene_object for scene_object in get_args(Object)}

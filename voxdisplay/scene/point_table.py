@@ -5,14 +5,18 @@ It must not open files, nor know what the points are for.
 
 from __future__ import annotations
 
+import math
 import re
 from array import array
 from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from voxdisplay.expressions.parse import excerpt
+from voxdisplay.scene.column_names import value_columns
 from voxdisplay.scene.table_layout import NAMES_HINT, Layout, find_layout, listed
 from voxdisplay.scene.table_text import (
     ROWS_HINT,
@@ -45,12 +49,15 @@ class FilePoints(NamedTuple):
         Index of the first point of each strand; empty if there is no point.
     note : str or None
         What was taken for x, y and z, if there was a choice.
+    columns : mapping of str to (n,) float64 array
+        Further columns that were wanted, by name; nan where there is no number.
 
     """
 
     points: Floats
     starts: NDArray[np.int64]
     note: str | None = None
+    columns: Mapping[str, Floats] = MappingProxyType({})
 
 
 def split_strands(points: Floats, gaps: list[int]) -> tuple[Floats, NDArray[np.int64]]:
@@ -73,7 +80,7 @@ def split_strands(points: Floats, gaps: list[int]) -> tuple[Floats, NDArray[np.i
     return points[kept], np.flatnonzero(first)
 
 
-def read_table(name: str, data: bytes, *, split: bool) -> FilePoints:
+def read_table(name: str, data: bytes, *, split: bool, wanted: Sequence[str] = ()) -> FilePoints:
     """Read a text table of points.
 
     Parameters
@@ -84,6 +91,8 @@ def read_table(name: str, data: bytes, *, split: bool) -> FilePoints:
         Text in UTF-8 or UTF-16.
     split : bool
         Whether rows that are empty or not finite separate strands; else they are errors.
+    wanted : sequence of str
+        Names of further columns that are read if the table has them.
 
     Raises
     ------
@@ -96,7 +105,8 @@ def read_table(name: str, data: bytes, *, split: bool) -> FilePoints:
     layout = find_layout(table)
     if layout is None:
         return FilePoints(np.empty((0, 3)), np.empty(0, dtype=np.int64))
-    rows = _Rows(table, layout)
+    more = value_columns(layout.names, wanted)
+    rows = _Rows(table, layout, list(more.values()))
     points = np.array(rows.numbers, dtype=np.float64).reshape(-1, 3)
     gaps = sorted(set(rows.empty) - {0, len(points)})
     if not split:
@@ -104,16 +114,21 @@ def read_table(name: str, data: bytes, *, split: bool) -> FilePoints:
             gaps = []
         rows.refuse_gaps(points, gaps)
     rows.refuse_ambiguity(points)
-    return FilePoints(*split_strands(points, gaps), rows.note())
+    values = np.array(rows.values, dtype=np.float64).reshape(len(points), -1)
+    values = values[np.isfinite(points).all(axis=1)]
+    columns = {each: values[:, i] for i, each in enumerate(more)}
+    return FilePoints(*split_strands(points, gaps), rows.note(), columns)
 
 
 class _Rows:
     """Numbers of all rows, and the lines that are no rows."""
 
-    def __init__(self, table: TableText, layout: Layout) -> None:
+    def __init__(self, table: TableText, layout: Layout, more: list[int]) -> None:
         self.table = table
         self.layout = layout
         self.numbers = array("d")
+        self.values = array("d")  # of the further columns
+        self._more = more
         self.empty: dict[int, int] = {}  # row -> an empty line before it
         self.skipped: list[int] = []  # rows before which there is a line that is no row
         self.decimal_comma: int | None = None  # line of the first one
@@ -136,6 +151,8 @@ class _Rows:
                 except ValueError:  # raised before the first is added
                     pass
                 else:
+                    if self._more:
+                        self._read_values(fields)
                     continue
             if text:
                 self._read_line(line)
@@ -179,6 +196,13 @@ class _Rows:
             if self.decimal_comma is None and has_decimal_comma(fields[k]):
                 self.decimal_comma = line
             self.numbers.append(value)
+        self._read_values(fields)
+
+    def _read_values(self, fields: list[str]) -> None:
+        """Read the further columns of a row; what is no number is nan."""
+        for k in self._more:
+            value = number(fields[k]) if k < len(fields) else None
+            self.values.append(math.nan if value is None else value)
 
     def _line_of(self, row: int) -> int:
         return self.layout.first + row + bisect_right(self.skipped, row)

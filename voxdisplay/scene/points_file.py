@@ -19,6 +19,8 @@ from voxdisplay.expressions.parse import excerpt
 from voxdisplay.scene.point_table import GAPS_HINT, FilePoints, read_table, split_strands
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 MAX_BYTES = 16 << 20
@@ -30,7 +32,9 @@ MAX_STRANDS = 10_000
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".xyz", ".asc", ".pts")
 
 
-def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
+def read_points(
+    folder: Path, name: str, *, split: bool = False, wanted: Sequence[str] = ()
+) -> FilePoints:
     """Read a file of points.
 
     Parameters
@@ -42,6 +46,8 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
         (n, 3), real numbers of any type.
     split : bool
         Whether rows that are empty or not finite separate strands; else they are errors.
+    wanted : sequence of str
+        Names of further columns that are read if the table has them.
 
     Raises
     ------
@@ -65,8 +71,10 @@ def read_points(folder: Path, name: str, *, split: bool = False) -> FilePoints:
     except (OSError, ValueError, RuntimeError) as error:  # of links in a loop, of a NUL
         what = error.strerror if isinstance(error, OSError) else error
         raise CurveError(f"cannot read {excerpt(name)}: {what}") from error
-    read = _read_array if kind == ".npy" else read_table
-    found = read(name, data, split=split)
+    if kind == ".npy":
+        found = _read_array(name, data, split=split)
+    else:
+        found = read_table(name, data, split=split, wanted=wanted)
     if not len(found.points):
         comments = kind != ".npy" and re.search(rb"^\s*[#%]", data, re.MULTILINE)
         hint = "lines that begin with # or % are comments" if comments else None

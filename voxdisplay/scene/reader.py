@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.model import Scene
 from voxdisplay.scene.objects import TYPES, Object, SceneFile
+from voxdisplay.scene.scene_files import SceneFiles
 from voxdisplay.scene.scene_object import SceneObject
 from voxdisplay.scene.type_mismatch import MOST_COMPARED, describe_value, find_mismatch
 from voxdisplay.scene.values import MAX_SIDE, Track
@@ -151,8 +153,9 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
             raise SceneError("expected text in double quotes", path="$.$schema")
         scene_object: SceneObject = _convert(raw, Object, source)
         environment = StillEnvironment({})
-        built = SceneBuilder([scene_object], ["$"], environment, folder, source).build()
-        return Scene(None, built.items, built.notes, built.spans)
+        files = SceneFiles(folder, None)
+        built = SceneBuilder([scene_object], ["$"], environment, files, source).build()
+        return Scene(files.size, built.items, built.notes, built.spans)
     file: SceneFile = _convert(raw, SceneFile, source)
     paths = [f"$.objects[{i}]" for i in range(len(file.objects))]
     notes = () if file.objects else ("the scene has no objects: there is nothing to show",)
@@ -164,9 +167,9 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
             raise SceneError("the scene has no duration", path=f"$.{key}", hint=hint)
     names = _params(file.params)
     size = _size(file.size, names) if file.size else None
-    builder = SceneBuilder(file.objects, paths, StillEnvironment(names), folder, source)
-    built = builder.build()
-    return Scene(size, built.items, (*built.notes, *notes), built.spans)
+    files = SceneFiles(folder, size)
+    built = SceneBuilder(file.objects, paths, StillEnvironment(names), files, source).build()
+    return Scene(files.size, built.items, (*built.notes, *notes), built.spans)
 
 
 def _moving_scene(
@@ -186,8 +189,10 @@ def _moving_scene(
     table = ValueTable(timeline.variables, timeline.values_at)
     environment = MovingEnvironment(timeline.constants, table)
     duration = timeline.duration
-    builder = SceneBuilder(file.objects, paths, environment, folder, source, duration)
-    return MovingScene.of_film(Film(timeline, table, builder, source), size, notes)
+    files = SceneFiles(folder, size)
+    builder = SceneBuilder(file.objects, paths, environment, files, source, duration)
+    scene = MovingScene.of_film(Film(timeline, table, builder, source), size, notes)
+    return scene if files.size == size else replace(scene, size=files.size)
 
 
 def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
@@ -212,7 +217,11 @@ def _params(params: dict[str, str | float | Track]) -> dict[str, float]:
 
 
 def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
-    numbers = EvaluationContext("$", StillEnvironment(names), None).numbers("size", sides).tolist()
+    numbers = (
+        EvaluationContext("$", StillEnvironment(names), SceneFiles(None, None))
+        .numbers("size", sides)
+        .tolist()
+    )
     for i, number in enumerate(numbers):
         if not (number.is_integer() and 1 <= number <= MAX_SIDE):
             problem = f"must be a whole number from 1 to {MAX_SIDE}, not {number:g}"

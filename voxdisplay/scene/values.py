@@ -69,6 +69,18 @@ Formula = Annotated[
         extra={"expected": "a number or an expression of t"},
     ),
 ]
+BodyFormula = Annotated[
+    float | _Text,
+    Meta(
+        title="Expression",
+        description=(
+            "An expression in the variables of the surface, numbers, constants (pi tau e deg), the "
+            f"scene's params and the functions {' '.join(sorted(FUNCTIONS))}. A condition is a "
+            "comparison by one of < <= > >= == !=, as in if(u < 1, a, b)."
+        ),
+        extra={"expected": "a number or an expression"},
+    ),
+]
 Vector = Annotated[
     tuple[Number, Number, Number],
     Meta(

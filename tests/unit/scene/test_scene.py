@@ -87,9 +87,10 @@ class TestMeaning:
         assert np.isfinite(item.curve.position(np.array(item.curve.t_range))).all()
 
     def test_every_type_is_tried(self) -> None:
-        assert {scene_object["type"] for scene_object in ONE_OF_EACH} == set(reader.TYPES) - {
-            "group"
+        curve_types = {
+            name for name, kind in reader.TYPES.items() if "closed" in kind.__struct_fields__
         }
+        assert {scene_object["type"] for scene_object in ONE_OF_EACH} == curve_types
 
     @pytest.mark.parametrize(
         "scene_object", ONE_OF_EACH, ids=lambda scene_object: scene_object["type"]
@@ -382,6 +383,8 @@ class TestSchema:
         assert scene.size
         assert scene.items
         for item in scene.items:
+            if not isinstance(item.shape, curves.Curve):
+                continue
             t = np.linspace(*item.curve.t_range, 1000)
             points = item.curve.position(t)
             assert (points >= 0).all()
