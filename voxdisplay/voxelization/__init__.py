@@ -101,16 +101,24 @@ def voxelize(
         For a body.
     Sequence
         For a curve:
-        26-connected; the first voxel of an open curve holds its first point, the last its last;
+        26-connected; the first voxel holds the first point, the last of an open curve its last;
         others are within 0.7072 of the curve, if a step from one float t to the next moves it by
         less than 0.002. Each has exactly two neighbours but for the contacts that
         ``.contact_pairs`` lists. A closed curve is one whose ends are within 0.001 voxels of each
         other, unless it says otherwise itself; its last voxel is a neighbour of the first.
 
-        A curve and its reverse have the same voxels, in reverse. A closed curve with a straight
-        run of nine voxels has the same voxels from every beginning (as far as its samples are the
-        same ones: for polygons to the bit); the first is the one that holds its first point or,
-        where a corner is cut there, the nearest to it.
+        A closed curve could begin at any of its corners, which are found at its ``breaks``: all of
+        their voxels are in the sequence, as ends are within 0.8661 of the curve, and are contacts
+        where no way without a chord leads through them, as at right angles between axes. So a
+        polygon has the same voxels from each of its corners, but for a few with corners less than
+        two voxels apart. A smooth closed curve that begins elsewhere has other voxels near both
+        beginnings where one passes by the first point of the other, and single ones where it is
+        sampled at other points.
+
+        A curve and its reverse have the same voxels, in reverse, and so have shifts by whole voxels
+        and mirror images, unless an end or a corner lies on a face of voxels: a voxel holds its
+        lower faces only. A closed curve that begins on a face, but at no corner, begins with the
+        voxel on the inner side.
 
     Raises
     ------

@@ -11,7 +11,8 @@ the intervals make up the range of t. For each some c_i is found such that all o
 
 *Every voxel is near the curve.* For each a parameter s is found such that all of the box that
 holds the single point P(s) is within 0.7072 of c_i: ``ERROR``; of the first and the last voxel,
-which hold the curve's ends whatever that takes, within 0.8661: ``END_ERROR``. So is P(s).
+which hold the curve's ends whatever that takes, within 0.8661: ``END_ERROR``; and so of those that
+hold the corners of a closed curve, which could begin at any of them. So is P(s).
 
 *The sequence is connected.* Integers.
 
@@ -57,7 +58,8 @@ class Certificate:
     coverage : float
         Every point of the curve is within this of a voxel's centre, in max norm, in voxels.
     error : float
-        Every voxel's centre is within this of the curve, but for the first and the last.
+        Every voxel's centre is within this of the curve, but for the first and the last, and those
+        that hold corners of a closed curve.
     end_error : float
         Those are within this.
 
@@ -108,6 +110,8 @@ def certify(
     ends = np.zeros(t.size, dtype=bool)
     ends[0] = True
     ends[-1] |= not closed or off[-1] > ERROR
+    if closed and curve.breaks.size:
+        ends |= _holds_any(voxels, curve.position(np.asarray(curve.breaks)))
     error = float(off[~ends].max(initial=0.0)) + ROUNDING
     end_error = float(off[ends].max()) + ROUNDING
     if not (error <= ERROR and end_error <= END_ERROR):
@@ -158,6 +162,12 @@ def _voxel_errors(curve: Curve, centres: Floats, t: Floats) -> Floats:
         other = _nearest(curve, centres[:, far], low, high)
         off[far] = np.fmin(off[far], _distances(curve, centres[:, far], other))
     return off
+
+
+def _holds_any(voxels: NDArray[np.int32], points: Floats) -> NDArray[np.bool_]:
+    """Return which voxels, (N, 3), hold any of some points, (3, n)."""
+    held = set(zip(*np.floor(points).astype(np.int64).tolist(), strict=True))
+    return np.array([tuple(voxel) in held for voxel in voxels.tolist()])
 
 
 def _distances(curve: Curve, centres: Floats, t: Floats) -> Floats:

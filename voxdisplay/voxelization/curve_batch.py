@@ -33,6 +33,9 @@ TIE_SHIFT = 1e-7
 CORE = 0.25
 # Ends this near to each other, in voxels, are one point, if the curve does not say.
 CLOSURE_TOLERANCE = 1e-3
+# A closed curve that turns more than this, 45 degrees, between its last initial sample and its
+# first ones has a corner where it begins.
+MAX_SMOOTH_COSINE = 0.7
 # A coordinate is on a face of voxels if it is this near to a whole number.
 ON_FACE = 1e-9
 
@@ -114,7 +117,6 @@ class CurveBatch:
         # The last position that was not finite: index of the curve, t.
         self._undefined: tuple[int, float] | None = None
         self._evaluator = BatchEvaluator(self.curves)
-        self._extended: Bools | None = None  # whose parameters go on past the end of the range
         self._centres: Floats | None = None  # of the curves' boxes, (3, curves)
         self._tie_shift = np.empty(0)
         # Parameters nearer to each other than this may be equal floats somewhere in the range.
@@ -178,9 +180,6 @@ class CurveBatch:
             If a position is not finite, or too far out to have a voxel.
 
         """
-        if self._extended is not None:
-            past = self._extended[curve] & (t > self.last[curve])
-            t = np.where(past, t - (self.last - self.first)[curve], t)
         points = self._evaluator.positions(curve, t)
         # And so not where P is not a number: it would be least and greatest.
         near = points.min(initial=0) > -MAX_COORDINATE and points.max(initial=0) < MAX_COORDINATE
@@ -207,20 +206,17 @@ class CurveBatch:
         of = np.repeat(np.arange(len(breaks)), [each.size for each in breaks])
         return np.asarray(of + 1j * np.concatenate(breaks))
 
-    def extend(self, curves: Bools) -> None:
-        """Accept parameters past the ends of the ranges of some curves, closed ones.
-
-        They mean the next round: ``last`` and more is ``first`` and more.
-        """
-        self._extended = curves
-
     @np.errstate(under="ignore")
     def settle_ties(self, samples: Samples) -> Samples:
         """Move all points of the curves by ``TIE_SHIFT`` from now on, but for the ends.
 
         A curve of which a corner, or the end of an open curve, lies on a face of voxels stays
-        where it is: which of two voxels holds a point of their face is a matter of definition. A
-        straight diagonal halfway between voxels stays straight: both of its axes move alike.
+        where it is: which of two voxels holds a point of their face is a matter of definition, of
+        [i, i + 1), and knows both axis and sign. So the mirror image of such a curve is not always
+        its voxels' mirror image. A closed curve that begins on a face without a corner, as a
+        circle does, is moved: of both voxels that hold its first point on their face, it begins
+        with the inner one, and looks there as it does on its other sides. A straight diagonal
+        halfway between voxels stays straight: both of its axes move alike.
 
         Parameters
         ----------
@@ -243,7 +239,7 @@ class CurveBatch:
         is_open |= (high - low).max(axis=0) <= CLOSURE_TOLERANCE  # a point, and no loop
         is_open |= np.array([curve.closed is False for curve in self.curves])
         ends = np.concatenate((first[is_open], last[is_open]))
-        fixed = np.concatenate((ends, self.corners(samples)))
+        fixed = np.concatenate((ends, self.corners(samples), self._first_corners(samples)))
         points = samples.points.take(fixed, axis=1)
         on_face = (np.abs(points - np.rint(points)) < ON_FACE).any(axis=0)
         self._tie_shift = np.full(first.size, TIE_SHIFT / CORE)
@@ -254,6 +250,17 @@ class CurveBatch:
         points = self._moved(samples.piece, samples.points)
         points[:, ends] = samples.points.take(ends, axis=1)
         return replace(samples, points=points)
+
+    def _first_corners(self, samples: Samples) -> Ints:
+        """Return the first samples of curves that would turn sharply there if they are closed."""
+        first, last = samples.bounds[:-1], samples.bounds[1:] - 1
+        points = samples.points
+        begin = points.take(np.minimum(first + 1, last), axis=1) - points.take(first, axis=1)
+        end = points.take(last, axis=1) - points.take(np.maximum(last - 1, first), axis=1)
+        length = np.sqrt((begin * begin).sum(axis=0) * (end * end).sum(axis=0))
+        turns = (begin * end).sum(axis=0) < MAX_SMOOTH_COSINE * length
+        turns |= np.array([curve.breaks.size > 0 for curve in self.curves])
+        return np.asarray(first[turns])
 
     def _moved(self, curve: Ints, points: Floats) -> Floats:
         if self._centres is None:

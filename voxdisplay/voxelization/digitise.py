@@ -11,13 +11,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from operator import attrgetter
 from time import perf_counter
 
 import numpy as np
 
 from voxdisplay.compute import kernel_backend, parallel
-from voxdisplay.compute.array_types import Ints
+from voxdisplay.compute.array_types import Bools, Ints
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.adaptive_sampling import (
@@ -29,10 +30,10 @@ from voxdisplay.voxelization.certify import Certificate, certify
 from voxdisplay.voxelization.curve_batch import CLOSURE_TOLERANCE, CurveBatch, Samples
 from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose_curves, sample_overlooked
 from voxdisplay.voxelization.grid_plane import trace_all_planes, trace_curves
-from voxdisplay.voxelization.loop_closing import close_loop
+from voxdisplay.voxelization.loop_closing import close_loops, loops_of
+from voxdisplay.voxelization.loop_corners import join_at_corners, split_at_corners
 from voxdisplay.voxelization.plane_crossings import dominant_crossings
 from voxdisplay.voxelization.restoring import restore_coverage
-from voxdisplay.voxelization.seams import begin_at_start, move_seams, within_range
 from voxdisplay.voxelization.sequence import Sequence
 from voxdisplay.voxelization.thinning import thin_events
 from voxdisplay.voxelization.voxel_events import VoxelEvents
@@ -46,6 +47,7 @@ BATCHES_PER_PROCESSOR = 8
 
 ONE_PIECE = np.zeros(1, dtype=np.int64)
 ONE_PIECE.flags.writeable = False
+NO_CORNERS = np.empty(0, dtype=np.int64)
 
 
 @np.errstate(all="ignore")
@@ -88,49 +90,55 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
         samples = refine_samples(batch, sample_overlooked(batch, samples, boxes))
     samples = split_at_jumps(batch, samples)
     closed = _closed(batch, samples)
-    crossings, moved = dominant_crossings(batch, samples), [False] * len(closed)
-    if any(closed):
-        crossings, samples, moved = move_seams(batch, crossings, samples, closed)
-    traced = trace_curves(batch, crossings, samples)
-    events = thin_events(traced, samples, keep_tips=certified)
+    crossings, parts = dominant_crossings(batch, samples), samples
+    some_closed = bool(closed.any())
+    if some_closed:
+        crossings, parts, whole = split_at_corners(batch, crossings, samples, closed)
+    traced = trace_curves(batch, crossings, parts)
+    events = thin_events(traced, parts, keep_tips=certified)
+    corners = NO_CORNERS
+    if some_closed and parts is not samples:
+        events, corners = join_at_corners(events, whole)
+        traced, _ = join_at_corners(traced, whole)
     starts = _starts(events)
     voxels, t = np.ascontiguousarray(events.voxels.T), events.t
     voxels.flags.writeable = t.flags.writeable = False
     # Curve i has the pieces of[i] to of[i + 1], which begin and end at these of the bounds.
     of = np.searchsorted(samples.curve[events.piece[starts]], np.arange(len(batch.curves) + 1))
-    bounds = np.append(starts, len(voxels))[of].tolist()
-    single = (np.diff(of) == 1).tolist()
+    bounds = np.append(starts, len(voxels))[of]
+    single = np.diff(of) == 1
+    ends, changed = bounds[1:].copy(), {}
+    if some_closed:
+        closed &= single
+        index = closed.nonzero()[0]
+        loops = loops_of(events, index, bounds[index], bounds[index + 1])
+        ends[index] = loops.begin + loops.size
+        changed = close_loops(batch, events, loops, corners)
     seconds = (perf_counter() - begin) / len(voxels)
-    spans = zip(batch.curves, bounds, bounds[1:], strict=False)
-    if not boxes and all(single) and not any(closed):  # as most are
-        with _garbage_collection_paused():
-            return [
-                Sequence(voxels[a:b], False, ONE_PIECE, t[a:b], curve, seconds * (b - a))
-                for curve, a, b in spans
+    begins = bounds[:-1].tolist()
+    listed = begins, ends.tolist(), closed.tolist()
+    with _garbage_collection_paused():
+        if single.all():  # as most are
+            sequences = [
+                Sequence(voxels[a:b], loop, ONE_PIECE, t[a:b], curve, seconds * (b - a))
+                for curve, a, b, loop in zip(batch.curves, *listed, strict=True)
             ]
-    sequences = []
-    for index, (curve, low, high) in enumerate(spans):
-        begin = perf_counter()
-        own_voxels, own_t = voxels[low:high], t[low:high]
-        closes = closed[index] and single[index]
-        if closes:
-            thin = events.take(np.arange(low, high))
-            if moved[index]:
-                loop = thin = begin_at_start(thin, batch.curves[index])
-            else:
-                loop = close_loop(thin, curve.position, batch.last[index])
-            own_voxels, own_t = np.ascontiguousarray(loop.voxels.T), loop.t
-            own_voxels.flags.writeable = own_t.flags.writeable = False
-        spent = seconds * len(own_voxels) + perf_counter() - begin
-        own_starts = starts[of[index] : of[index + 1]] - low
-        sequence = Sequence(own_voxels, closes, own_starts, own_t, curve, spent)
-        if boxes:
-            if not (closes and moved[index]):
-                thin = events.take(np.arange(low, high))
-            sequence = _with_proof(batch, sequence, boxes, index, thin, traced)
-            spent = seconds * len(sequence) + perf_counter() - begin
-            sequence = replace(sequence, seconds=spent)
-        sequences.append(sequence)
+        else:
+            own_starts = [starts[i:j] - starts[i] for i, j in pairwise(of.tolist())]
+            sequences = [
+                Sequence(voxels[a:b], loop, own, t[a:b], curve, seconds * (b - a))
+                for curve, a, b, loop, own in zip(batch.curves, *listed, own_starts, strict=True)
+            ]
+    for number, (own_voxels, own_t) in changed.items():
+        curve, spent = batch.curves[number], seconds * len(own_voxels)
+        sequences[number] = Sequence(own_voxels, True, ONE_PIECE, own_t, curve, spent)
+    if boxes:
+        for number, sequence in enumerate(sequences):
+            begin = perf_counter()
+            thin = events.take(np.arange(bounds[number], bounds[number + 1]))
+            proven = _with_proof(batch, sequence, boxes, number, thin, traced)
+            spent = seconds * len(proven) + perf_counter() - begin
+            sequences[number] = replace(proven, seconds=spent)
     return sequences
 
 
@@ -179,7 +187,7 @@ def _with_proof(
             full = trace_all_planes(batch, samples)
             thin = thin_events(full, samples, keep_tips=True)
         else:
-            full = within_range(traced.take(traced.piece == thin.piece[0]), curve)
+            full = traced.take(traced.piece == thin.piece[0])
         restored = restore_coverage(thin, full, ends, box, closed=closed)
         voxels = np.ascontiguousarray(restored.voxels.T)
         voxels.flags.writeable = restored.t.flags.writeable = False
@@ -197,23 +205,27 @@ def _starts(events: VoxelEvents) -> Ints:
     return np.concatenate(([0], ends + 1))
 
 
-def _closed(batch: CurveBatch, samples: Samples) -> list[bool]:
+def _closed(batch: CurveBatch, samples: Samples) -> Bools:
     """Return which curves are closed; raise CurveError if one is declared so but is not."""
     first = samples.curve_starts(len(batch.curves))
     last = np.append(first[1:], samples.t.size) - 1
-    apart = np.abs(samples.points[:, first] - samples.points[:, last]).max(axis=0)
-    closed: list[bool] = (apart <= CLOSURE_TOLERANCE).tolist()
-    for index in np.flatnonzero(apart <= CLOSURE_TOLERANCE).tolist():
-        own = samples.points[:, first[index] : last[index] + 1]
+    ends = samples.points.take(first, axis=1), samples.points.take(last, axis=1)
+    apart = np.abs(ends[0] - ends[1]).max(axis=0)
+    closed = np.asarray(apart <= CLOSURE_TOLERANCE)
+    if closed.any():
         # A curve that stays in one point is not closed.
-        closed[index] = bool(np.abs(own - own[:, :1]).max() > CLOSURE_TOLERANCE)
+        extent = np.maximum.reduceat(samples.points, first, axis=1)
+        extent -= np.minimum.reduceat(samples.points, first, axis=1)
+        closed &= extent.max(axis=0) > CLOSURE_TOLERANCE
     declared = [
         (at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None
     ]
     for index, is_closed in declared:
-        ends = samples.points[:, [first[index], last[index]]]
         closed[index] = is_closed
-        if is_closed and (np.abs(np.diff(np.floor(ends))) > 1).any():
+        if (
+            is_closed
+            and (np.abs(np.floor(ends[0][:, index]) - np.floor(ends[1][:, index])) > 1).any()
+        ):
             raise CurveError(
                 f"{batch.message_prefix(index)}the curve is said to be closed, but its ends are "
                 f"{apart[index]:.6g} voxels apart",

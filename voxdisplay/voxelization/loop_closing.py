@@ -1,204 +1,373 @@
-"""Closing of small loops at their first voxel.
+"""Closing of loops at their first voxel, and at corners that must stay.
 
-A closed curve without a long straight run (see `seams`) is thinned as if it were open, from the
-voxel of its first point S to the same voxel. Often the voxels before and after it are adjacent, a
-chord. Then the loop is led through S by a small detour, found by exhaustive search. All of this is
-local to S and works on one curve, given as points: this module must not know curves.
+A closed curve is thinned as if it were open, from the voxel of its first point S to the same
+voxel. Often the voxels before and after it are adjacent, a chord. Then the loop is led through S by
+a small detour, the nearest to the curve, found by exhaustive search; if there is none, S stays and
+the chord with it, as at a right angle between two axes. Corners are treated as S is. This module
+knows curves only as points.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from itertools import product
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.compute.array_types import Floats
-from voxdisplay.voxelization.thinning import MAX_UNCOVERED, WINDOW, furthest_shortcuts
-from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, adjacent
+from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.voxelization.curve_batch import CurveBatch
+from voxdisplay.voxelization.thinning import (
+    COST_UNITS,
+    FAR,
+    MAX_UNCOVERED,
+    TINY,
+    VOXEL_COST,
+    WINDOW,
+)
+from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 Voxel = tuple[int, int, int]
 
-# How far from the seam voxels may be replaced, and by how many on each side.
+# How far from a joint voxels may be replaced, and by how many on each side.
 MAX_REPLACED = 7
 MAX_DETOUR = 3
-# Samples per voxel of the sequence, to tell how far voxels are from the curve.
-SAMPLES_PER_VOXEL = 16
+# A loop of fewer voxels is left as it is.
+MIN_LOOP = 5
+# Points of the curve on each side of a joint, to tell how far voxels are from it.
+POINTS = 57
+# Squared distance from the curve up to which voxels may be part of a detour: less than that of all
+# four voxels around a line along their edge, which would be led around it.
+MAX_SQUARE = 0.5 - 1e-6
+
+# Places along a loop, counted from a joint, between which a chord would lead over it.
+_PAIRS = np.array(
+    [(low, low + d) for d in range(2, WINDOW + 1) for low in range(max(-d, 1 - WINDOW), 1)],
+    dtype=np.int64,
+)
+_PAIRS = _PAIRS[_PAIRS[:, 1] < WINDOW]
+_CELL = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.int64).T
 
 
-def close_loop(loop: VoxelEvents, position: Callable[[Floats], Floats], end: float) -> VoxelEvents:
-    """Return a closed sequence made of one that returns to its first voxel.
+@dataclass(frozen=True, slots=True)
+class Loops:
+    """Closed curves among thinned events.
+
+    Attributes
+    ----------
+    curve : (n,) int64 array
+        Indices of the curves, ascending.
+    begin, size : (n,) int64 arrays
+        The first event of each, and the number of its voxels.
+
+    """
+
+    curve: Ints
+    begin: Ints
+    size: Ints
+
+
+class Ring(NamedTuple):
+    """A closed sequence: voxels, parameters, and which voxels must stay."""
+
+    voxels: list[Voxel]
+    t: list[float]
+    stays: list[bool]
+
+
+class Path(NamedTuple):
+    """A chordless path from a joint's voxel to one side of the loop; sets of voxels as bits."""
+
+    cost: int  # of its voxels and of what is left of the side
+    nodes: tuple[int, ...]
+    join: int  # where it arrives on the side
+    own: int
+    ends: int  # its voxels and that of the side where it arrives
+    rest: int  # what is left of the side
+    near_own: int
+    near_ends: int
+
+
+def loops_of(events: VoxelEvents, curve: Ints, begin: Ints, end: Ints) -> Loops:
+    """Return loops of events from ``begin`` to ``end``, of which the last may repeat the first."""
+    again = (events.voxels[:, begin] == events.voxels[:, end - 1]).all(axis=0)
+    size = end - begin
+    return Loops(curve, begin, size - (again & (size > 1)))
+
+
+def close_loops(
+    batch: CurveBatch, events: VoxelEvents, loops: Loops, corners: Ints
+) -> dict[int, tuple[NDArray[np.int32], Floats]]:
+    """Lead loops through their first voxels and their corners without chords, where possible.
 
     Parameters
     ----------
-    loop : VoxelEvents
-        One thinned piece, first and last voxel equal or adjacent.
-    position : callable
-        (n,) parameters -> (3, n) points of the curve.
-    end : float
-        The last parameter of the curve.
+    batch : CurveBatch
+        The curves.
+    events : VoxelEvents
+        Thinned.
+    loops : Loops
+        Closed curves among them. First and last voxel of each are adjacent.
+    corners : (k,) int64 array
+        Events, ascending, whose voxels are to stay as well.
 
     Returns
     -------
-    Events
-        The first voxel is the same; the last is a neighbour of it. No two voxels near the seam
-        are neighbours but consecutive ones, unless that is impossible with voxels near the
-        curve that cover it.
+    dict
+        For those that change, by the index of the curve: voxels, (n, 3), and parameters, (n,). The
+        first voxel stays the first. No two voxels near the joints are neighbours but consecutive
+        ones, unless that is impossible with voxels near the curve that cover it.
 
     """
-    size = loop.t.size
-    if size > 1 and (loop.voxels[:, 0] == loop.voxels[:, -1]).all():
-        size -= 1
-        loop = loop.take(np.arange(size))
-    if size < 5 or not _touches_at_seam(loop.voxels):
-        return loop
-    ring = _cut_across(loop)
-    return _reroute(ring, loop, position, end) or loop
+    inside = loops.begin.searchsorted(corners, side="right") - 1
+    at = corners - loops.begin[inside]
+    inner = (inside >= 0) & (at > 0) & (at < loops.size[inside])
+    of = np.concatenate((np.arange(loops.begin.size), inside[inner]))
+    at = np.concatenate((np.zeros(loops.begin.size, dtype=np.int64), at[inner]))
+    order = np.lexsort((at, of))
+    of, at = of[order], at[order]
+    touching = _has_chord(events, loops, of, at).nonzero()[0]
+    if not touching.size:
+        return {}
+    # In an order that knows no beginning: detours at joints near to each other are not independent.
+    voxels = events.voxels.take(loops.begin[of[touching]] + at[touching], axis=1)
+    touching = touching[np.lexsort((*voxels, of[touching]))]
+    points = _points_around(batch, events, loops, of, at, touching)
+    opens = np.searchsorted(of, np.arange(loops.begin.size + 1))
+    changed: dict[int, tuple[NDArray[np.int32], Floats]] = {}
+    rings: dict[int, Ring] = {}
+    for joint, near in zip(touching.tolist(), points, strict=True):
+        number = int(of[joint])
+        index, nth = int(loops.curve[number]), joint - int(opens[number])
+        if number not in rings:
+            some = slice(int(loops.begin[number]), int(loops.begin[number] + loops.size[number]))
+            stays = np.zeros(int(loops.size[number]), dtype=bool)
+            stays[at[opens[number] : opens[number + 1]]] = True
+            listed = list(zip(*events.voxels[:, some].tolist(), strict=True))
+            rings[number] = Ring(listed, events.t[some].tolist(), stays.tolist())
+        before = rings[number]
+        here = [k for k, stays in enumerate(before.stays) if stays][nth]
+        ring = _reroute(before, here, near, float(batch.last[index]))
+        if ring is not before:
+            rings[number] = ring
+            t = np.maximum.accumulate(ring.t)
+            changed[index] = np.array(ring.voxels, dtype=np.int32), t
+    return changed
 
 
-def _touches_at_seam(voxels: NDArray[np.int32]) -> bool:
-    """Return whether a closed sequence, (3, n), has a chord across its seam."""
-    size = voxels.shape[1]
-    reach = min(WINDOW - 1, size - 1)
-    around = np.arange(-reach, reach + 1)
-    ring = voxels[:, around % size]
-    touch = adjacent(ring[:, :, None], ring[:, None, :])
-    before, after = np.meshgrid(around, around, indexing="ij")
-    # Cyclic distance from 2 to WINDOW: more than a step, and no chord that the window let be.
-    apart = after - before
-    across = (before < 0) & (after >= 0) | (before <= 0) & (after > 0)
-    across &= (apart > 1) & (apart <= min(WINDOW, size - 2))
-    return bool((touch & across).any())
+def _has_chord(events: VoxelEvents, loops: Loops, of: Ints, at: Ints) -> Bools:
+    """Return which loops have a chord that leads over a joint: ``at`` of loop ``of``, (m,) each."""
+    size = loops.size[of]
+    reach = np.arange(1 - WINDOW, WINDOW)
+    around = (at[:, None] + reach) % size[:, None] + loops.begin[of, None]
+    low, high = _PAIRS.T + (WINDOW - 1)
+    chord = np.zeros(of.size, dtype=bool)
+    close = np.ones((of.size, len(_PAIRS)), dtype=bool)
+    for row in events.voxels:
+        ring = row[around]
+        close &= np.abs(ring[:, high] - ring[:, low]) <= 1
+    # A loop has no more places than voxels; and two of them are neighbours anyway.
+    close &= high - low <= (size - 2)[:, None]
+    within = np.minimum(WINDOW, size)[:, None]
+    close &= (_PAIRS[:, 1] < within) & (-_PAIRS[:, 0] < within)
+    np.logical_or.reduce(close, axis=1, out=chord)
+    return np.asarray(chord & (size >= MIN_LOOP))
 
 
-def _cut_across(loop: VoxelEvents) -> VoxelEvents:
-    """Take the first shortcut across the seam. It skips the first voxel."""
-    size = loop.t.size
-    reach = min(WINDOW, (size - 1) // 2)
-    around = np.arange(-reach, reach + 1) % size
-    leap = furthest_shortcuts(loop.voxels[:, around], np.zeros(around.size, dtype=np.int64))
-    over = np.arange(reach) + leap[:reach] > reach
-    if not over.any():
-        return loop
-    start = int(np.argmax(over))
-    skipped = around[start + 1 : start + leap[start]]
-    return loop.take(np.delete(np.arange(size), skipped))
+def _points_around(
+    batch: CurveBatch, events: VoxelEvents, loops: Loops, of: Ints, at: Ints, some: Ints
+) -> Floats:
+    """Return points of the curve before and after some of the joints: (m, 3, 2 * POINTS).
+
+    They go as far as voxels may be replaced, and not over the next joint.
+    """
+    size, begin, curve = loops.size[of], loops.begin[of], loops.curve[of]
+    reach = np.minimum(MAX_REPLACED, size // 2 - 1)
+    last_of_loop = np.append(of[1:] != of[:-1], True)
+    following = np.where(last_of_loop, size, np.append(at[1:], 0))
+    previous = np.append(0, at[:-1])
+    previous[at == 0] = at[last_of_loop]
+    t, first, last = events.t, batch.first[curve], batch.last[curve]
+    middle = t[begin + at]
+    end = np.where(at == 0, last, middle)
+    low = t[begin + np.maximum(np.where(at == 0, size, at) - reach, previous)]
+    beyond = np.minimum(at + reach, following)
+    high = np.where(beyond < size, t[begin + np.minimum(beyond, size - 1)], last)
+    share = np.linspace(0.0, 1.0, POINTS)
+    sides = [a[some, None] + (b - a)[some, None] * share for a, b in ((low, end), (middle, high))]
+    along = np.concatenate(sides, axis=1)
+    along = np.clip(along, first[some, None], last[some, None]).reshape(-1)
+    order = np.argsort(some, kind="stable")  # curves must ascend
+    points = batch.evaluate(
+        curve[some[order]].repeat(2 * POINTS), along.reshape(some.size, -1)[order].reshape(-1)
+    )
+    points = points.reshape(3, some.size, 2 * POINTS).transpose(1, 0, 2)
+    return points[np.argsort(order)]
 
 
-def _reroute(
-    ring: VoxelEvents, loop: VoxelEvents, position: Callable[[Floats], Floats], end: float
-) -> VoxelEvents | None:
-    """Return a ring led through the first voxel of ``loop`` without chords; None if impossible."""
-    size = ring.t.size
-    if size == loop.t.size:
-        return None  # a chord, but what is between its ends goes its own way
+def _reroute(ring: Ring, at: int, points: Floats, last: float) -> Ring:
+    """Return a ring led through the voxel at a joint without chords; the same if impossible."""
+    size = len(ring.t)
     reach = min(MAX_REPLACED, size // 2 - 1)
     if reach < 1:
-        return None
-    start = _as_voxels(loop.voxels[:, :1])[0]
-    after = _as_voxels(ring.voxels[:, :reach])
-    before = _as_voxels(ring.voxels[:, : -reach - 1 : -1])
-    t_before = np.linspace(ring.t[-reach], end, SAMPLES_PER_VOXEL * reach)
-    t_after = np.linspace(loop.t[0], ring.t[reach - 1], SAMPLES_PER_VOXEL * reach)
-    points = position(np.concatenate((t_before, t_after)))
-    square = _square_distances(points, {*after, *before})
-    detour = _best_detour(start, after, before, points, square)
-    if detour is None:
-        return None
-    out, j, back, i = detour
-    kept = ring.take(np.arange(j, size - i))
-    lead = np.array([start, *out], dtype=np.int32).T
-    tail = np.array(back[::-1], dtype=np.int32).reshape(-1, 3).T
-    t = np.concatenate(
-        (
-            np.linspace(loop.t[0], kept.t[0], len(out) + 1, endpoint=False),
-            kept.t,
-            np.linspace(end, kept.t[-1], len(back), endpoint=False)[::-1],
-        )
+        return ring
+    around = [[(at + way * (k + 1)) % size for k in range(reach)] for way in (1, -1)]
+    for side in around:  # detours do not lead over other joints
+        stop = next((k for k, index in enumerate(side) if ring.stays[index]), reach)
+        del side[stop + 1 :]
+    after, before = around
+    found = _best_detour(
+        ring.voxels[at],
+        [ring.voxels[k] for k in after],
+        [ring.voxels[k] for k in before],
+        points,
     )
-    voxels = np.concatenate((lead, kept.voxels, tail), axis=1)
-    return VoxelEvents(np.full(t.size, loop.piece[0]), t, voxels, np.full(t.size, NO_HEADING))
+    if found is None:
+        return ring
+    out, j, back, i = found
+    t_out = ring.t[after[j]] if after[j] else last
+    t_back = ring.t[before[i]]
+    begin, end = ring.t[at], ring.t[at] if at else last
+    fresh_out = [begin + (t_out - begin) * (k + 1) / (len(out) + 1) for k in range(len(out))]
+    fresh_back = [end + (t_back - end) * (k + 1) / (len(back) + 1) for k in range(len(back))]
+    parts = []
+    for old, new_out, new_back in (
+        (ring.voxels, out, back),
+        (ring.t, fresh_out, fresh_back),
+        (ring.stays, [False] * len(out), [False] * len(back)),
+    ):
+        turned = old[at:] + old[:at]
+        kept = turned[1 + j : size - i]
+        fresh = [turned[0], *new_out, *kept, *new_back[::-1]]
+        parts.append(fresh)
+    if at:  # turn it back
+        start = 1 + len(out) + (size - at) - (1 + j)
+        parts = [part[start:] + part[:start] for part in parts]
+    return Ring(*parts)
 
 
 def _best_detour(
-    start: Voxel,
-    after: list[Voxel],
-    before: list[Voxel],
-    points: Floats,
-    square: dict[Voxel, float],
+    start: Voxel, after: list[Voxel], before: list[Voxel], points: Floats
 ) -> tuple[list[Voxel], int, list[Voxel], int] | None:
     """Return the paths from ``start`` to both sides of a ring that lie nearest to the curve.
 
     Returns
     -------
     out, j, back, i
-        Over the voxels ``out`` to ``after[j]``, over ``back`` to ``before[i]``.
+        Over the voxels ``out`` to ``after[j]``, over ``back`` to ``before[i]``. They have the least
+        cost, that of `thinning`; of several, those that come first in the order of voxels, read
+        from either end.
 
     """
-    candidates = [voxel for voxel, far in square.items() if far <= 0.5]
-    best, least = None, np.inf
-    for (out, j), (back, i) in product(
-        list(_chordless_paths(start, after, candidates)),
-        list(_chordless_paths(start, before, candidates)),
-    ):
-        touching = (
-            any(_adjacent(a, b) for a in [*out, after[j]] for b in [*back, before[i]])
-            or any(_adjacent(a, b) for a in out for b in before[i:])
-            or any(_adjacent(a, b) for a in back for b in after[j:])
-        )
-        voxels = [*out, *back, *after[j:], *before[i:]]
-        cost = sum(square[voxel] for voxel in voxels)
-        if not touching and cost < least and _covered(points, [start, *voxels]):
-            best, least = (out, j, back, i), cost
-    return best
+    voxels, square, usable = _candidates(start, {*after, *before}, points)
+    number = {voxel: k for k, voxel in enumerate(voxels)}
+    costs = np.floor((np.minimum(square, FAR) + VOXEL_COST) * COST_UNITS + 0.5)
+    centres = np.array(voxels).T
+    apart = np.abs(centres[:, :, None] - centres[:, None, :]).max(axis=0) <= 1
+    near = [int.from_bytes(row, "little") for row in np.packbits(apart, axis=1, bitorder="little")]
+    allowed = sum(1 << k for k in usable.nonzero()[0].tolist())
+    cost = [int(each) for each in costs]
+    sides = [[number[voxel] for voxel in side] for side in (after, before)]
+    outs, backs = (_chordless_paths(number[start], side, allowed, near, cost) for side in sides)
+    best: tuple[int, list[Voxel]] | None = None
+    found = None
+    for out in outs:
+        if not backs or (best and out.cost + backs[0].cost > best[0]):
+            break
+        for back in backs:
+            total = out.cost + back.cost
+            if best and total > best[0]:
+                break
+            if out.near_ends & (back.ends | back.rest) or back.near_ends & out.rest:
+                continue
+            way = [
+                *(voxels[k] for k in back.nodes[::-1]),
+                start,
+                *(voxels[k] for k in out.nodes),
+            ]
+            key = min(way, way[::-1])
+            if best and total == best[0] and key >= best[1]:
+                continue
+            if _covered(points, [*way, *after[out.join :], *before[back.join :]]):
+                best, found = (total, key), (out, back)
+    if found is None:
+        return None
+    (out, back) = found
+    ways = [[voxels[k] for k in path.nodes] for path in found]
+    return ways[0], out.join, ways[1], back.join
+
+
+def _candidates(
+    start: Voxel, known: set[Voxel], points: Floats
+) -> tuple[list[Voxel], Floats, Bools]:
+    """Return voxels near a joint, their squared distances from the curve, and which may be used.
+
+    Those are near the curve and near ``start``; ``known`` ones, and ``start``, are listed anyway.
+    """
+    cells = np.floor(points - 0.5).astype(np.int64)
+    fresh = (cells[:, 1:] != cells[:, :-1]).any(axis=0)
+    cells = cells[:, np.append(True, fresh)]
+    corners = (cells[:, :, None] + _CELL[:, None, :]).reshape(3, -1)
+    corners = corners[:, (np.abs(corners.T - start) <= MAX_DETOUR).all(axis=1)]
+    voxels = sorted({*zip(*corners.tolist(), strict=True), *known, start})
+    centres = np.array(voxels, dtype=float).T + 0.5
+    begin, along = points[:, None, :-1], np.diff(points, axis=1)[:, None]
+    offset = centres[:, :, None] - begin
+    length = np.maximum((along * along).sum(axis=0), TINY)
+    share = np.clip((offset * along).sum(axis=0) / length, 0.0, 1.0)
+    offset -= share * along
+    square = (offset * offset).sum(axis=0).min(axis=1)
+    usable = square <= MAX_SQUARE
+    usable[voxels.index(start)] = False
+    return voxels, square, usable
 
 
 def _chordless_paths(
-    start: Voxel, side: list[Voxel], candidates: list[Voxel]
-) -> Iterator[tuple[list[Voxel], int]]:
-    """Yield chordless paths from ``start`` over at most ``MAX_DETOUR`` voxels to a ring's side.
+    start: int, side: list[int], allowed: int, near: list[int], cost: list[int]
+) -> list[Path]:
+    """Return chordless paths over at most ``MAX_DETOUR`` voxels to a side, the cheapest first."""
+    rest, rest_cost = [0] * (len(side) + 1), [0] * (len(side) + 1)
+    for k in range(len(side) - 1, -1, -1):
+        rest[k] = rest[k + 1] | 1 << side[k]
+        rest_cost[k] = rest_cost[k + 1] + cost[side[k]]
+    found = []
 
-    Yields
-    ------
-    path : list of voxels
-        Those in between, none of them on the rest of the side.
-    index : int
-        The voxel of ``side`` at which the path arrives.
-
-    """
-
-    def extend(path: list[Voxel]) -> Iterator[tuple[list[Voxel], int]]:
-        tip = path[-1]
-        touched = [j for j, voxel in enumerate(side) if _adjacent(tip, voxel)]
-        if touched:
+    def extend(nodes: tuple[int, ...], own: int, passed: int, near_own: int, spent: int) -> None:
+        """Extend a path; ``passed`` is what is near ``start`` or its voxels but the last."""
+        tip = nodes[-1] if nodes else start
+        if near[tip] & rest[0]:
             # The furthest it touches is where it must join: any other would leave a chord.
-            join = touched[-1]
-            if not any(
-                _adjacent(voxel, side[k]) for voxel in path[:-1] for k in range(join, len(side))
-            ):
-                yield path[1:], join
-        if len(path) > MAX_DETOUR:
+            join = max(k for k, node in enumerate(side) if near[tip] >> node & 1)
+            if not passed & rest[join]:
+                found.append(
+                    Path(
+                        spent + rest_cost[join],
+                        nodes,
+                        join,
+                        own,
+                        own | 1 << side[join],
+                        rest[join],
+                        near_own,
+                        near_own | near[side[join]],
+                    )
+                )
+        if len(nodes) == MAX_DETOUR:
             return
-        for voxel in candidates:
-            free = voxel != tip and not any(_adjacent(other, voxel) for other in path[:-1])
-            if free and _adjacent(tip, voxel):
-                yield from extend([*path, voxel])
+        free = allowed & near[tip] & ~passed & ~(1 << tip)
+        while free:
+            bit = free & -free
+            free ^= bit
+            node = bit.bit_length() - 1
+            extend(
+                (*nodes, node),
+                own | bit,
+                passed | near[tip],
+                near_own | near[node],
+                spent + cost[node],
+            )
 
-    yield from extend([start])
-
-
-def _square_distances(points: Floats, known: set[Voxel]) -> dict[Voxel, float]:
-    """Return the squared distances of the voxels around points, (3, n), in a fixed order.
-
-    At most a little too large, for the points stand for a curve.
-    """
-    held = set(_as_voxels(np.floor(points).astype(np.int64)))
-    steps = list(product((-1, 0, 1), repeat=3))
-    voxels = sorted({(x + i, y + j, z + k) for x, y, z in held for i, j, k in steps} | known)
-    centres = np.array(voxels, dtype=float).T + 0.5
-    apart = centres[:, :, None] - points[:, None, :]
-    return dict(zip(voxels, (apart * apart).sum(axis=0).min(axis=1).tolist(), strict=True))
+    extend((), 0, 0, 0, 0)
+    return sorted(found)
 
 
 def _covered(points: Floats, voxels: list[Voxel]) -> bool:
@@ -206,11 +375,3 @@ def _covered(points: Floats, voxels: list[Voxel]) -> bool:
     centres = np.array(voxels, dtype=float).T + 0.5
     apart = centres[:, :, None] - points[:, None, :]
     return bool(((apart * apart).sum(axis=0).min(axis=0) <= MAX_UNCOVERED * MAX_UNCOVERED).all())
-
-
-def _adjacent(a: Voxel, b: Voxel) -> bool:
-    return abs(a[0] - b[0]) <= 1 and abs(a[1] - b[1]) <= 1 and abs(a[2] - b[2]) <= 1
-
-
-def _as_voxels(rows: NDArray[np.integer]) -> list[Voxel]:
-    return [(x, y, z) for x, y, z in rows.T.tolist()]

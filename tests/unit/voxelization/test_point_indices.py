@@ -54,7 +54,7 @@ def test_colours_blend_between_points_however_far_apart_they_are() -> None:
 
 
 def test_a_closed_curve_leads_back_to_the_first_colour() -> None:
-    ring = [[3.5, 1.5, 1.5], [7.5, 1.5, 1.5], [10.5, 5.5, 1.5], [6.5, 9.5, 1.5], [1.5, 5.5, 1.5]]
+    ring = [[3.5, 1.5, 1.5], [8.5, 1.5, 1.5], [10.5, 5.5, 1.5], [6.5, 9.5, 1.5], [1.5, 5.5, 1.5]]
     colors = [[200, 0, 0], [0, 200, 0], [0, 0, 200], [90, 90, 90], [0, 0, 0]]
     picture = drawn(vd.Points(ring, closed=True), colors)
     for (x, y, z), color in zip(np.floor(ring).astype(int), colors, strict=True):
