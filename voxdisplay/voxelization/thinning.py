@@ -7,6 +7,8 @@ which turns back within two voxels, must not lose its far end.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
@@ -37,9 +39,17 @@ TINY = float(np.finfo(float).tiny)
 
 
 def drop_repeats(events: VoxelEvents) -> VoxelEvents:
-    """Remove consecutive events of a piece that share a voxel."""
+    """Remove consecutive events of a piece that share a voxel.
+
+    Of their parameters the middle stays: a curve and its reverse have the same.
+    """
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    return events.take(np.concatenate(([True], ~same))) if same.any() else events
+    if not same.any():
+        return events
+    kept = np.append(True, ~same).nonzero()[0]
+    last = np.append(kept[1:], events.t.size) - 1
+    thin = events.take(kept)
+    return replace(thin, t=(thin.t + events.t[last]) / 2)
 
 
 @with_kernel
@@ -86,9 +96,10 @@ def thin_events(
         change[starts + 1] += 1
         change[stops] -= 1
         thin = drop_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
-    # A piece ends where it ends, even if its last voxel was reached before.
-    last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
-    thin.t[thin_last] = full.t[last]
+    # A piece begins and ends where it does, even if its last voxel was reached before.
+    ends, thin_ends = ((~each.joined).nonzero()[0] for each in (full, thin))
+    thin.t[thin_ends + 1], thin.t[thin_ends] = full.t[ends + 1], full.t[ends]
+    thin.t[0], thin.t[-1] = full.t[0], full.t[-1]
     return thin
 
 

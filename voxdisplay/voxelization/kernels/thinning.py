@@ -410,16 +410,18 @@ def _thin_events(
     bounds, sample_t, _ = curve
     farthest = constants[3]
     whole = full_t.size
-    number = np.empty(whole, dtype=np.int64)
+    number, middle = np.empty(whole, dtype=np.int64), np.empty(whole)
     size = 0
     for k in range(whole):
-        if not (k and full_piece[k] == full_piece[k - 1] and _same(full_voxels, k, k - 1)):
-            number[size] = k
+        if k and full_piece[k] == full_piece[k - 1] and _same(full_voxels, k, k - 1):
+            middle[size - 1] = (full_t[number[size - 1]] + full_t[k]) / 2
+        else:
+            number[size], middle[size] = k, full_t[k]
             size += 1
     number = number[:size]
     piece, t, voxels, heading = full_piece, full_t, full_voxels, full_heading
     if size < whole:
-        piece, t, heading = full_piece[number], full_t[number], full_heading[number]
+        piece, t, heading = full_piece[number], middle[:size], full_heading[number]
         voxels = np.empty((3, size), dtype=np.int32)
         for row in range(3):
             for k in range(size):
@@ -464,24 +466,28 @@ def _thin_events(
             count += 1
     _thin_group(voxels, piece, t, curve, constants, low, high, links[:, :count], skipped)
 
-    kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
+    kept, kept_t, first_t = np.empty(size, dtype=np.int64), np.empty(size), 0.0
     count = 0
     for i in range(size):
         if skipped[i]:
             continue
         last = kept[count - 1] if count else -1
-        if not (
+        if (
             count
             and full_piece[last] == piece[i]
             and full_voxels[0, last] == voxels[0, i]
             and full_voxels[1, last] == voxels[1, i]
             and full_voxels[2, last] == voxels[2, i]
         ):
-            kept[count], kept_t[count] = number[i], t[i]
+            kept_t[count - 1] = (first_t + t[i]) / 2
+        else:
+            kept[count], kept_t[count], first_t = number[i], t[i], t[i]
             count += 1
 
     at = 0
-    for k in range(whole):  # a piece ends where it ends, even if its last voxel was reached before
+    for k in range(whole):  # a piece begins and ends where it does: see the numpy function
+        if k == 0 or full_piece[k - 1] != full_piece[k]:
+            kept_t[at] = full_t[k]
         if k + 1 == whole or full_piece[k + 1] != full_piece[k]:
             while at + 1 < count and full_piece[kept[at + 1]] == full_piece[k]:
                 at += 1
