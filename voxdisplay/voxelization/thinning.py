@@ -7,8 +7,6 @@ which turns back within two voxels, must not lose its far end.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
@@ -39,17 +37,15 @@ TINY = float(np.finfo(float).tiny)
 
 
 def drop_repeats(events: VoxelEvents) -> VoxelEvents:
-    """Remove consecutive events of a piece that share a voxel.
-
-    Of their parameters the middle stays: a curve and its reverse have the same.
-    """
+    """Remove consecutive events of a piece that share a voxel."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    if not same.any():
-        return events
-    kept = np.append(True, ~same).nonzero()[0]
-    last = np.append(kept[1:], events.t.size) - 1
-    thin = events.take(kept)
-    return replace(thin, t=(thin.t + events.t[last]) / 2)
+    return events.take(np.concatenate(([True], ~same))) if same.any() else events
+
+
+def _last_parameters(events: VoxelEvents) -> Floats:
+    """Return the parameters of the last of consecutive events that share a voxel."""
+    same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
+    return np.asarray(events.t[np.append(~same, True)])
 
 
 @with_kernel
@@ -89,17 +85,17 @@ def thin_events(
     if not events.t.size:
         return events
     full, thin = events, drop_repeats(events)
-    starts, stops = _shortcuts(thin, samples, keep_tips=keep_tips)
+    until = thin.t if thin is full else _last_parameters(full)
+    starts, stops = _shortcuts(thin, until, samples, keep_tips=keep_tips)
     if starts.size:
-        starts, stops = _cheapest(thin, samples, starts, stops)
+        starts, stops = _cheapest(thin, until, samples, starts, stops)
         change = np.zeros(thin.t.size, dtype=np.int8)
         change[starts + 1] += 1
         change[stops] -= 1
         thin = drop_repeats(thin.take(np.cumsum(change, dtype=np.int8) == 0))
-    # A piece begins and ends where it does, even if its last voxel was reached before.
-    ends, thin_ends = ((~each.joined).nonzero()[0] for each in (full, thin))
-    thin.t[thin_ends + 1], thin.t[thin_ends] = full.t[ends + 1], full.t[ends]
-    thin.t[0], thin.t[-1] = full.t[0], full.t[-1]
+    # A piece ends where it ends, even if its last voxel was reached before.
+    last, thin_last = (np.append(~each.joined, True).nonzero()[0] for each in (full, thin))
+    thin.t[thin_last] = full.t[last]
     return thin
 
 
@@ -119,7 +115,7 @@ def continues_run(events: VoxelEvents) -> NDArray[np.bool_]:
 
 
 def _shortcuts(
-    events: VoxelEvents, samples: Samples | None, *, keep_tips: bool
+    events: VoxelEvents, until: Floats, samples: Samples | None, *, keep_tips: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return all shortcuts, as indices of their ends, in ascending order of these."""
     size = events.t.size
@@ -139,13 +135,14 @@ def _shortcuts(
         keep = ~_skips_tip(events, starts, stops)
         starts, stops = starts[keep], stops[keep]
     if samples:
-        keep = ~_uncovers_curve(events, samples, starts, stops)
+        keep = ~_uncovers_curve(events, until, samples, starts, stops)
         starts, stops = starts[keep], stops[keep]
     return starts, stops
 
 
 def _cheapest(
     events: VoxelEvents,
+    until: Floats,
     samples: Samples | None,
     starts: NDArray[np.intp],
     stops: NDArray[np.intp],
@@ -163,7 +160,7 @@ def _cheapest(
         highs = np.maximum.reduceat(stops, first)[several]
         counts = highs - lows + 1
         nodes = expand_ranges(lows, counts)
-        costs = _costs(events, samples, nodes).tolist()
+        costs = _costs(events, until, samples, nodes).tolist()
         voxels = list(zip(*events.voxels.take(nodes, axis=1).tolist(), strict=True))
         shortcuts = list(zip(starts.tolist(), stops.tolist(), strict=True))
         at = 0
@@ -216,24 +213,31 @@ def _cheapest_path(
 
 
 def _costs(
-    events: VoxelEvents, samples: Samples | None, index: NDArray[np.integer]
+    events: VoxelEvents, until: Floats, samples: Samples | None, index: NDArray[np.integer]
 ) -> NDArray[np.int64]:
     """Return the costs of events: squared distances from the samples' polyline, as integers.
 
-    Whole numbers, so that sums do not depend on the order of their terms.
+    Whole numbers, so that sums do not depend on the order of their terms. Of events that share a
+    voxel the first and the last count, so that the direction does not.
     """
     square = np.zeros(index.size)
     if samples:
-        square = _squared_distances(events, samples, index)
+        square = _squared_distances(events, events.t, samples, index)
+        again = (until[index] != events.t[index]).nonzero()[0]
+        if again.size:
+            other = _squared_distances(events, until, samples, index[again])
+            square[again] = np.minimum(square[again], other)
     scaled = (np.minimum(square, FAR) + VOXEL_COST) * COST_UNITS
     return np.floor(scaled + 0.5).astype(np.int64)
 
 
 @np.errstate(under="ignore")
-def _squared_distances(events: VoxelEvents, samples: Samples, index: NDArray[np.integer]) -> Floats:
-    """Return squared distances of voxel centres, (n,), from the polyline around their t."""
+def _squared_distances(
+    events: VoxelEvents, t: Floats, samples: Samples, index: NDArray[np.integer]
+) -> Floats:
+    """Return squared distances of voxel centres, (n,), from the polyline around parameters t."""
     order = samples.piece + 1j * samples.t
-    here = events.piece[index] + 1j * events.t[index]
+    here = events.piece[index] + 1j * t[index]
     low, high = np.searchsorted(order, here), np.searchsorted(order, here, side="right")
     bounds = samples.bounds
     first, last = bounds[events.piece[index]], bounds[events.piece[index] + 1] - 1
@@ -274,13 +278,18 @@ def _skips_tip(
 
 @np.errstate(under="ignore")
 def _uncovers_curve(
-    events: VoxelEvents, samples: Samples, starts: NDArray[np.intp], stops: NDArray[np.intp]
+    events: VoxelEvents,
+    until: Floats,
+    samples: Samples,
+    starts: NDArray[np.intp],
+    stops: NDArray[np.intp],
 ) -> NDArray[np.bool_]:
     """Return which shortcuts leave a point of the curve further than ``MAX_UNCOVERED``."""
     # Complex numbers are ordered by their real parts, then by their imaginary ones.
     order = samples.piece + 1j * samples.t
     ends = np.stack((starts, stops))
-    low, high = np.searchsorted(order, events.piece[starts] + 1j * events.t[ends])
+    between = np.stack((events.t[starts], until[stops]))
+    low, high = np.searchsorted(order, events.piece[starts] + 1j * between)
     count = high - low
     of = np.arange(starts.size).repeat(count)
     points = samples.points.take(expand_ranges(low, count), axis=1)

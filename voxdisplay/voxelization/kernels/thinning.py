@@ -249,11 +249,11 @@ def _square(voxels: Voxels, i: int, points: Floats, p: int) -> float:
 
 @jit
 def _uncovers(
-    curve: CurvePoints, t: Floats, voxels: Voxels, i: int, j: int, p: int, farthest: float
+    curve: CurvePoints, end: float, voxels: Voxels, i: int, j: int, p: int, farthest: float
 ) -> bool:
     """Return whether a point of the curve, from ``p`` on, is far from both ends."""
     _, sample_t, points = curve
-    while p < sample_t.size and sample_t[p] < t[j]:
+    while p < sample_t.size and sample_t[p] < end:
         if min(_square(voxels, i, points, p), _square(voxels, j, points, p)) > farthest:
             return True
         p += 1
@@ -261,48 +261,59 @@ def _uncovers(
 
 
 @jit
-def _cost(
-    curve: CurvePoints, constants: CostConstants, piece: Pieces, t: Floats, voxels: Voxels, k: int
-) -> int:
-    """See `thinning._costs` and `thinning._squared_distances`."""
+def _squared_distance(curve: CurvePoints, piece: int, t: float, voxels: Voxels, k: int) -> float:
+    """See `thinning._squared_distances`."""
     bounds, sample_t, points = curve
+    first, last = bounds[piece], bounds[piece + 1] - 1
+    low, high = first, last + 1
+    while low < high:
+        middle = (low + high) // 2
+        if sample_t[middle] < t:
+            low = middle + 1
+        else:
+            high = middle
+    high = low
+    while high <= last and sample_t[high] <= t:
+        high += 1
+    least = np.inf
+    x, y, z = voxels[0, k] + 0.5, voxels[1, k] + 0.5, voxels[2, k] + 0.5
+    for shift in range(4):
+        begin = min(max(low - 2 + shift, first), last)
+        end = min(begin + 1, high + 1, last)
+        from_x, from_y, from_z = points[0, begin], points[1, begin], points[2, begin]
+        along_x = points[0, end] - from_x
+        along_y = points[1, end] - from_y
+        along_z = points[2, end] - from_z
+        off_x, off_y, off_z = x - from_x, y - from_y, z - from_z
+        length = max(along_x * along_x + along_y * along_y + along_z * along_z, TINY)
+        share = (off_x * along_x + off_y * along_y + off_z * along_z) / length
+        share = min(max(share, 0.0), 1.0)
+        off_x, off_y, off_z = (
+            off_x - share * along_x,
+            off_y - share * along_y,
+            off_z - share * along_z,
+        )
+        least = min(least, off_x * off_x + off_y * off_y + off_z * off_z)
+    return least
+
+
+@jit
+def _cost(
+    curve: CurvePoints,
+    constants: CostConstants,
+    piece: Pieces,
+    t: Floats,
+    until: Floats,
+    voxels: Voxels,
+    k: int,
+) -> int:
+    """See `thinning._costs`."""
     voxel_cost, units, far, _ = constants
     least = 0.0
-    if sample_t.size:
-        first, last = bounds[piece[k]], bounds[piece[k] + 1] - 1
-        low, high = first, last + 1
-        while low < high:
-            middle = (low + high) // 2
-            if sample_t[middle] < t[k]:
-                low = middle + 1
-            else:
-                high = middle
-        high = low
-        while high <= last and sample_t[high] <= t[k]:
-            high += 1
-        least = np.inf
-        x, y, z = voxels[0, k] + 0.5, voxels[1, k] + 0.5, voxels[2, k] + 0.5
-        for shift in range(4):
-            begin = min(max(low - 2 + shift, first), last)
-            end = min(begin + 1, high + 1, last)
-            from_x, from_y, from_z = (
-                points[0, begin],
-                points[1, begin],
-                points[2, begin],
-            )
-            along_x = points[0, end] - from_x
-            along_y = points[1, end] - from_y
-            along_z = points[2, end] - from_z
-            off_x, off_y, off_z = x - from_x, y - from_y, z - from_z
-            length = max(along_x * along_x + along_y * along_y + along_z * along_z, TINY)
-            share = (off_x * along_x + off_y * along_y + off_z * along_z) / length
-            share = min(max(share, 0.0), 1.0)
-            off_x, off_y, off_z = (
-                off_x - share * along_x,
-                off_y - share * along_y,
-                off_z - share * along_z,
-            )
-            least = min(least, off_x * off_x + off_y * off_y + off_z * off_z)
+    if curve[1].size:
+        least = _squared_distance(curve, piece[k], t[k], voxels, k)
+        if until[k] != t[k]:
+            least = min(least, _squared_distance(curve, piece[k], until[k], voxels, k))
     scaled = (min(least, far) + voxel_cost) * units
     return int(np.floor(scaled + 0.5))
 
@@ -379,6 +390,7 @@ def _thin_group(
     voxels: Voxels,
     piece: Pieces,
     t: Floats,
+    until: Floats,
     curve: CurvePoints,
     constants: CostConstants,
     low: int,
@@ -392,7 +404,7 @@ def _thin_group(
     elif links.shape[1]:
         costs = np.empty(high - low + 1, dtype=np.int64)
         for k in range(low, high + 1):
-            costs[k - low] = _cost(curve, constants, piece, t, voxels, k)
+            costs[k - low] = _cost(curve, constants, piece, t, until, voxels, k)
         _take_cheapest(voxels, costs, low, links, skipped)
 
 
@@ -410,18 +422,17 @@ def _thin_events(
     bounds, sample_t, _ = curve
     farthest = constants[3]
     whole = full_t.size
-    number, middle = np.empty(whole, dtype=np.int64), np.empty(whole)
+    number, until = np.empty(whole, dtype=np.int64), np.empty(whole)
     size = 0
     for k in range(whole):
-        if k and full_piece[k] == full_piece[k - 1] and _same(full_voxels, k, k - 1):
-            middle[size - 1] = (full_t[number[size - 1]] + full_t[k]) / 2
-        else:
-            number[size], middle[size] = k, full_t[k]
+        if not (k and full_piece[k] == full_piece[k - 1] and _same(full_voxels, k, k - 1)):
+            number[size] = k
             size += 1
+        until[size - 1] = full_t[k]
     number = number[:size]
     piece, t, voxels, heading = full_piece, full_t, full_voxels, full_heading
     if size < whole:
-        piece, t, heading = full_piece[number], middle[:size], full_heading[number]
+        piece, t, heading = full_piece[number], full_t[number], full_heading[number]
         voxels = np.empty((3, size), dtype=np.int32)
         for row in range(3):
             for k in range(size):
@@ -450,11 +461,11 @@ def _thin_events(
                 p = max(p, bounds[piece[i]])
                 while p < bounds[piece[i] + 1] and sample_t[p] < t[i]:
                     p += 1
-                if _uncovers(curve, t, voxels, i, j, p, farthest):
+                if _uncovers(curve, until[j], voxels, i, j, p, farthest):
                     continue
             if i >= high:
                 _thin_group(
-                    voxels, piece, t, curve, constants, low, high, links[:, :count], skipped
+                    voxels, piece, t, until, curve, constants, low, high, links[:, :count], skipped
                 )
                 count, low = 0, i
             high = max(high, j)
@@ -464,30 +475,26 @@ def _thin_events(
                 links = longer
             links[0, count], links[1, count] = i, j
             count += 1
-    _thin_group(voxels, piece, t, curve, constants, low, high, links[:, :count], skipped)
+    _thin_group(voxels, piece, t, until, curve, constants, low, high, links[:, :count], skipped)
 
-    kept, kept_t, first_t = np.empty(size, dtype=np.int64), np.empty(size), 0.0
+    kept, kept_t = np.empty(size, dtype=np.int64), np.empty(size)
     count = 0
     for i in range(size):
         if skipped[i]:
             continue
         last = kept[count - 1] if count else -1
-        if (
+        if not (
             count
             and full_piece[last] == piece[i]
             and full_voxels[0, last] == voxels[0, i]
             and full_voxels[1, last] == voxels[1, i]
             and full_voxels[2, last] == voxels[2, i]
         ):
-            kept_t[count - 1] = (first_t + t[i]) / 2
-        else:
-            kept[count], kept_t[count], first_t = number[i], t[i], t[i]
+            kept[count], kept_t[count] = number[i], t[i]
             count += 1
 
     at = 0
-    for k in range(whole):  # a piece begins and ends where it does: see the numpy function
-        if k == 0 or full_piece[k - 1] != full_piece[k]:
-            kept_t[at] = full_t[k]
+    for k in range(whole):  # a piece ends where it ends, even if its last voxel was reached before
         if k + 1 == whole or full_piece[k + 1] != full_piece[k]:
             while at + 1 < count and full_piece[kept[at + 1]] == full_piece[k]:
                 at += 1
