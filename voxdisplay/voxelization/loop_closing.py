@@ -181,12 +181,13 @@ def _points_around(
 
     They go as far as voxels may be replaced, and not over the next joint.
     """
-    size, begin, curve = loops.size[of], loops.begin[of], loops.curve[of]
-    reach = np.minimum(MAX_REPLACED, size // 2 - 1)
     last_of_loop = np.append(of[1:] != of[:-1], True)
-    following = np.where(last_of_loop, size, np.append(at[1:], 0))
+    following = np.where(last_of_loop, loops.size[of], np.append(at[1:], 0))[some]
     previous = np.append(0, at[:-1])
     previous[at == 0] = at[last_of_loop]
+    of, at, previous = of[some], at[some], previous[some]
+    size, begin, curve = loops.size[of], loops.begin[of], loops.curve[of]
+    reach = np.minimum(MAX_REPLACED, size // 2 - 1)
     t, first, last = events.t, batch.first[curve], batch.last[curve]
     middle = t[begin + at]
     end = np.where(at == 0, last, middle)
@@ -194,15 +195,12 @@ def _points_around(
     beyond = np.minimum(at + reach, following)
     high = np.where(beyond < size, t[begin + np.minimum(beyond, size - 1)], last)
     share = np.linspace(0.0, 1.0, POINTS)
-    sides = [a[some, None] + (b - a)[some, None] * share for a, b in ((low, end), (middle, high))]
-    along = np.concatenate(sides, axis=1)
-    along = np.clip(along, first[some, None], last[some, None]).reshape(-1)
-    order = np.argsort(some, kind="stable")  # curves must ascend
-    points = batch.evaluate(
-        curve[some[order]].repeat(2 * POINTS), along.reshape(some.size, -1)[order].reshape(-1)
-    )
-    points = points.reshape(3, some.size, 2 * POINTS).transpose(1, 0, 2)
-    return points[np.argsort(order)]
+    sides = [a[:, None] + (b - a)[:, None] * share for a, b in ((low, end), (middle, high))]
+    along = np.clip(np.concatenate(sides, axis=1), first[:, None], last[:, None])
+    order = np.argsort(curve, kind="stable")  # they must ascend
+    points = batch.evaluate(curve[order].repeat(2 * POINTS), along[order].reshape(-1))
+    points = points.reshape(3, order.size, 2 * POINTS).transpose(1, 0, 2)
+    return np.asarray(points[np.argsort(order)])
 
 
 def _reroute(ring: Ring, at: int, points: Floats, last: float) -> Ring:
