@@ -12,6 +12,7 @@ from voxdisplay.bodies.body import Body, Kind, invertible, transform_bounds
 from voxdisplay.bodies.geometry import Bounds, LitVoxels
 from voxdisplay.curves import arguments
 from voxdisplay.curves.arguments import ArgumentError
+from voxdisplay.errors import BodyError
 from voxdisplay.raster.area_means import Placement, area_means, nearest_samples
 from voxdisplay.raster.array_arguments import as_voxels
 from voxdisplay.raster.color import Color
@@ -136,17 +137,21 @@ class Volume(AffineSamples):
         offset: ArrayLike = (0, 0, 0),
         labels: bool = False,
     ) -> None:
-        self.array = as_volume("array", array)
         self.labels = flag("labels", labels)
-        if window is not None:
-            self.window = as_window("window", window)
-        else:
-            self.window = (label_window if self.labels else default_window)(self.array)
+        try:
+            self.array = as_volume("array", array)
+            sizes = as_spacing("spacing", spacing)
+            chosen = None if window is None else as_window("window", window)
+            self.colors = color_map(map)
+        except ValueError as error:
+            raise BodyError(str(error)) from None
+        if chosen is None:
+            chosen = (label_window if self.labels else default_window)(self.array)
+        self.window = chosen
         self.threshold = None if threshold is None else number("threshold", threshold)
         if self.threshold is not None and np.isnan(self.threshold):
             raise ArgumentError("threshold", "is not a number")
-        self.colors = color_map(map)
-        self.matrix = np.diag(as_spacing("spacing", spacing))
+        self.matrix = np.diag(sizes)
         self.offset = arguments.vector("offset", offset)
         self._low = np.zeros(3)
         self._high = np.array(self.array.shape[::-1], dtype=np.float64)
