@@ -115,6 +115,7 @@ def preview(
     """
     from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
     from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
+    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
     from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
     from voxdisplay.view.save import FILM_SUFFIXES, ExportJob  # noqa: PLC0415
 
@@ -131,7 +132,7 @@ def preview(
     options = RenderOptions(size=size_px, glow=not plain, axes=not plain)
     options = options.with_view(view_angle, zoom)
     title = "voxdisplay" if scene == "-" else Path(scene).stem
-    job = ExportJob(frame.array(), grid, frame.format, options, title, seconds, fps)
+    job = ExportJob(PixelMap(*frame.lit()), grid, frame.format, options, title, seconds, fps)
     with progress_bar("drawing") as progress:
         save_image(output, job, progress)
     note(f"{output}: {plural(len(frame.lit()[0]), 'voxel')} on {grid} {format_}")

@@ -47,6 +47,8 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
     count = len(frame.lit()[0])
     if count > _MAX_VOXELS_DRAWN:
         return
+    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
+
     try:
         from voxdisplay.view.half_blocks import half_blocks, has_true_color  # noqa: PLC0415
         from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415 - an extra
@@ -61,7 +63,7 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
     if page is None and _is_quick_to_read(info, count, rate):
         page = display.read()
     caption = "what was sent, not read back" if page is None else "read back from the display"
-    shown = frame.array() if page is None else page
+    shown = PixelMap(*frame.lit()) if page is None else page
     lit = lit_voxels(shown, info.grid, info.format, frame.palette)
     for line in half_blocks(lit, info.grid, columns, rows, full=has_true_color()):
         print_drawing(line)

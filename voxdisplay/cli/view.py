@@ -131,11 +131,13 @@ def _serve(
 
 @contextlib.contextmanager
 def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
+    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
     from voxdisplay.view.live.message import Snapshot  # noqa: PLC0415 - an extra
     from voxdisplay.view.live.sources import StaticSource  # noqa: PLC0415
 
     frame, title = _scene_frame(scene, size), Path(scene).name
-    yield StaticSource(Snapshot(frame.array(), frame.grid, frame.format, 1, title, frame.digest()))
+    lit = PixelMap(*frame.lit())
+    yield StaticSource(Snapshot(lit, frame.grid, frame.format, 1, title, frame.digest()))
 
 
 @contextlib.contextmanager
@@ -194,11 +196,12 @@ def _scene_frame(scene: str, size: vd.Grid | None) -> vd.Frame:
 
 @contextlib.contextmanager
 def _scene_view(scene: str, size: vd.Grid | None) -> Iterator[TerminalView]:
+    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
     from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
     from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
     frame = _scene_frame(scene, size)
-    lit = lit_voxels(frame.array(), frame.grid, frame.format)
+    lit = lit_voxels(PixelMap(*frame.lit()), frame.grid, frame.format)
     yield TerminalView(frame.grid, Path(scene).name, lambda: lit, changes=False)
 
 

@@ -313,7 +313,7 @@ class Frame:
         """
         from voxdisplay.view.rich_display import save_page  # noqa: PLC0415 - needs an extra
 
-        save_page(path, self.array(), self.grid, self.format, self.palette)
+        save_page(path, self._raster.lit, self.grid, self.format, self.palette)
 
     def show(self) -> None:
         """Show a picture of the frame: in a notebook's output, else in the picture viewer.
@@ -328,13 +328,13 @@ class Frame:
         """
         from voxdisplay.view.rich_display import show_page  # noqa: PLC0415 - needs an extra
 
-        show_page(self.array(), self.grid, self.format, self.palette)
+        show_page(self._raster.lit, self.grid, self.format, self.palette)
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks; None without Pillow."""
         from voxdisplay.view.rich_display import page_png  # noqa: PLC0415 - needs an extra
 
-        return page_png(self.array(), self.grid, self.format, self.palette)
+        return page_png(self._raster.lit, self.grid, self.format, self.palette)
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the colours shown, (nz, ny, nx, 3) uint8, whatever the format."""

@@ -21,6 +21,7 @@ from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.atomic_write import atomic_write
 from voxdisplay.view.live.message import Snapshot, encode
 from voxdisplay.view.live.page import content_security_policy, page_html
@@ -33,7 +34,7 @@ _PLACE = '<script type="application/octet-stream" id="embedded">'
 
 def save_html(
     path: Path | str,
-    pages: Sequence[NDArray[np.integer]],
+    pages: Sequence[NDArray[np.integer] | PixelMap],
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - as the option --format
     *,
@@ -46,8 +47,9 @@ def save_html(
     Parameters
     ----------
     path : Path or str
-    pages : sequence of ndarray
-        As from `Display.read` or `Frame.array`, indexed [z, y, x]; at least one.
+    pages : sequence of ndarray or PixelMap
+        As from `Display.read` or `Frame.array`, indexed [z, y, x], or the lit pixels alone; at
+        least one.
     grid : Grid
     format : PixelFormat
     title : str
@@ -70,7 +72,14 @@ def save_html(
         raise ValueError(f"{fps} pages per second: the rate must be 0.1 to 120")
     grid = Grid(*grid)
     frames = [
-        Snapshot(np.asarray(one), grid, format, number, title, palette=palette)
+        Snapshot(
+            one if isinstance(one, PixelMap) else np.asarray(one),
+            grid,
+            format,
+            number,
+            title,
+            palette=palette,
+        )
         for number, one in enumerate(pages, 1)
     ]
     packed = [zlib.compress(encode(frame), _LEVEL) for frame in frames]

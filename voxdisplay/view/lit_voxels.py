@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 
 _BLOCK_PIXELS = 8  # of 1, 2 or 3 bytes each: they make whole 64-bit words
 _DENSE_RATIO = 8  # with more than one nonzero word in so many, one pass is faster than two
@@ -35,7 +36,7 @@ class LitVoxels(NamedTuple):
 
 
 def lit_voxels(
-    page: NDArray[np.integer],
+    page: NDArray[np.integer] | PixelMap,
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - as the option --format
     palette: Colors | None = None,
@@ -44,8 +45,8 @@ def lit_voxels(
 
     Parameters
     ----------
-    page : ndarray
-        As from `Display.read` or `Frame.array`, indexed [z, y, x].
+    page : ndarray or PixelMap
+        As from `Display.read` or `Frame.array`, indexed [z, y, x]; or the lit pixels alone.
     grid : Grid
     format : PixelFormat
     palette : (256, 3) uint8 array, optional
@@ -61,6 +62,10 @@ def lit_voxels(
         If the page is not of this grid and format.
 
     """
+    if isinstance(page, PixelMap):
+        values = page.values
+        shown = format.rgb(values) if palette is None else palette[values]
+        return LitVoxels(grid.voxels_at(page.index).astype(np.uint16), shown)
     page = np.asarray(page)
     format.validate(page, grid.array_shape)
     flat = page.reshape(format.shape((grid.voxels,)))

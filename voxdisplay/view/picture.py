@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.axes_and_grid import BACKGROUND, draw_stage
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.glow import Light, accumulate_light, blur
@@ -70,7 +71,7 @@ class RenderOptions:
 
 
 def render_page(
-    page: NDArray[np.integer],
+    page: NDArray[np.integer] | PixelMap,
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - as the option --format
     options: RenderOptions = RenderOptions(),
@@ -80,8 +81,8 @@ def render_page(
 
     Parameters
     ----------
-    page : ndarray
-        As from `Display.read` or `Frame.array`, indexed [z, y, x].
+    page : ndarray or PixelMap
+        As from `Display.read` or `Frame.array`, indexed [z, y, x]; or the lit pixels alone.
     grid : Grid
     format : PixelFormat
     options : Look

@@ -20,12 +20,13 @@ from voxdisplay.errors import MissingExtra, VoxDisplayError, did_you_mean
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 
 _MAX_SIDE = 65535  # of a grid that the camera takes
 
 
 def page_png(
-    page: NDArray[np.integer],
+    page: NDArray[np.integer] | PixelMap,
     grid: Grid,
     format: PixelFormat,  # noqa: A002 - the word of the command line
     palette: Colors | None = None,
@@ -34,8 +35,8 @@ def page_png(
 
     Parameters
     ----------
-    page : ndarray
-        As `Frame.array` returns it, indexed [z, y, x].
+    page : ndarray or PixelMap
+        As `Frame.array` returns it, indexed [z, y, x]; or the lit pixels alone.
     grid : Grid
     format : PixelFormat
     palette : (256, 3) uint8 array, optional
@@ -85,7 +86,7 @@ def voxels_png(voxels: NDArray[np.integer]) -> bytes | None:
 
 def save_page(
     path: str | os.PathLike[str],
-    page: NDArray[np.integer],
+    page: NDArray[np.integer] | PixelMap,
     grid: Grid,
     format: PixelFormat,  # noqa: A002
     palette: Colors | None = None,
@@ -125,7 +126,7 @@ def save_page(
 
 
 def show_page(
-    page: NDArray[np.integer],
+    page: NDArray[np.integer] | PixelMap,
     grid: Grid,
     format: PixelFormat,  # noqa: A002
     palette: Colors | None = None,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
 from voxdisplay.view.atomic_write import atomic_write
 from voxdisplay.view.lit_voxels import lit_voxels
@@ -29,8 +30,8 @@ class ExportJob:
 
     Attributes
     ----------
-    page : ndarray
-        Indexed [z, y, x].
+    page : ndarray or PixelMap
+        Indexed [z, y, x]; or the lit pixels alone.
     grid : Grid
     format : PixelFormat
     options : Look
@@ -42,7 +43,7 @@ class ExportJob:
 
     """
 
-    page: NDArray[np.integer]
+    page: NDArray[np.integer] | PixelMap
     grid: Grid
     format: PixelFormat
     options: RenderOptions = field(default_factory=RenderOptions)

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.lit_voxels import lit_voxels
+from voxdisplay.view.live.message import Snapshot, encode
 
 # (x, y, z): colour. In scan order; colours that every format but mono1 has as they are.
 LIT = {
@@ -35,6 +37,24 @@ def test_places_and_colours(grid, format_):
     meant = [(255,) * 3 if mono else color for color in LIT.values()]
     assert list(map(tuple, colors.tolist())) == meant
     assert (positions.dtype, colors.dtype) == (np.uint16, np.uint8)
+
+
+@pytest.mark.parametrize("format_", PixelFormat)
+@pytest.mark.parametrize("grid", [Grid(3, 5, 7), Grid(300, 5, 9)])
+def test_lit_pixels_alone_show_the_same(grid, format_):
+    array = page(grid, format_)
+    values = format_.values(array)
+    pixels = PixelMap(np.flatnonzero(values), values[values != 0])
+    colors = np.arange(768, dtype=np.uint8).reshape(256, 3)
+    for palette in [None, colors] if format_ is PixelFormat.INDEX8 else [None]:
+        dense, sparse = (lit_voxels(each, grid, format_, palette) for each in (array, pixels))
+        assert np.array_equal(dense.positions, sparse.positions)
+        assert np.array_equal(dense.colors, sparse.colors)
+        assert sparse.positions.dtype == np.uint16
+        snapshots = (
+            Snapshot(each, grid, format_, 1, "", palette=palette) for each in (array, pixels)
+        )
+        assert encode(next(snapshots)) == encode(next(snapshots))
 
 
 @pytest.mark.parametrize("format_", PixelFormat)

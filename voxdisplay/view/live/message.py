@@ -28,6 +28,7 @@ from voxdisplay.printable_text import printable
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Colors, Palette
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.lit_voxels import lit_voxels
 
 _OFFSET = struct.Struct("<I")
@@ -39,8 +40,8 @@ class Snapshot:
 
     Attributes
     ----------
-    page : ndarray
-        As from `Display.read`, indexed [z, y, x].
+    page : ndarray or PixelMap
+        As from `Display.read`, indexed [z, y, x]; or the lit pixels alone.
     grid : Grid
     format : PixelFormat
     number : int
@@ -56,7 +57,7 @@ class Snapshot:
 
     """
 
-    page: NDArray[np.integer]
+    page: NDArray[np.integer] | PixelMap
     grid: Grid
     format: PixelFormat
     number: int
@@ -103,8 +104,11 @@ def _planes(snapshot: Snapshot, voxels: NDArray[np.integer], palette: Palette) -
     """Return the planes of pixel values, and the palette of index8."""
     if snapshot.format is PixelFormat.MONO1:
         return b""
-    x, y, z = voxels.T
-    values = snapshot.page[z, y, x].T
+    if isinstance(snapshot.page, PixelMap):
+        values = snapshot.format.pixels(snapshot.page.values).T
+    else:
+        x, y, z = voxels.T
+        values = snapshot.page[z, y, x].T
     if snapshot.format is PixelFormat.RGB565:
         values = np.stack((values & 0xFF, values >> 8))
     planes = bytes(values.astype("u1").tobytes())

@@ -213,7 +213,7 @@ class DisplaySource:
     def _read_page(self, digest: int | None) -> None:
         """Read the page back; keep it if it differs."""
         page, last = self._display.read(), self._last
-        if last and digest is None and np.array_equal(page, last.page):
+        if last and digest is None and np.array_equal(page, np.asarray(last.page)):
             return
         self._delivered = False
         number = last.number + 1 if last else 1
