@@ -38,6 +38,8 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     CatmullRom          Smooth curve through points.
     Curve               Base class, for curves of one's own.
     Mesh                Triangles between vertices.
+    Triangle            Single triangle.
+    Polygon             Flat region inside of a ring of straight lines.
     Box                 Box along the axes.
     Plane               Plane, as far as the display goes.
     Scatter             Points without an order, each in its voxel.
@@ -100,10 +102,12 @@ if TYPE_CHECKING:
         Implicit,
         Mesh,
         Plane,
+        Polygon,
         Scatter,
         Sphere,
         SphericalTriangle,
         Text,
+        Triangle,
         Volume,
         VoxelModel,
     )
@@ -191,6 +195,7 @@ if TYPE_CHECKING:
         "Plane",
         "PlayReport",
         "Points",
+        "Polygon",
         "Polyline",
         "ProtocolError",
         "Receipt",
@@ -208,6 +213,7 @@ if TYPE_CHECKING:
         "TransportClosed",
         "TransportError",
         "TransportTimeout",
+        "Triangle",
         "Volume",
         "VoxDisplayError",
         "VoxelModel",
@@ -234,10 +240,12 @@ _MODULES = {
         "Implicit",
         "Mesh",
         "Plane",
+        "Polygon",
         "Scatter",
         "Sphere",
         "SphericalTriangle",
         "Text",
+        "Triangle",
         "Volume",
         "VoxelModel",
     ],

@@ -72,6 +72,8 @@ CALLS = {
     "HeightField": {"z": "k + x", "x": (1, 4), "y": (2, 5), "params": {"k": 1}},
     "Cone": {"start": (2, 2, 2), "end": (5, 6, 7), "radius": 2, "fill": "shell"},
     "Cylinder": {"start": (2, 2, 2), "end": (5, 6, 7), "radius": 2, "fill": "shell"},
+    "Triangle": {"points": POINTS[:3]},
+    "Polygon": {"points": [(1, 1, 1), (5, 1, 1), (5, 5, 1), (3, 2, 1), (1, 5, 1)]},
     "SphericalTriangle": {"center": (5, 5, 5), "radius": 3, "corners": POINTS[1:]},
     "Ellipsoid": {"center": (5, 5, 5), "radii": (3, 2, 1), "fill": "solid"},
     "Sphere": {"center": (5, 5, 5), "radius": 3, "fill": "solid"},

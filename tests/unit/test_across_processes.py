@@ -36,6 +36,8 @@ BODIES = {
     "HeightField": vd.HeightField("3 + sin(x)*k", x=(1, 6), y=(2, 5), params={"k": 2}),
     "Cone": vd.Cone((2, 2, 2), (5, 6, 7), 2),
     "Cylinder": vd.Cylinder((2, 2, 2), (5, 6, 7), 2),
+    "Triangle": vd.Triangle([(1, 1, 1), (5, 2, 3), (4, 5, 6)]),
+    "Polygon": vd.Polygon([(1, 1, 1), (5, 1, 1), (5, 5, 1), (3, 2, 1), (1, 5, 1)]),
     "SphericalTriangle": vd.SphericalTriangle((5, 5, 5), 3, [(9, 5, 5), (5, 9, 5), (5, 5, 9)]),
     "Ellipsoid": vd.Ellipsoid((5, 5, 5), (3, 2, 1)),
     "Sphere": vd.Sphere((5, 5, 5), 3, fill="solid"),

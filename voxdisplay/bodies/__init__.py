@@ -3,7 +3,7 @@
 from voxdisplay.bodies.body import Body, TransformedBody
 from voxdisplay.bodies.height_field import HeightField
 from voxdisplay.bodies.implicit import Implicit
-from voxdisplay.bodies.mesh import Box, Mesh
+from voxdisplay.bodies.mesh import Box, Mesh, Polygon, Triangle
 from voxdisplay.bodies.primitives import (
     Cone,
     Cylinder,
@@ -28,11 +28,13 @@ __all__ = [
     "Implicit",
     "Mesh",
     "Plane",
+    "Polygon",
     "Scatter",
     "Sphere",
     "SphericalTriangle",
     "Text",
     "TransformedBody",
+    "Triangle",
     "Volume",
     "VoxelModel",
 ]

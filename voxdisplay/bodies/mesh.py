@@ -9,6 +9,7 @@ import numpy as np
 
 from voxdisplay.argument_checks import instance
 from voxdisplay.bodies.body import Body, Fill, check_fill, invertible
+from voxdisplay.bodies.ear_clipping import clip_ears
 from voxdisplay.bodies.geometry import Bounds, TriangleMesh
 from voxdisplay.curves import arguments
 from voxdisplay.curves.arguments import ArgumentError
@@ -17,6 +18,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from voxdisplay.compute.array_types import Floats, Ints
+
+
+MAX_TRIANGLES = 1 << 25
+"""Meshes of more triangles are refused, before their arrays are copied."""
+_MAX_RING = 10_000
+_LATTICE = 1 << 16
+# A ring is flat if its points are this close to a plane, in voxels, or in parts of its size.
+_FLAT, _FLAT_PARTS = 1e-3, 1e-6
 
 
 class TriangulatedBody(Body):
@@ -88,6 +97,14 @@ class Mesh(TriangulatedBody):
         face_textures: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
     ) -> None:
+        sized = isinstance(faces, list | tuple) or (isinstance(faces, np.ndarray) and faces.ndim)
+        count = len(faces) if sized else 0  # type: ignore[arg-type]
+        if count > MAX_TRIANGLES:
+            raise ArgumentError(
+                "faces",
+                f"has {count} triangles, and {MAX_TRIANGLES} is the most",
+                hint="simplify the mesh, or draw it in parts",
+            )
         points = arguments.points("vertices", vertices, least=1)
         triangles = _indices("faces", faces, (None, 3), 0, len(points) - 1)
         if not len(triangles):
@@ -129,6 +146,61 @@ class Mesh(TriangulatedBody):
     def faces(self) -> Ints:
         """Indices of the vertices of each triangle, (F, 3) int64."""
         return self._mesh.faces
+
+
+class Triangle(TriangulatedBody):
+    """A single triangle.
+
+    Parameters
+    ----------
+    points : (3, 3) array
+        Its corners.
+
+    """
+
+    def __init__(self, points: ArrayLike) -> None:
+        corners = arguments.array("points", points, (3, 3))
+        super().__init__(TriangleMesh(corners, np.array([[0, 1, 2]])), "shell")
+        self._arguments = {"points": corners}
+
+
+class Polygon(TriangulatedBody):
+    """A flat region inside of a ring of straight lines.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        The ring's corners in order, in one plane; the last is joined to the first.
+
+    """
+
+    def __init__(self, points: ArrayLike) -> None:
+        ring = arguments.points("points", points, least=3)
+        if len(ring) > 3 and np.array_equal(ring[0], ring[-1]):
+            ring = ring[:-1]
+        if len(ring) > _MAX_RING:
+            raise ArgumentError("points", f"has {len(ring)} corners, and {_MAX_RING} is the most")
+        middle = ring.mean(axis=0)
+        around = ring - middle
+        normal = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
+        size = float(np.abs(around).max())
+        length = float(np.linalg.norm(normal))
+        if length <= _FLAT_PARTS * size**2:
+            raise ArgumentError("points", "are on one line, or enclose nothing")
+        off = np.abs(around @ (normal / length))
+        if off.max() > max(_FLAT, _FLAT_PARTS * size):
+            raise ArgumentError(
+                f"points[{int(np.argmax(off))}]",
+                f"is {off.max():.3g} voxels away from the plane of the others",
+                hint="make a mesh of triangles instead",
+            )
+        kept = np.delete(around, int(np.argmax(np.abs(normal))), axis=1)
+        scale = min(_LATTICE, (1 << 29) / size)
+        triangles = clip_ears(np.rint(kept * scale).astype(np.int64))
+        if triangles is None:
+            raise ArgumentError("points", "has sides that cross each other")
+        super().__init__(TriangleMesh(ring, triangles), "shell")
+        self._arguments = {"points": ring}
 
 
 class Box(TriangulatedBody):

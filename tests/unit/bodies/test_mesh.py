@@ -61,3 +61,56 @@ def test_lit_voxels_move_by_their_centres():
         np.array([(0.0, -1, 0), (1, 0, 0), (0, 0, 1)]), np.array([9.0, 0, 0])
     )
     assert turned.voxels.tolist() == [[6, 1, 3]]
+
+
+def test_too_many_triangles_are_refused_before_anything_is_copied():
+    faces = np.broadcast_to(np.array([0, 1, 2]), (100_000_000, 3))
+    with pytest.raises(vd.BodyError, match="has 100000000 triangles"):
+        vd.Mesh(TETRAHEDRON[0], faces)
+
+
+def star(count):
+    angle = np.pi * np.arange(2 * count) / count
+    radius = np.where(np.arange(2 * count) % 2, 7.0, 18.0)
+    return np.stack((20 + radius * np.cos(angle), 20 + radius * np.sin(angle)), axis=1)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_polygon_covers_what_is_inside_of_its_ring(axis, turned):
+    ring = star(9)
+    points = np.insert(ring, axis, 5.0, axis=1)
+    polygon = vd.Polygon(points[::-1] if turned else points)
+    found = np.delete(vd.voxelize(polygon).voxels, axis, axis=1)
+    x, y = np.indices((40, 40)) + 0.5
+    inside = np.zeros((40, 40), dtype=bool)
+    for (ax, ay), (bx, by) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        inside ^= ((ay > y) != (by > y)) & (x < (bx - ax) * (y - ay) / (by - ay) + ax)
+    lit = np.zeros((40, 40), dtype=bool)
+    lit[found[:, 0], found[:, 1]] = True
+    assert lit[inside].all()
+    near = np.zeros_like(inside)
+    for shift in np.ndindex(3, 3):
+        near |= np.roll(inside, np.array(shift) - 1, axis=(0, 1))
+    # The tips are thinner than a voxel.
+    assert np.count_nonzero(lit & ~near) <= 9
+
+
+def test_a_polygon_has_no_more_triangles_than_corners():
+    ring = [(0, 0, 1), (4, 0, 1), (8, 0, 1), (8, 8, 1), (4, 2, 1), (0, 8, 1)]  # one on a side
+    assert len(vd.Polygon(ring)._mesh.faces) == 4
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([(0, 0, 0), (4, 4, 0), (4, 0, 0), (0, 4, 0)], "enclose nothing|cross each other"),
+        ([(0, 0, 0), (9, 0, 0), (9, 9, 0), (4, -3, 0)], "cross each other"),
+        ([(0, 0, 0), (4, 0, 0), (4, 4, 1), (0, 4, 0)], r"points\[\d\] is 0.\d+ voxels away"),
+        ([(0, 0, 0), (1, 1, 1), (2, 2, 2)], "on one line"),
+        ([(0, 0, 0), (1, 1, 1)], "has 2 points"),
+    ],
+)
+def test_wrong_polygons(points, message):
+    with pytest.raises(vd.BodyError, match=message):
+        vd.Polygon(points)

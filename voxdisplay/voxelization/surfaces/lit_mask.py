@@ -49,6 +49,10 @@ class LitMask:
         """Return which places are lit."""
         return self._mask.take(place)
 
+    def scan_index(self, place: Ints) -> Ints:
+        """Return the scan-order indices of places."""
+        return place
+
     def index(self) -> Ints:
         """Return the scan-order indices of lit voxels, ascending."""
         # Eight voxels at a time: most are dark.
@@ -125,19 +129,24 @@ class LitBricks(LitMask):
 
     def index(self) -> Ints:
         """Return the scan-order indices of lit voxels, ascending."""
-        digits, low = self._digits, (1 << self._digits) - 1
-        nx, ny, _ = self._cells
         found = np.flatnonzero(self._mask[: self._count])
         row, inner = self._split(found)
         brick = np.concatenate([*self._bricks, np.empty(0, dtype=np.int64)])[row]
+        index = self.scan_index((brick << (3 * self._digits)) + inner)
+        index.sort()
+        return index
+
+    def scan_index(self, place: Ints) -> Ints:
+        """Return the scan-order indices of places."""
+        digits, low = self._digits, (1 << self._digits) - 1
+        nx, ny, _ = self._cells
+        brick, inner = self._split(place)
         rest = brick // nx
         z = rest // ny
         x = ((brick - rest * nx) << digits) + (inner & low)
         y = ((rest - z * ny) << digits) + ((inner >> digits) & low)
         z = (z << digits) + (inner >> (2 * digits))
-        index = x + self.sides[0] * (y + self.sides[1] * z)
-        index.sort()
-        return np.asarray(index)
+        return np.asarray(x + self.sides[0] * (y + self.sides[1] * z))
 
 
 def lit_mask(sides: Triple) -> LitMask:

@@ -7,18 +7,23 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from voxdisplay.voxelization.surfaces.lit_mask import lit_mask
+from voxdisplay.voxelization.surfaces.mesh_attributes import has_attributes, interpolate
 from voxdisplay.voxelization.surfaces.mesh_shell import mark_shell
 from voxdisplay.voxelization.surfaces.mesh_solid import solid_index
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology, analyse
 from voxdisplay.voxelization.surfaces.snapped_mesh import snap
+from voxdisplay.voxelization.surfaces.surface_samples import SurfaceSamples, sample_surface
 from voxdisplay.voxelization.surfaces.thin_parts import mark_thin_parts
 from voxdisplay.voxelization.voxel_box import Triple, VoxelBox
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from voxdisplay.bodies.body import Body
     from voxdisplay.bodies.geometry import TriangleMesh
-    from voxdisplay.compute.array_types import Ints
+    from voxdisplay.compute.array_types import Floats, Ints
 
 
 def voxelize_mesh(
@@ -32,12 +37,22 @@ def voxelize_mesh(
     mesh = snap(geometry, box)
     topology = analyse(mesh)
     notes = list(_topology_notes(topology))
-    if body.kind == "solid":
-        index, more = solid_index(topology)
+    solid = body.kind == "solid"
+    samples = None
+    if not solid or has_attributes(geometry):
+        index, samples = shell(topology, box.sides, sampled=has_attributes(geometry))
+    if solid:
+        inside, more = solid_index(topology)
         notes += more
-    else:
-        index = shell_index(topology, box.sides)
-    return VoxelSet(box, index, body.kind, notes=tuple(notes))
+        if samples is not None:
+            samples = samples.spread(index, inside, box.sides)
+        index = inside
+    colors: NDArray[np.uint8] | None = None
+    parameters: dict[str, Floats] = {}
+    if samples is not None:
+        given = samples if topology.triangles is None else samples.renumbered(topology.triangles)
+        colors, parameters = interpolate(geometry, given)
+    return VoxelSet(box, index, body.kind, colors, parameters, tuple(notes))
 
 
 def _topology_notes(topology: Topology) -> Iterator[str]:
@@ -50,20 +65,34 @@ def _topology_notes(topology: Topology) -> Iterator[str]:
         yield "the triangles do not agree on an outside"
 
 
-def shell_index(topology: Topology, sides: Triple) -> Ints:
-    """Return the scan-order indices, ascending, of the voxels of a shell in its mesh's box."""
-    if topology.mesh.is_within():
-        mask = lit_mask(sides)
-        mark_shell(mask, topology, sides)
-        mark_thin_parts(mask, topology)
-        return mask.index()
-    # Beyond the box too, so that clipping commutes with the search for thin parts.
-    nx, ny, nz = sides
-    topology = replace(topology, mesh=topology.mesh.expanded(1))
+def shell(
+    topology: Topology, sides: Triple, *, sampled: bool = False
+) -> tuple[Ints, SurfaceSamples | None]:
+    """Return the scan-order indices, ascending, of the voxels of a shell in its mesh's box.
+
+    Parameters
+    ----------
+    topology : Topology
+    sides : (int, int, int)
+        Of the mesh's box.
+    sampled : bool
+        Return the points of the mesh, too, that are nearest to the voxels' centres.
+
+    """
+    within = topology.mesh.is_within()
+    walls = sides
+    if not within:
+        # Beyond the box too, so that clipping commutes with the search for thin parts.
+        topology = replace(topology, mesh=topology.mesh.expanded(1))
+        walls = (sides[0] + 1, sides[1] + 1, sides[2] + 1)
     mask = lit_mask(topology.mesh.sides)
-    mark_shell(mask, topology, (nx + 1, ny + 1, nz + 1))
-    mark_thin_parts(mask, topology)
-    margin = VoxelBox((-1, -1, -1), (nx + 1, ny + 1, nz + 1))
-    voxels = margin.voxels_at(mask.index())
+    mark_shell(mask, topology, walls)
+    thin = mark_thin_parts(mask, topology)
+    index = mask.index()
+    samples = sample_surface(mask, topology, walls, index, thin) if sampled else None
+    if within:
+        return index, samples
     box = VoxelBox.of_grid(sides)
-    return box.index_of(voxels[box.inside(voxels)])
+    voxels = box.expanded(1).voxels_at(index)
+    kept = box.inside(voxels)
+    return box.index_of(voxels[kept]), samples.select(kept) if samples else None

@@ -48,8 +48,27 @@ class EdgeCrossings:
     plane: Ints
 
 
-def mark_thin_parts(mask: LitMask, topology: Topology) -> None:
-    """Light voxels for the parts of a mesh that its triangles' crossings miss.
+@dataclass(frozen=True, slots=True, eq=False)
+class LitBy:
+    """Voxels, and the points of triangles that light them.
+
+    Attributes
+    ----------
+    place : (n,) int64 array
+        See `LitMask.locate`.
+    triangle : (n,) int64 array
+    weights : (3, n) float64 array
+        Barycentric coordinates of the points, by corner.
+
+    """
+
+    place: Ints
+    triangle: Ints
+    weights: Floats
+
+
+def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
+    """Light voxels for the parts of a mesh that its triangles' crossings miss; return them.
 
     Parameters
     ----------
@@ -64,17 +83,20 @@ def mark_thin_parts(mask: LitMask, topology: Topology) -> None:
             found = dark_edge_crossings(mask, topology, block, axis)
             if len(found.plane):
                 dark[axis].append(found)
-    places = [
-        place
+    lit = [
+        each
         for axis in range(3)
         if dark[axis]
-        for place in _faces_to_light(mask, topology, axis, _joined(dark[axis]))
+        for each in _faces_to_light(mask, topology, axis, _joined(dark[axis]))
     ]
-    for place in places:
-        mask.mark(place)
-    for block in triangle_blocks(topology.mesh):
-        if (grains := _grains(mask, block)) is not None:
-            mask.mark(_cells_to_light(mask, topology, *grains))
+    for each in lit:
+        mask.mark(each.place)
+    parts = [_grains(mask, block) for block in triangle_blocks(topology.mesh)]
+    grains = [part for part in parts if part is not None]
+    if grains:
+        lit.append(_cells_to_light(mask, topology, np.concatenate(grains, axis=1)))
+        mask.mark(lit[-1].place)
+    return lit
 
 
 def _joined(parts: list[EdgeCrossings]) -> EdgeCrossings:
@@ -122,8 +144,8 @@ def dark_edge_crossings(
 
 def _faces_to_light(
     mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
-) -> Iterator[Ints]:
-    """Yield places of the corners to light in dual faces without a lit corner."""
+) -> Iterator[LitBy]:
+    """Yield the corners to light in dual faces without a lit corner."""
     mesh = topology.mesh
     along_u, along_v = (axis + 1) % 3, (axis + 2) % 3
     a = mesh.faces[crossings.triangle, crossings.corner]
@@ -147,11 +169,23 @@ def _faces_to_light(
     key = np.stack((crossings.plane, i, j, s == 0, t == 0))[:, rows]
     group = _groups(key)
     distance = np.stack([np.where(exists, d, np.inf)[rows] for _, _, d, exists in corners])
-    yield from _nearest_corners(
-        mask, topology, axis, group, distance,
-        [p[rows] for p, _, _, _ in corners], [q[rows] for _, q, _, _ in corners],
+    for place, near in _nearest_corners(
+        mask,
+        topology,
+        axis,
+        group,
+        distance,
+        [p[rows] for p, _, _, _ in corners],
+        [q[rows] for _, q, _, _ in corners],
         crossings.plane[rows],
-    )  # fmt: skip
+    ):
+        chosen = rows[near]
+        weights = np.zeros((3, len(chosen)))
+        share = run[chosen] / rise[chosen]
+        corner, columns = crossings.corner[chosen], np.arange(len(chosen))
+        weights[corner, columns] = 1 - share
+        weights[(corner + 1) % 3, columns] = share
+        yield LitBy(place, crossings.triangle[chosen], weights)
 
 
 def _cell_and_fraction(
@@ -208,8 +242,8 @@ def _nearest_corners(
     i: list[Ints],
     j: list[Ints],
     level: Ints,
-) -> Iterator[Ints]:
-    """Yield places of the corners that are nearest in their group.
+) -> Iterator[tuple[Ints, Ints]]:
+    """Yield places of the corners that are nearest in their group, and the rows they belong to.
 
     Of several that are as near, closed and oriented meshes light all, so that mirrored meshes have
     mirrored voxels; others the upper one, as on the faces of voxels.
@@ -228,13 +262,14 @@ def _nearest_corners(
         p, q = i[k][rows], j[k][rows]
         inside = (p >= 0) & (p < nu) & (q >= 0) & (q < nv)
         inside &= (level[rows] >= 0) & (level[rows] < mask.sides[axis])
-        yield mask.locate(axis, p[inside], q[inside], level[rows][inside])
+        place = mask.locate(axis, p[inside], q[inside], level[rows][inside])
+        yield place, rows[inside]
 
 
-def _grains(mask: LitMask, block: TriangleBlock) -> tuple[Ints, Ints] | None:
-    """Return the bounds, (3, n) and (3, n), of triangles inside of dual cells without a lit corner.
+def _grains(mask: LitMask, block: TriangleBlock) -> Ints | None:
+    """Return low and high bounds and numbers of triangles in dual cells without a lit corner.
 
-    None if there are none. Those in a wall between cells belong to the wall.
+    (7, n), or None if there are none. Those in a wall between cells belong to the wall.
     """
     sides = np.array(mask.sides)[:, None]
     low, high = block.corners.min(axis=1), block.corners.max(axis=1)
@@ -256,7 +291,9 @@ def _grains(mask: LitMask, block: TriangleBlock) -> tuple[Ints, Ints] | None:
         exists = ~(on_wall & np.array(up, dtype=bool)[:, None]).any(axis=0)
         lit |= exists & _is_lit(mask, 2, *corner)
     lit |= _zero_area(block.corners[:, :, rows].astype(np.int64))
-    return None if lit.all() else (low[:, ~lit], high[:, ~lit])
+    if lit.all():
+        return None
+    return np.concatenate((low[:, ~lit], high[:, ~lit], rows[None, ~lit] + block.begin))
 
 
 def _zero_area(corners: Ints) -> Bools:
@@ -272,8 +309,9 @@ def _dual_cells(point: Ints) -> tuple[Ints, Bools]:
     return (point - HALF) >> SHIFT, (point - HALF) & (UNIT - 1) == 0
 
 
-def _cells_to_light(mask: LitMask, topology: Topology, low: Ints, high: Ints) -> Ints:
-    """Return places of the corners nearest to the middle of what is in each dual cell."""
+def _cells_to_light(mask: LitMask, topology: Topology, grains: Ints) -> LitBy:
+    """Return the corners nearest to the middle of what is in each dual cell."""
+    low, high = grains[:3], grains[3:6]
     cell, on_wall = _dual_cells(low)
     group = _groups(np.concatenate((cell, on_wall)))
     size = int(group.max()) + 1
@@ -284,7 +322,9 @@ def _cells_to_light(mask: LitMask, topology: Topology, low: Ints, high: Ints) ->
     middle = bounds[0] - bounds[1]  # twice that
     # On a voxel's face both sides are as near.
     level, tied = middle >> (SHIFT + 1), middle & (2 * UNIT - 1) == 0
-    places = []
+    first = np.full(size, np.iinfo(np.int64).max)
+    np.minimum.at(first, group, grains[6])
+    places, triangles = [], []
     for down in np.ndindex(2, 2, 2):
         if any(down) and not topology.has_inside:
             break
@@ -293,4 +333,6 @@ def _cells_to_light(mask: LitMask, topology: Topology, low: Ints, high: Ints) ->
         inside = (x >= 0) & (x < mask.sides[0]) & (y >= 0) & (y < mask.sides[1])
         inside &= (z >= 0) & (z < mask.sides[2])
         places.append(mask.locate(2, x[inside], y[inside], z[inside]))
-    return np.concatenate(places)
+        triangles.append(first[rows][inside])
+    triangle = np.concatenate(triangles)
+    return LitBy(np.concatenate(places), triangle, np.full((3, len(triangle)), 1 / 3))
