@@ -1,6 +1,8 @@
 """Meshes, volumes and voxel models on the command line: shown, converted, refused."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -139,3 +141,27 @@ def test_wrong_options_are_named(run, volume, options, words):
 
 def test_options_for_models_are_refused_for_scenes(run):
     refused(run("push", "examples/paper-curve.json", "--fill", "solid"), "--fill", "scene")
+
+
+HEAVY = {"PIL", "charset_normalizer", "cmap", "fontpkg", "lxml", "nibabel", "networkx", "nrrd",
+         "pydicom", "scipy", "trimesh", "uharfbuzz"}  # fmt: skip
+
+
+def loaded_by(*arguments):
+    """Packages that a command has loaded when it ends."""
+    script = (
+        "import sys; from voxdisplay.cli.main import main\n"
+        f"assert main({list(map(str, arguments))!r}) == 0\n"
+        "print(*{name.split('.')[0] for name in sys.modules}, sep='\\n')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.split())
+
+
+def test_push_of_a_scene_or_an_array_loads_no_extra(volume):
+    for shown in ("examples/paper-curve.json", volume):
+        names = loaded_by("push", shown, "--port", "sim:?size=16x16x16", "--quiet")
+        assert "numpy" in names
+        assert not names & HEAVY

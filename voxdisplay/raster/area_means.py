@@ -95,6 +95,7 @@ def axis_taps(
     return index.clip(max=samples - 1).astype(np.intp), length.clip(min=0)
 
 
+@np.errstate(all="ignore")  # sums of the largest numbers may be infinite: then dark
 def area_means(
     values: NDArray[np.generic], grid: tuple[int, int, int], placement: Placement
 ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
@@ -134,8 +135,7 @@ def area_means(
     if not complete:
         cover = _weighted_sums(values, taps, np.dtype(np.float64), missing="count")
         cover[cover < 1e-9] = 0  # rounding
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(cover > 0, total / cover.astype(kind), 0)
+    mean = np.where(cover > 0, total / cover.astype(kind), 0)
     return mean.astype(kind, copy=False), cover
 
 

@@ -211,7 +211,7 @@ def map_entries(
     """
     narrow = values.dtype.itemsize <= 2 or values.dtype == np.float32
     kind: np.dtype[np.floating] = np.dtype(np.float32 if narrow else np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
         finite = np.isfinite(values)
         lit = finite & (values > window.low if threshold is None else values >= threshold)
         # Halved, so that the difference of the largest numbers is one too.

@@ -84,3 +84,10 @@ def test_nearest_samples_are_those_at_the_centers():
     assert [each.tolist() for each in index] == [[0, 0, 1, 1], [0, 1, 2], [1, 3]]
     assert [each.all() for each in found] == [False, True, True]
     assert found[0].tolist() == [False, True, True, False]
+
+
+def test_the_largest_numbers_raise_nothing():
+    values = np.full((3, 5, 7), np.finfo(np.float64).max)
+    values[0] = np.finfo(np.float64).tiny
+    mean, _ = area_means(values, (3, 3, 3), Placement((0.43, 0.6, 1), (0, 0, 0)))
+    assert mean[0].max() < 1

@@ -1,0 +1,27 @@
+"""docs/files.md: its code runs, its formats are those that are read and written."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from voxdisplay.files.loading import SUFFIXES
+from voxdisplay.files.writing import WRITERS
+from voxdisplay.raster.color_map import BUILT_IN
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "files.md"
+if not DOCUMENT.exists():
+    pytest.skip("docs are not installed", allow_module_level=True)
+TEXT = DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_its_python_runs():
+    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    exec(compile(code, "files.md", "exec"), {})  # noqa: S102 - our own text
+
+
+def test_it_names_every_format_and_map():
+    for suffix in (*SUFFIXES, *WRITERS):
+        assert f"`{suffix}`" in TEXT or suffix == ".tiff"
+    for name in BUILT_IN:
+        assert f"`{name}`" in TEXT
