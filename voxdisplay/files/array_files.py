@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import BodyError
+from voxdisplay.files.bounded_unpacking import check_ratio
 from voxdisplay.files.contained_files import short_name
 from voxdisplay.files.contents import MAX_BYTES, ModelVoxels, VolumeSamples
 from voxdisplay.files.library_calls import guarded
@@ -117,6 +118,7 @@ def _member(name: str, archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArr
     label = f"{name}:{short_name(info.filename)}"
     if info.file_size > MAX_BYTES:
         raise BodyError(f"{label} is larger than {MAX_BYTES >> 20} MiB")
+    check_ratio(label, info.file_size, info.compress_size)
     with archive.open(info) as member:
         head = member.read(_HEADER_BYTES)
         kind, shape, _, start = _npy_header(label, head)

@@ -8,6 +8,14 @@ import zlib
 from voxdisplay.errors import BodyError
 
 _STEP = 1 << 20
+_SMALL = 1 << 26
+_RATIO = 500  # of scans it is below 10, of sparse masks some 300; deflate has 1030 at most
+
+
+def check_ratio(name: str, unpacked: int, packed: int) -> None:
+    """Raise `BodyError` if data would grow so much that they are hardly a picture of anything."""
+    if unpacked > _SMALL and unpacked > _RATIO * packed:
+        raise BodyError(f"{name} would be {unpacked >> 20} MiB unpacked, from {packed} bytes")
 
 
 def gunzip(name: str, data: bytes, most: int) -> bytes:

@@ -73,7 +73,8 @@ def _check_stl(name: str, data: bytes) -> Claims:
         return Claims(count)  # what follows the triangles is a comment of some programs
     lower = data.lower()
     facets, vertices = (len(re.findall(rb"\b%s\b" % word, lower)) for word in (b"facet", b"vertex"))
-    if vertices != 3 * facets or not re.search(rb"\bendsolid\b[^\n]*\s*$", lower):
+    last = lower.rstrip().rpartition(b"\n")[2].lstrip()
+    if vertices != 3 * facets or not last.startswith(b"endsolid"):
         raise BodyError(f"{name} is cut off or damaged: {facets} facets, {vertices} vertices, "
                         "and no endsolid at its end")  # fmt: skip
     return Claims(facets)

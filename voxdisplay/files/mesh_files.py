@@ -172,6 +172,8 @@ def _parts_of(name: str, scene: Any, trimesh: Any) -> list[Part]:
     nodes = list(scene.graph.nodes_geometry)
     if len(nodes) > _MAX_INSTANCES:
         raise BodyError(f"{name} shows more than {_MAX_INSTANCES} parts")
+    filler = np.asarray(trimesh.visual.material.empty_material().image.convert("RGB"))
+    textures = _Textures(name, filler)
     parts: list[Part] = []
     count = 0
     for node in nodes:
@@ -190,7 +192,7 @@ def _parts_of(name: str, scene: Any, trimesh: Any) -> list[Part]:
             faces = faces[:, ::-1]
         with np.errstate(over="ignore", invalid="ignore"):
             moved = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        parts.append(_colored(name, moved, faces, geometry.visual))
+        parts.append(_colored(moved, faces, geometry.visual, textures))
     return parts
 
 
@@ -206,15 +208,44 @@ def _check_indices(name: str, vertices: NDArray[np.float64], faces: NDArray[np.i
         raise BodyError(f"{name}: vertex {bad[0]} is not finite")
 
 
+class _Textures:
+    """Images of a scene as arrays: each once, whatever shows it.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    filler : array
+        What trimesh puts where there is no image.
+
+    """
+
+    def __init__(self, name: str, filler: NDArray[np.uint8]) -> None:
+        self._name = name
+        self._filler = filler
+        self._found: dict[int, tuple[Any, NDArray[np.uint8] | None]] = {}
+        self._texels = 0
+
+    def array(self, image: Any) -> NDArray[np.uint8] | None:
+        """Return an image as an (h, w, 3) array; None for the filler."""
+        if id(image) not in self._found:
+            width, height = image.size
+            self._texels += width * height
+            if self._texels > _MAX_TEXELS:
+                raise BodyError(f"{self._name}: textures of more than {_MAX_TEXELS} pixels")
+            pixels = np.asarray(image.convert("RGB"), dtype=np.uint8)
+            empty = np.array_equal(pixels, self._filler)
+            self._found[id(image)] = image, None if empty else pixels
+        return self._found[id(image)][1]
+
+
 def _colored(
-    name: str, vertices: NDArray[np.float64], faces: NDArray[np.int64], visual: Any
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], visual: Any, textures: _Textures
 ) -> Part:
     """Return a mesh with the colours that trimesh found for it."""
     if visual.kind == "vertex":
         colors = np.asarray(visual.vertex_colors, dtype=np.uint8)[:, :3]
-        return (
-            Part(vertices, faces, colors) if len(colors) == len(vertices) else Part(vertices, faces)
-        )
+        return Part(vertices, faces, colors if len(colors) == len(vertices) else None)
     if visual.kind == "face":
         colors = np.asarray(visual.face_colors, dtype=np.uint8)[:, :3]
         return Part(vertices, faces, None, colors)
@@ -227,10 +258,9 @@ def _colored(
     uv = visual.uv
     if image is None or uv is None or len(uv) != len(vertices):
         return Part(vertices, faces, None, face_colors)
-    width, height = image.size
-    if width * height > _MAX_TEXELS:
-        raise BodyError(f"{name}: a texture of {width} x {height} pixels is too large")
-    texture = np.asarray(image.convert("RGB"), dtype=np.uint8)
+    texture = textures.array(image)
+    if texture is None:
+        return Part(vertices, faces)
     if hasattr(material, "image"):  # there the image is the colour
         face_colors = None
     return Part(vertices, faces, None, face_colors, np.asarray(uv, dtype=np.float64), texture)
@@ -245,10 +275,15 @@ def joined(name: str, parts: list[Part], fill: Fill) -> Mesh:
     used = np.unique(faces) if not np.isfinite(vertices).all() else None
     if used is not None:  # of unused vertices nobody asks where they are
         vertices = np.where(np.isfinite(vertices), vertices, vertices[used[0]])
-    textures = [part.texture for part in parts if part.texture is not None]
-    numbers = iter(range(len(textures)))
-    face_textures = np.concatenate(
-        [np.full(len(part.faces), -1 if part.texture is None else next(numbers)) for part in parts]
+    textures: list[NDArray[np.uint8]] = []
+    numbers = {}
+    for part in parts:
+        if part.texture is not None and id(part.texture) not in numbers:
+            numbers[id(part.texture)] = len(textures)
+            textures.append(part.texture)
+    face_textures = np.repeat(
+        [-1 if part.texture is None else numbers[id(part.texture)] for part in parts],
+        [len(part.faces) for part in parts],
     )
     return Mesh(
         vertices,

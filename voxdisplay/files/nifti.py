@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import BodyError, MissingExtra
-from voxdisplay.files.bounded_unpacking import gunzip
+from voxdisplay.files.bounded_unpacking import check_ratio, gunzip
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
 from voxdisplay.files.library_calls import guarded
 from voxdisplay.files.volume_axes import to_canonical
@@ -55,6 +55,8 @@ def read_nifti(name: str, data: bytes) -> VolumeSamples:
     if not 0 < offset <= _MAX_HEADER:
         raise BodyError(f"{name}: its samples begin at byte {offset}")
     wanted = offset + volume * kind.itemsize  # of several volumes the first
+    if packed:
+        check_ratio(name, wanted, len(data))
     content = gunzip(name, data, wanted) if packed else data
     if len(content) < wanted:
         raise BodyError(f"{name} is cut off: {len(content)} of {wanted} bytes")

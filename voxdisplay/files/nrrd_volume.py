@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import BodyError, MissingExtra
-from voxdisplay.files.bounded_unpacking import bunzip, gunzip
+from voxdisplay.files.bounded_unpacking import bunzip, check_ratio, gunzip
 from voxdisplay.files.contained_files import read_inside, short_name
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
 from voxdisplay.files.library_calls import guarded
@@ -106,6 +106,8 @@ def _nrrd_numbers(
     skip = int(header.get("byte skip", header.get("byteskip", 0)) or 0)
     for _ in range(min(max(lines, 0), len(data))):
         data = data.partition(b"\n")[2]
+    if encoding in {"gz", "gzip", "bz2", "bzip2"}:
+        check_ratio(name, wanted, len(data))
     if encoding in {"ascii", "text", "txt"}:
         words = data.split(maxsplit=wanted // kind.itemsize)[: wanted // kind.itemsize]
         found = guarded(name, "its samples", lambda: np.array(words, dtype=np.float64))

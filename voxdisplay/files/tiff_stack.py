@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import BodyError, MissingExtra
+from voxdisplay.files.bounded_unpacking import check_ratio
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
 from voxdisplay.files.library_calls import guarded
 
@@ -43,6 +44,7 @@ def read_tiff(name: str, data: bytes) -> VolumeSamples:
         nonlocal pixels
         for page in ImageSequence.Iterator(image):
             pixels += page.width * page.height
+            check_ratio(name, pixels, len(data))
             if len(pages) >= _MAX_PAGES or pixels > MAX_SAMPLES:
                 raise BodyError(f"{name} has more than {_MAX_PAGES} pages or {MAX_SAMPLES} samples")
             color = page.mode not in {"1", "L", "I", "F", "I;16", "I;16B", "I;16L"}

@@ -279,3 +279,28 @@ def test_changed_bytes_are_read_or_refused(name):
         except (BodyError, MissingExtra):
             continue
         assert np.isfinite(body.vertices).all()
+
+
+def test_coordinates_without_an_image_are_no_color(tmp_path):
+    (tmp_path / "a.obj").write_bytes(OBJ)
+    mesh = geometry(load_body(tmp_path / "a.obj").body)
+    assert mesh.textures == ()
+    assert mesh.face_colors is None
+
+
+def test_an_image_that_several_parts_show_is_held_once():
+    box = trimesh.creation.box()
+    image = Image.fromarray(np.arange(48, dtype=np.uint8).reshape(4, 4, 3))
+    uv = np.zeros((len(box.vertices), 2))
+    box.visual = trimesh.visual.TextureVisuals(
+        uv=uv, material=trimesh.visual.material.PBRMaterial(baseColorTexture=image)
+    )
+    scene = trimesh.Scene()
+    for i in range(3):
+        place = np.eye(4)
+        place[0, 3] = 2 * i
+        scene.add_geometry(box, geom_name="box", transform=place)
+    body, _ = read_mesh("a", "glb", scene.export(file_type="glb"), None)
+    assert len(body.faces) == 36
+    assert len(geometry(body).textures) == 1
+    assert set(geometry(body).face_textures) == {0}

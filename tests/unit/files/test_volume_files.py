@@ -122,7 +122,7 @@ def test_archive_bombs_are_refused():
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.npy", npy(VALUES) + bytes(200 << 20))
-    refused(read_npz, file.getvalue(), "claims")
+    refused(read_npz, file.getvalue(), "claims|unpacked")
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for i in range(1001):
@@ -361,3 +361,19 @@ def test_changed_bytes_are_read_or_refused(name):
             read("changed", changed.tobytes())
         except (BodyError, MissingExtra):
             continue
+
+
+def test_compressed_samples_that_grow_beyond_reason_are_refused():
+    pytest.importorskip("nrrd", reason="needs the extra volume")
+    zeros = gzip.compress(bytes(1 << 20)) * 300  # 300 MiB in 300 members
+    refused(read_nrrd, nrrd("gzip", content=zeros, sizes="3 5 10000000"), "MiB unpacked")
+    huge = bytearray(nifti())
+    huge[42:48] = np.array([1000, 1000, 500], "<i2").tobytes()
+    refused(read_nifti, gzip.compress(bytes(huge)), "MiB unpacked")
+    image = pytest.importorskip("PIL.Image")
+    file = io.BytesIO()
+    image.new("L", (10_000, 10_000)).save(file, "TIFF", compression="tiff_adobe_deflate")
+    refused(read_tiff, file.getvalue(), "MiB unpacked")
+    file = io.BytesIO()
+    np.savez_compressed(file, a=np.zeros((512, 512, 512), np.uint8))
+    refused(read_npz, file.getvalue(), "MiB unpacked")
