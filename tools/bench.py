@@ -4,8 +4,8 @@
 command from a cold start; ``curves`` voxelisation beside other methods; ``link`` the encoders
 beside other codings; ``view`` pictures and the live view; ``ports`` each kind of port beside the
 bare pipe below it; ``stream`` how busy streaming keeps a line; ``goodput`` what bit errors leave
-of one; ``scale`` time and memory by the size of the volume and by what is lit. Each of these is a
-module in `benchmarks`.
+of one; ``scale`` time and memory by the size of the volume and by what is lit; ``play`` how evenly
+shows play by line rate. Each of these is a module in `benchmarks`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from benchmarks.curves import bench_curves
 from benchmarks.goodput import bench_goodput
 from benchmarks.link import bench_link
 from benchmarks.live import bench_live
+from benchmarks.play import bench_play
 from benchmarks.ports import bench_ports
 from benchmarks.scale import bench_scale
 from benchmarks.stream import bench_stream
@@ -237,6 +238,7 @@ TABLES = {
     "stream": bench_stream,
     "goodput": bench_goodput,
     "scale": bench_scale,
+    "play": bench_play,
 }
 
 

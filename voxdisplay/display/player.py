@@ -7,6 +7,7 @@ the link while it waits. Must not know how frames are made or encoded.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -230,12 +231,12 @@ class Player:
         """Start a frame."""
         due_s = max(self._play.moment(slot.begins_s), self._began_s)
         self._meter.frames += slot.ordinal - self._last.ordinal if self._last else 1
-        began_s = self._clock()
+        began_s = time.thread_time()
         self._last_ticket = operations.queue.start_unwaited(picture)
         self._swaps[self._last_ticket] = _Swap(tick, due_s)
         self._last, self._last_picture = slot, picture
         operations.send_encoded()
-        self._source.note_encoding(self._clock() - began_s)
+        self._source.note_encoding(time.thread_time() - began_s)
 
     def _note_shown(self, ticket: int, now: float) -> None:
         """Record a swap; those before it whose reports were lost have happened, too."""

@@ -52,6 +52,8 @@ class FrameSource:
         self._ready: dict[int, tuple[Slot, Picture]] = {}
         self._requested: dict[int, Slot] = {}  # of the other process
         self._seconds: deque[float] = deque(maxlen=_MEASURED)
+        # Of the processor: on a busy machine another process would only have to wait, too.
+        self._work_s: deque[float] = deque(maxlen=_MEASURED)
 
     @property
     def uses_worker(self) -> bool:
@@ -73,10 +75,10 @@ class FrameSource:
         """Seconds that a frame takes."""
         return sorted(self._seconds)[len(self._seconds) // 2] if self._seconds else 0.0
 
-    def note_encoding(self, seconds: float) -> None:
-        """Add the time that encoding the last frame took to that of its preparation."""
-        if self._seconds and not self.uses_worker:
-            self._seconds[-1] += seconds
+    def note_encoding(self, work_s: float) -> None:
+        """Add the processor time of encoding the last frame to that of its preparation."""
+        if self._work_s:
+            self._work_s[-1] += work_s
 
     def request(self, slot: Slot, encoding: Encoding, period_s: float) -> None:
         """Have a frame prepared, unless that has been requested.
@@ -101,13 +103,15 @@ class FrameSource:
                 self._requested[slot.ordinal] = slot
                 self._worker.request(slot.ordinal, slot.segment, slot.number, encoding)
             return
-        began_s = self._clock()
+        began_s, work_s = self._clock(), time.thread_time()
         self._ready[slot.ordinal] = slot, self._prepare(slot, encoding)
         self._seconds.append(self._clock() - began_s)
+        self._work_s.append(time.thread_time() - work_s)
 
     def _is_slow(self, period_s: float) -> bool:
-        measured = len(self._seconds) == _MEASURED
-        return measured and self._may_use_worker and self.estimate_s > _WORKER_SHARE * period_s
+        measured = len(self._work_s) == _MEASURED
+        middle_s = sorted(self._work_s)[_MEASURED // 2] if measured else 0.0
+        return self._may_use_worker and middle_s > _WORKER_SHARE * period_s
 
     def _prepare(self, slot: Slot, encoding: Encoding) -> Picture:
         show = self._shows[slot.segment]
@@ -130,7 +134,7 @@ class FrameSource:
                 self._ready[ordinal] = slot, encoded
                 self._seconds.append(seconds)
         if worker.ended:
-            self._worker = None
+            self.close()
             self._requested.clear()
 
     def pending(self, after: int) -> list[int]:
