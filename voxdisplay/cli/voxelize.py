@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -202,13 +203,24 @@ def _report(
     facts: dict[str, Any] = {"object": number, "type": item.type}
     if isinstance(voxels, vd.Sequence):
         return facts | _sequence_report(item, voxels, clipped)
+    report = voxels.report
     return facts | {
         "kind": voxels.kind,
         "voxels": len(voxels),
+        "e_max": _rounded(report.e_max),
+        "e_av": _rounded(report.e_av),
+        "tunnels": report.tunnels,
+        "cover": _rounded(report.cover),
+        "enclosed": report.enclosed,
         "clipped": clipped,
         "seconds": round(voxels.seconds, 6),
         "notes": list(voxels.notes),
     }
+
+
+def _rounded(value: float | None) -> float | None:
+    """Return a figure for JSON, which has no infinite numbers."""
+    return None if value is None or not math.isfinite(value) else round(value, 6)
 
 
 def _sequence_report(item: SceneItem, sequence: vd.Sequence, clipped: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from voxdisplay.bodies.body import Body, Kind
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.voxelization.voxel_box import VoxelBox
+
+if TYPE_CHECKING:
+    from voxdisplay.voxelization.body_report import BodyReport
 
 
 @dataclass(eq=False, repr=False)
@@ -84,6 +87,14 @@ class VoxelSet:
         voxels = self.box.voxels_at(self.index)
         voxels.flags.writeable = False
         return voxels
+
+    @cached_property
+    def report(self) -> BodyReport:
+        """Quality figures, computed when first asked for: that takes longer than drawing."""
+        from voxdisplay.voxelization.body_report import report_on  # noqa: PLC0415 - rarely needed
+
+        voxels = self.voxels.astype(np.int64)
+        return report_on(voxels, self.box, self.kind, self.body, self.seconds)
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks, in its bounding box; None without Pillow."""

@@ -1,0 +1,110 @@
+"""Figures of voxel sets: right where they are known, and bad for bad sets."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import voxdisplay as vd
+from voxdisplay.cli.voxelize import voxelize
+from voxdisplay.voxelization.flood_fill import count_enclosed
+from voxdisplay.voxelization.measure_mesh import mesh_cover, mesh_distances, mesh_tunnels
+
+BOX = vd.Box((1.25, 1.5, 2), (9, 8, 9.75))
+CLIP = (11, 10, 12)
+
+
+def test_a_box():
+    report = vd.voxelize(vd.Box((1, 1, 2), (9, 8, 9)), clip=CLIP).report
+    assert (report.kind, report.voxels) == ("surface", 8 * 7 * 7 - 6 * 5 * 5)
+    assert (report.e_max, report.e_av) == pytest.approx((0.5, 0.5))
+    assert (report.tunnels, report.enclosed) == (0, 6 * 5 * 5)
+    assert report.cover == pytest.approx(0.5)
+
+
+def test_a_solid_is_judged_by_its_outer_layer():
+    report = vd.voxelize(vd.Box((1, 1, 2), (9, 8, 9), fill="solid"), clip=CLIP).report
+    assert (report.kind, report.voxels, report.tunnels) == ("solid", 8 * 7 * 7, 0)
+    assert (report.e_max, report.enclosed) == (pytest.approx(0.5), 0)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        vd.Sphere((10, 10, 10), 7.3),
+        vd.Ellipsoid((10, 10, 10), (8, 5, 6)),
+        vd.Cylinder((4, 4, 4), (14, 12, 15), 3.5),
+        vd.Cone((4, 4, 4), (14, 12, 15), 5),
+        vd.Disc((10, 10, 10), 7, (1, 2, 3)),
+        vd.Implicit("x**2 + y**2 + (z - 10)**2 - 90", box=((-10, -10, 0), (10, 10, 20))),
+        vd.HeightField("10 + 3*sin(x/3)*cos(y/4)", x=(0, 19), y=(1, 18)),
+    ],
+    ids=lambda body: type(body).__name__,
+)
+def test_other_bodies(body):
+    report = vd.voxelize(body).report
+    assert 0.25 < report.e_max <= 0.501
+    assert 0.1 < report.e_av < 0.3
+    assert report.tunnels == 0
+
+
+def test_a_missing_voxel_is_a_tunnel_and_a_voxel_too_many_an_error():
+    found = vd.voxelize(BOX, clip=CLIP)
+    mesh, voxels = BOX._mesh, found.voxels
+    args = mesh.vertices, mesh.faces
+    assert mesh_tunnels(voxels, *args, found.box) == 0
+    middle = np.flatnonzero((voxels[:, :2] == (5, 4)).all(axis=1))
+    holed = np.delete(voxels, middle[0], axis=0)
+    assert mesh_tunnels(holed, *args, found.box) == 1
+    assert count_enclosed(holed) == 0 < count_enclosed(voxels)
+    assert mesh_distances(voxels, *args).max() <= 0.5
+    assert mesh_distances(np.append(voxels, [(5, 4, 5)], axis=0), *args)[-1] == np.inf
+    assert mesh_distances(np.append(voxels, [(5, 4, 3)], axis=0), *args)[-1] == 1.5
+    near = np.delete(voxels, np.flatnonzero(np.abs(voxels - (5, 4, 2)).max(axis=1) <= 1), axis=0)
+    assert mesh_cover(near, *args) > 1
+
+
+def test_distances_are_those_of_points_from_triangles():
+    chance = np.random.default_rng(5)
+    vertices = chance.uniform(2, 8, (9, 3))
+    faces = np.arange(9).reshape(3, 3)
+    voxels = np.array(list(np.ndindex(10, 10, 10)))
+    found = mesh_distances(voxels, vertices, faces)
+    i, j = np.indices((201, 201)).reshape(2, -1) / 200
+    weights = np.stack((i, j, 1 - i - j))[:, i + j <= 1]
+    points = np.einsum("fcx,cp->fpx", vertices[faces], weights).reshape(-1, 3)
+    for voxel, distance in zip(voxels[::37], found[::37], strict=True):
+        expected = np.sqrt(((points - voxel - 0.5) ** 2).sum(axis=1).min())
+        assert distance == (pytest.approx(expected, abs=2e-3) if distance < np.inf else np.inf)
+        assert (distance < np.inf) == (expected <= 1.5) or abs(expected - 1.5) < 2e-3
+
+
+def test_what_a_snake_of_dark_voxels_reaches_is_not_enclosed():
+    lit = np.ones((9, 8, 7), dtype=bool)
+    path = [(0, 4, 3), (1, 4, 3), (2, 4, 3), (2, 5, 3), (2, 6, 3), (3, 6, 3), (3, 6, 4), (4, 6, 4)]
+    for voxel in path:
+        lit[voxel] = False
+    lit[6, 2, 2] = lit[6, 3, 2] = False
+    assert count_enclosed(np.argwhere(lit)) == 2
+    assert count_enclosed(np.empty((0, 3), dtype=int)) == 0
+
+
+def test_points_and_empty_sets_have_no_distances():
+    scatter = vd.voxelize(vd.Scatter([(1, 1, 1), (5, 5, 5)]), clip=(9, 9, 9)).report
+    assert (scatter.kind, scatter.e_max, scatter.tunnels) == ("points", None, None)
+    empty = vd.voxelize(vd.Box((20, 20, 20), (30, 30, 30)), clip=(9, 9, 9)).report
+    assert (empty.voxels, empty.e_max, empty.tunnels, empty.enclosed) == (0, None, 0, 0)
+
+
+def test_the_command_prints_the_figures(tmp_path):
+    scene = tmp_path / "scene.json"
+    scene.write_text('{"size": [20, 20, 20], "objects": [{"type": "sphere", "center": [10, 10, 10],'
+                     ' "radius": 7}]}')  # fmt: skip
+    run = CliRunner().invoke(voxelize, [str(scene), "--json"])
+    (facts,) = json.loads(run.stdout)["objects"]
+    assert (facts["kind"], facts["tunnels"]) == ("surface", 0)
+    assert 0 < facts["e_av"] < facts["e_max"] <= 0.5
+    assert facts["enclosed"] > 0
+    assert dataclasses.is_dataclass(vd.voxelize(BOX).report)
