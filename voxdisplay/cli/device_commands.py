@@ -104,7 +104,10 @@ def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_jso
         array = display.read()
         device, name = device_json(display.info), display.port
         format_ = display.info.format
+        unknown = format_.value == "index8" and "palette" in display.info.features
     lit = save_voxels(output, array, format_)
+    if unknown and lit and output.suffix.lower() != ".npy":
+        note("a palette cannot be read back: colours are those of the default one")
     if as_json:
         print_json({"port": name, "device": device, "output": str(output), "voxels": lit})
     else:

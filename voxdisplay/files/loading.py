@@ -236,6 +236,7 @@ def _series(path: Path) -> Iterator[tuple[str, bytes]]:
     for name in names:
         other = folder / name
         if other != path and (path.is_dir() or other.suffix.lower() == path.suffix.lower()):
+            path_inside(folder, name)  # links lead nowhere else
             with other.open("rb") as file:
                 if file.read(132)[128:] != b"DICM":
                     continue

@@ -17,7 +17,7 @@ from voxdisplay.files.byte_reader import ByteReader
 from voxdisplay.files.contents import MAX_LIT, ModelVoxels
 
 _MAX_NODES = 1 << 16
-_MAX_VISITS = 1 << 16  # a node may have several parents, so a small file could have 2^64 paths
+_MAX_VISITS = 1 << 14  # a node may have several parents, so a small file could have 2^64 paths
 _MAX_DEPTH = 256
 _MAX_ATTRIBUTES = 1 << 10
 _MAX_SIDE = 1 << 16

@@ -136,6 +136,7 @@ def read_mesh(
     """
     claims = check(name, kind, data)
     try:
+        import PIL  # noqa: F401, PLC0415 - without it trimesh leaves textures out
         import trimesh  # noqa: PLC0415 - an extra
     except ModuleNotFoundError:
         raise _missing(name) from None
@@ -143,7 +144,10 @@ def read_mesh(
 
     def parts_of_scene() -> list[Part]:
         file = io.BytesIO(data)
-        scene = trimesh.load_scene(file, file_type=kind, resolver=beside, process=False)
+        try:
+            scene = trimesh.load_scene(file, file_type=kind, resolver=beside, process=False)
+        except ImportError:  # of what it needs for some kinds alone
+            raise _missing(name) from None
         return _parts_of(name, scene, trimesh)
 
     try:

@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import struct
+import sys
 import zipfile
 
 import numpy as np
@@ -304,3 +305,19 @@ def test_an_image_that_several_parts_show_is_held_once():
     assert len(body.faces) == 36
     assert len(geometry(body).textures) == 1
     assert set(geometry(body).face_textures) == {0}
+
+
+def test_without_a_library_the_error_names_the_extra(monkeypatch):
+    def lacks(*_, **__):
+        raise ModuleNotFoundError("No module named 'lxml'")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trimesh, "load_scene", lacks)
+        with pytest.raises(MissingExtra, match="meshes need trimesh") as caught:
+            read_mesh("a", "3mf", exported("3mf"), None)
+    assert "voxdisplay[mesh]" in caught.value.hint
+    for module in ("trimesh", "PIL"):
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, module, None)
+            with pytest.raises(MissingExtra):
+                read_mesh("a", "stl", exported("stl"), None)
