@@ -279,3 +279,53 @@ def test_a_difference_goes_whole_when_the_session_ends_before_it_is_shown():
     again = transmit(link, 0.3)
     assert [packet.ops for packet in again] == [b"\xa7", b"\xa8"]
     assert {packet.flags & spec.DATA_FLAG_CLEAR for packet in again} == {spec.DATA_FLAG_CLEAR}
+
+
+def chained_link():
+    """Link that has sent a frame, and behind it two that repeat it."""
+    link = open_link()
+    sessions, _ = link.displayed
+    ticket = link.present([b"\xa2"])
+    again = link.present_difference((sessions, ticket), [], lambda: [b"\xa2"])
+    link.present_difference((sessions, again), [b"\xa3"], lambda: [b"\xa2", b"\xa3"])
+    return link
+
+
+def test_a_difference_from_the_frame_right_before_it_is_sent_behind_it():
+    """6, point 6: a device begins a frame when the one before is on display."""
+    sent = transmit(chained_link(), 0.1)
+    assert [(packet.frame, packet.ops) for packet in sent] == [(0, b"\xa2"), (1, b""), (2, b"\xa3")]
+    clear, commit = spec.DATA_FLAG_CLEAR, spec.DATA_FLAG_COMMIT
+    assert [packet.flags for packet in sent] == [clear | commit, commit, commit]
+
+
+@pytest.mark.parametrize("shown", [0, 1, 2])
+def test_such_differences_in_a_new_session_begin_with_a_whole_frame(shown):
+    link = chained_link()
+    transmit(link, 0.1)
+    if shown:
+        receive(link, ack(3, 2, frame=shown - 1, flags=1), 0.1)
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.2)
+    (hello,) = transmit(link, 0.2)
+    receive(link, dataclasses.replace(INFO, session=hello.session), 0.3)
+    again = transmit(link, 0.3)
+    whole = spec.DATA_FLAG_CLEAR
+    expected = [
+        [(0, b"\xa2", whole), (1, b"", 0), (2, b"\xa3", 0)],
+        [(0, b"\xa2", whole), (1, b"\xa3", 0)],
+        [(0, b"\xa2", whole), (0, b"\xa3", whole)],
+    ][shown]
+    assert [(p.frame, p.ops, p.flags & spec.DATA_FLAG_CLEAR) for p in again] == expected
+
+
+def test_a_burst_that_ended_at_its_size_is_followed_by_more():
+    link = open_link(rx_buffer=1 << 20, max_payload=4096)
+    link.present([bytes(4000)])
+    assert len(transmit(link, 0.0)) == 1
+    assert not link.has_more
+    receive(link, ack(1, 0, frame=0, flags=1, credit=1 << 20), 0.001)
+    link.present([bytes(4000)] * 12)
+    bursts = [len(transmit(link, 0.001))]
+    while link.has_more:
+        bursts.append(len(transmit(link, 0.001)))
+    assert bursts == [5, 5, 2]
