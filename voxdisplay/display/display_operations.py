@@ -252,7 +252,8 @@ class DisplayOperations:
         link.cancel_reads()  # of a call that was interrupted
         self._pages.clear()
         total = info.grid.voxels
-        values = np.zeros(total, dtype=np.uint32)
+        # Only what is lit is written to: the rest of a large page takes no memory.
+        pixels = np.zeros(info.format.shape((total,)), dtype=info.format.dtype)
         at, reconnects = 0, connection.reconnects
         while at < total:
             link.read(at, total - at, back=back)
@@ -261,14 +262,17 @@ class DisplayOperations:
             if reconnects != connection.reconnects:  # the device may have lost its memory
                 self.flush()
                 self._pages.clear()
+                pixels[:at] = 0
                 at, reconnects = 0, connection.reconnects
                 continue
             page = self._pages.pop()
-            values[at : at + page.count] = decode_spans(page.ops, page.count, info.format)
+            values = decode_spans(page.ops, page.count, info.format)
+            lit = np.flatnonzero(values)
+            pixels[at + lit] = info.format.pixels(values[lit])
             at += page.count
             if progress:
                 progress(at, total)
-        return info.format.pixels(values).reshape(info.format.shape(info.grid.array_shape))
+        return pixels.reshape(info.format.shape(info.grid.array_shape))
 
     def blank(self, timeout_s: float) -> None:
         """Show a dark frame at once: a new session drops all that is queued.
