@@ -20,8 +20,14 @@ from voxdisplay.voxelization.length_estimate import estimated_min_length
 # A longer curve is a mistake, not a picture: 256^3 has 17 million voxels in all.
 MAX_VOXELS = 10_000_000
 MAX_SAMPLES = 4_000_000
+# All curves of a call together: their voxels, in all, and samples and jumps of those at work.
+MAX_TOTAL_VOXELS = 4 * MAX_VOXELS
+MAX_TOTAL_SAMPLES = 3 * MAX_SAMPLES
 # Each jump takes some 200 samples to be found.
 MAX_JUMPS = 1 << 14
+MAX_TOTAL_JUMPS = 4 * MAX_JUMPS
+# A curve with chords shorter than this, in voxels, all along, oscillates: see `check_estimate`.
+WIDE = 100.0
 # A step is still beside a jump if it is shorter than this share of the longest that need no split.
 JUMP_CONTRAST = 1e-2
 # From so many samples of a curve on, its length is estimated before it gets more.
@@ -65,34 +71,25 @@ def _initial_shares(degree: int | None) -> Floats:
     return shares
 
 
-def sample_adaptively(batch: CurveBatch) -> Samples:
-    """Return samples of curves that resolve their features, cut at jumps.
+def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
+    """Return samples that resolve the features of curves.
 
     Steps are split until none is longer than ``MAX_CHORD`` or bends more than ``MAX_SAG``; the bend
-    h^2 |P''| / 8 is taken from second divided differences. A step that is still wider than
-    ``MIN_JUMP`` where parameters cannot be told apart any more is a jump.
+    h^2 |P''| / 8 is taken from second divided differences.
 
     Parameters
     ----------
     batch : CurveBatch
         The curves.
-
-    Returns
-    -------
-    Samples
-        With at least one sample per piece and at least one piece per curve.
+    samples : Samples
+        One piece for each curve.
 
     Raises
     ------
     CurveError
-        If a curve runs off, does not settle, or would need too many voxels.
+        If a curve runs off, does not settle, or would need too many voxels, or all together.
 
     """
-    return split_at_jumps(batch, refine_samples(batch, initial_samples(batch)))
-
-
-def refine_samples(batch: CurveBatch, samples: Samples) -> Samples:
-    """Split steps of samples, one piece for each curve, to the limits of `sample_adaptively`."""
     estimated: set[int] = set()
     while True:
         parts, chord = subdivision_counts(samples, batch.resolution)
@@ -201,6 +198,16 @@ def check_estimate(batch: CurveBatch, index: int) -> None:
         raise _roughness_error(batch, index)
     if length > MAX_VOXELS:
         raise _length_error(batch, index, length)
+    if 0 < step < WIDE:
+        # An oscillation as wide as this bends as an arc of this radius does, or more, all along.
+        samples = 2 * length / min(MAX_CHORD, (8 * MAX_SAG * step) ** 0.5)
+        if samples > MAX_SAMPLES or _wriggles(samples, length):
+            raise _roughness_error(batch, index)
+
+
+def _wriggles(samples: float, length: float) -> bool:
+    """Return whether a curve needs many samples for few voxels: it wriggles within a voxel."""
+    return samples > MAX_SAMPLES // 16 + 3 * length
 
 
 def _check_jumps(batch: CurveBatch, samples: Samples, chord: Floats) -> None:
@@ -215,6 +222,12 @@ def _check_jumps(batch: CurveBatch, samples: Samples, chord: Floats) -> None:
             f"and {MAX_JUMPS} is the limit",
             hint="shorten the range of t, or have it jump less often",
         )
+    if count.sum() > MAX_TOTAL_JUMPS:
+        raise CurveError(
+            f"the curves jump at {count.sum()} parameters or more in all, "
+            f"and {MAX_TOTAL_JUMPS} is the limit",
+            hint="draw fewer of them, or have them jump less often",
+        )
 
 
 def check_lengths(batch: CurveBatch) -> None:
@@ -223,6 +236,17 @@ def check_lengths(batch: CurveBatch) -> None:
     if max(lengths) > MAX_VOXELS:
         index = int(np.argmax(np.array(lengths) > MAX_VOXELS))
         raise _length_error(batch, index, lengths[index])
+    check_total(sum(lengths))
+
+
+def check_total(length: float) -> None:
+    """Raise CurveError if curves are too long together, in voxels."""
+    if length > MAX_TOTAL_VOXELS:
+        raise CurveError(
+            f"the curves are too long together: {length:.3g} voxels at least, "
+            f"and {MAX_TOTAL_VOXELS} is the limit",
+            hint="draw fewer of them, shorten their ranges of t, or scale them down",
+        )
 
 
 def _length_error(batch: CurveBatch, index: int, length: float) -> CurveError:
@@ -235,18 +259,25 @@ def _length_error(batch: CurveBatch, index: int, length: float) -> CurveError:
 
 def _check_limits(batch: CurveBatch, samples: Samples, parts: Ints, chord: Floats) -> None:
     """Raise CurveError before a curve takes too many samples; ``parts`` are the next ones."""
-    if parts.sum() <= MAX_SAMPLES // 16 and chord.sum() <= MAX_VOXELS:
+    total = int(parts.sum())
+    if total <= MAX_SAMPLES // 16 and chord.sum() <= MAX_VOXELS:
         return
     starts = samples.bounds[:-1]
     length = np.add.reduceat(chord, starts)
     count = np.add.reduceat(parts * samples.joined, starts)
     count -= [8 * len(each.breaks) for each in batch.curves]  # these may need some each
-    # Many samples for few voxels: the curve wriggles all along, and no wider than a voxel.
-    wriggles = count > MAX_SAMPLES // 16 + 3 * length
+    wriggles = count > MAX_SAMPLES // 16 + 3 * length  # as `_wriggles`
     grows = np.maximum.reduceat(parts, starts) > 1  # others are done, and no concern of these
     over = grows & ((length > MAX_VOXELS) | (count > MAX_SAMPLES) | wriggles)
     excess = over.nonzero()[0]
     if not excess.size:
+        check_total(float(length.sum()))
+        if total > MAX_TOTAL_SAMPLES:
+            raise CurveError(
+                "the curves are too rough together: however finely they are sampled, they do not "
+                "settle",
+                hint="draw fewer of them, slow their oscillation, or shorten their ranges of t",
+            )
         return
     index = int(excess[0])
     worst = int(np.argmax(np.where(samples.piece[:-1] == index, chord, -1.0)))
@@ -283,7 +314,11 @@ def _divergence_error(batch: CurveBatch, index: int, samples: Samples, at: int) 
 
 
 def split_at_jumps(batch: CurveBatch, samples: Samples) -> Samples:
-    """Split refined samples into pieces where curves jump."""
+    """Split refined samples into pieces where curves jump.
+
+    A step that is still wider than ``MIN_JUMP`` where parameters cannot be told apart any more is
+    a jump. There is at least one sample per piece, and one piece per curve.
+    """
     finest = samples.t[1:] - samples.t[:-1] < 2 * batch.resolution[samples.piece[:-1]]
     finest &= samples.joined
     if not finest.any():

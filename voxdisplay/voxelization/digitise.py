@@ -22,6 +22,7 @@ from voxdisplay.compute.array_types import Bools, Ints
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.adaptive_sampling import (
+    check_total,
     initial_samples,
     refine_samples,
     split_at_jumps,
@@ -66,7 +67,7 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
                 if not batch.complete_undefined():
                     raise
 
-    size, batches = 16, 1
+    size, batches, total = 16, 1, 0
     while (begin := len(sequences)) < len(curves):
         end = min(begin + size * batches, len(curves))
         # Many short array operations in numpy would only wait for each other.
@@ -75,6 +76,8 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
         for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
             sequences += fresh
         voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
+        total += voxels
+        check_total(total)
         at_once = parallel.cpu_count()
         batches = at_once * (BATCHES_PER_PROCESSOR if apart else 1)
         size = min(MAX_BATCH_CURVES, MAX_BATCH_VOXELS // at_once * (end - begin) // voxels + 1)

@@ -7,15 +7,20 @@ import numpy as np
 import pytest
 from space_curves import Function
 
-from voxdisplay.curves import Bezier, Parametric, Polyline, Segment
+from voxdisplay.curves import Bezier, Circle, Parametric, Polyline, Segment
 from voxdisplay.errors import CurveError
+from voxdisplay.voxelization import voxelize, voxelize_many
 from voxdisplay.voxelization.adaptive_sampling import (
     INITIAL_STEPS,
     initial_samples,
     limit_chords,
-    sample_adaptively,
+    refine_samples,
 )
 from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
+
+
+def refined(batch: CurveBatch) -> Samples:
+    return refine_samples(batch, initial_samples(batch))
 
 
 def test_curves_are_looked_at_as_closely_as_their_degree_asks() -> None:
@@ -55,7 +60,7 @@ def test_no_parameter_is_looked_at_twice() -> None:
 
 
 @pytest.mark.parametrize(
-    "look", [sample_adaptively, lambda batch: limit_chords(batch, initial_samples(batch), 0.1)]
+    "look", [refined, lambda batch: limit_chords(batch, initial_samples(batch), 0.1)]
 )
 def test_curves_are_too_rough_alone_or_not_at_all(
     look: Callable[[CurveBatch], Samples], monkeypatch: pytest.MonkeyPatch
@@ -83,7 +88,7 @@ def test_no_turn_of_a_polynomial_is_missed(degree: int) -> None:
     wave = 20 * np.prod(t[:, None] - roots, axis=1) * 2.0 ** (degree - 1)
     samples = np.linspace(0, 1, degree + 1)
     curve = Bezier(_control(samples, np.stack((30 * samples, wave, 0 * t), axis=1)))
-    found = sample_adaptively(CurveBatch([curve]))
+    found = refined(CurveBatch([curve]))
     fine = np.linspace(0, 1, 20_001)
     straight = np.stack([np.interp(fine, found.t, row) for row in found.points])
     assert np.abs(straight - curve.position(fine)).max() < 0.1
@@ -98,7 +103,7 @@ def test_one_more_look_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
         return evaluate(batch, curve, t)
 
     monkeypatch.setattr(CurveBatch, "evaluate", counted)
-    found = sample_adaptively(
+    found = refined(
         CurveBatch([Parametric("80*cos(t)", "80*sin(t)", "80*(1 - cos(4*t))", t=(-3, 3))])
     )
     assert len(looks) == 2
@@ -110,3 +115,34 @@ def _control(t: np.ndarray, points: np.ndarray) -> np.ndarray:
     degree = len(t) - 1
     unit = [Bezier(np.eye(degree + 1)[:, [j, j, j]]).position(t)[0] for j in range(degree + 1)]
     return np.linalg.solve(np.stack(unit, axis=1), points)
+
+
+ENDLESS_TOGETHER = {
+    "long circles": [Circle((0, 0, 0), 1e6, normal=(1, 2, 3))] * 100,
+    "long formulas": [Parametric("9e5*t", "9e5*sin(t)", "3", t=(0, 9))] * 9,
+    "many jumps": [Parametric("t", "9*mod(floor(3000*t), 2)", "3", t=(0, 5))] * 9,
+}
+
+
+@pytest.mark.parametrize("name", ENDLESS_TOGETHER)
+def test_curves_that_are_too_much_together_are_refused(name: str) -> None:
+    with pytest.raises(CurveError, match=r"the curves (are too|jump).*(limit|settle)") as caught:
+        voxelize_many(ENDLESS_TOGETHER[name])
+    assert "fewer" in str(caught.value.hint)
+
+
+@pytest.mark.parametrize(
+    "formula", ["20 + 5*cos(1e5*t)", "20 + .6*sin(1e5*t)", "8 + round(5*sin(1e5*t))"]
+)
+def test_oscillations_are_refused_before_they_are_resolved(formula: str) -> None:
+    evaluated = 0
+
+    class Counted(Parametric):
+        def position(self, t: np.ndarray) -> np.ndarray:
+            nonlocal evaluated
+            evaluated += t.size
+            return super().position(t)
+
+    with pytest.raises(CurveError, match=r"too rough|jumps"):
+        voxelize(Counted(formula, "t", "5*sin(1e5*t)", t=(0, 10)))
+    assert evaluated < 2_000_000

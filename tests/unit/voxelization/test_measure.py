@@ -8,7 +8,7 @@ from space_curves import Function, chain, paper_curve
 
 import voxdisplay as vd
 from voxdisplay.curves import Polyline
-from voxdisplay.voxelization import measure
+from voxdisplay.voxelization import curve_distance, measure
 
 
 def line(t: np.ndarray) -> tuple[np.ndarray | float, ...]:
@@ -141,7 +141,7 @@ def test_a_curve_without_points_is_not_measured() -> None:
 
 
 def test_a_curve_without_end_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "MAX_SEGMENTS", 1000)
+    monkeypatch.setattr(curve_distance, "MAX_SEGMENTS", 1000)
     with pytest.raises(ValueError, match="too rough to measure"):
         measure.distances(
             np.zeros((1, 3), dtype=int), Function(lambda t: (t, t, 40 * np.sin(1e9 * t)))
