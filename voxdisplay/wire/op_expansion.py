@@ -1,0 +1,204 @@
+"""Expansion of chains, bricks and shapes into voxels, for many ops at once (protocol.md, 7.1 to 7.4).
+
+Each class collects ops while they are parsed. Must not know how they are written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from voxdisplay.raster.grid import Grid
+from voxdisplay.wire.op_encoding import Ints, concat_ranges
+
+Written = tuple[Ints, Ints, Ints]
+"""Number of the op, scan-order index, and pixel value of each voxel that is written."""
+
+
+def _ints(values: list[int]) -> Ints:
+    return np.array(values, dtype=np.int64)
+
+
+@dataclass
+class Chains:
+    """Chains of steps: STEP and FROM, of which begin and end are on the grid."""
+
+    op: list[int] = field(default_factory=list)
+    pen: list[int] = field(default_factory=list)
+    begin: list[int] = field(default_factory=list)
+    octant: list[int] = field(default_factory=list)
+    steps: list[int] = field(default_factory=list)
+    crumbs: list[bytes] = field(default_factory=list)
+
+    def add(self, op: int, pen: int, begin: int, octant: int, steps: int, crumbs: bytes) -> None:
+        """Add a chain.
+
+        Parameters
+        ----------
+        op, pen : int
+            Number of the op, and the pixel value that it writes.
+        begin : int
+            Index of its first voxel.
+        octant, steps, crumbs
+            As on the wire.
+
+        """
+        self.op.append(op)
+        self.pen.append(pen)
+        self.begin.append(begin)
+        self.octant.append(octant)
+        self.steps.append(steps)
+        self.crumbs.append(crumbs)
+
+    def expand(self, grid: Grid) -> Written:
+        """Return the voxels of all chains."""
+        steps, octant = _ints(self.steps), _ints(self.octant)
+        stride = np.array((1, grid.nx, grid.nx * grid.ny), dtype=np.int64)
+        main = octant // 8
+        # Change of the index by a step along each axis, (chains, 3): main axis, and the two others.
+        axes = (main[:, None] + np.arange(3)) % 3
+        delta = np.where(octant[:, None] >> axes & 1, -stride[axes], stride[axes])
+
+        raw = np.frombuffer(b"".join(self.crumbs), dtype=np.uint8)
+        bits = np.unpackbits(raw, bitorder="little").reshape(-1, 2).astype(np.int64)
+        slots = -(-steps // 4) * 4
+        bits = bits[concat_ranges(np.cumsum(slots) - slots, steps)]
+        chain = np.repeat(np.arange(len(steps)), steps)
+        moved = delta[chain, 0] + (bits * delta[chain, 1:]).sum(axis=1)
+
+        # The first voxel of a chain comes before its steps.
+        first = np.cumsum(steps + 1) - (steps + 1)
+        change = np.zeros(int((steps + 1).sum()), dtype=np.int64)
+        change[concat_ranges(first + 1, steps)] = moved
+        total = np.cumsum(change)
+        index = total + np.repeat(_ints(self.begin) - total[first], steps + 1)
+        return np.repeat(_ints(self.op), steps + 1), index, np.repeat(_ints(self.pen), steps + 1)
+
+
+@dataclass
+class Bricks:
+    """Octree bricks: OCT."""
+
+    op: list[int] = field(default_factory=list)
+    pen: list[int] = field(default_factory=list)
+    corner: list[tuple[int, int, int]] = field(default_factory=list)
+    level: list[int] = field(default_factory=list)
+    masks: list[list[bytes]] = field(default_factory=list)
+
+    def add(
+        self, op: int, pen: int, brick: tuple[int, int, int], level: int, masks: list[bytes]
+    ) -> None:
+        """Add a brick.
+
+        Parameters
+        ----------
+        op, pen : int
+            As of `Chains.add`.
+        brick : (int, int, int)
+            Its coordinates, as on the wire.
+        level : int
+        masks : list of bytes
+            Masks of the nodes of each level, from the brick's own on.
+
+        """
+        x, y, z = brick
+        self.op.append(op)
+        self.pen.append(pen)
+        self.corner.append((x << level, y << level, z << level))
+        self.level.append(level)
+        self.masks.append(masks)
+
+    def expand(self, grid: Grid) -> Written:
+        """Return the voxels of all bricks; raise ValueError if one is off the grid."""
+        brick = np.arange(len(self.op))
+        corner = np.array(self.corner, dtype=np.int64).reshape(-1, 3)
+        side = np.int64(1) << _ints(self.level)
+        found: list[tuple[Ints, Ints, Ints]] = []  # cubes: brick, corner, side
+        depth = 0
+        while len(brick):
+            voxels = side == 1
+            found.append((brick[voxels], corner[voxels], side[voxels]))
+            brick, corner, side = brick[~voxels], corner[~voxels], side[~voxels]
+            present = [masks[depth] for masks in self.masks if len(masks) > depth]
+            mask = np.frombuffer(b"".join(present), dtype=np.uint8)
+            full = mask == 0
+            found.append((brick[full], corner[full], side[full]))
+            node, bit = np.nonzero(np.unpackbits(mask[:, None], axis=1, bitorder="little"))
+            side = side[node] // 2
+            child = np.stack((bit & 1, bit >> 1 & 1, bit >> 2), axis=1)
+            corner = corner[node] + child * side[:, None]
+            brick = brick[node]
+            depth += 1
+        owners, corners, sides = (
+            np.concatenate(part) if found else np.empty(0, dtype=np.int64)
+            for part in (zip(*found, strict=True) if found else ((), (), ()))
+        )
+        op, index, pen = [], [], []
+        for each in np.unique(sides).tolist():
+            of_side = sides == each
+            offset = np.stack(np.unravel_index(np.arange(each**3), (each,) * 3), axis=1)
+            voxels = (corners[of_side][:, None, :] + offset).reshape(-1, 3)
+            if not grid.inside(voxels).all():
+                raise ValueError("a brick writes outside the grid")
+            index.append(grid.index_of(voxels))
+            owner = np.repeat(owners[of_side], each**3)
+            op.append(_ints(self.op)[owner])
+            pen.append(_ints(self.pen)[owner])
+        empty = np.empty(0, dtype=np.int64)
+        return (
+            np.concatenate([*op, empty]),
+            np.concatenate([*index, empty]),
+            np.concatenate([*pen, empty]),
+        )
+
+
+@dataclass
+class Shapes:
+    """Lines, boxes and single voxels: LINE, BOX and DOTS, whose voxels named are on the grid."""
+
+    lines: list[tuple[int, int, int, int]] = field(default_factory=list)
+    boxes: list[tuple[int, int, int, int]] = field(default_factory=list)
+    dots: list[tuple[int, int, Ints]] = field(default_factory=list)
+
+    def add_line(self, op: int, pen: int, begin: int, end: int) -> None:
+        """Add a line between the voxels of two indices."""
+        self.lines.append((op, pen, begin, end))
+
+    def add_box(self, op: int, pen: int, begin: int, end: int) -> None:
+        """Add a box between the voxels of two indices."""
+        self.boxes.append((op, pen, begin, end))
+
+    def add_dots(self, op: int, pen: int, index: Ints) -> None:
+        """Add voxels by their indices, (n,)."""
+        self.dots.append((op, pen, index))
+
+    def expand(self, grid: Grid) -> Written:
+        """Return the voxels of all shapes."""
+        parts = [np.empty((3, 0), dtype=np.int64)]
+        if self.dots:
+            counts = [len(index) for _, _, index in self.dots]
+            names = np.repeat([(op, pen) for op, pen, _ in self.dots], counts, axis=0).T
+            index = np.concatenate([index for _, _, index in self.dots])
+            parts.append(np.stack((names[0], index, names[1])))
+        if self.lines:
+            parts.append(self._expand_lines(grid))
+        for op, pen, begin, end in self.boxes:
+            a, b = grid.voxels_at(np.array([begin, end]))
+            ranges = (np.arange(low, high + 1) for low, high in zip(*np.sort((a, b), 0), strict=True))
+            x, y, z = ranges
+            index = (x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])).reshape(-1)
+            parts.append(np.stack((np.full_like(index, op), index, np.full_like(index, pen))))
+        op_, index_, pen_ = np.concatenate(parts, axis=1)
+        return op_, index_, pen_
+
+    def _expand_lines(self, grid: Grid) -> Ints:
+        op, pen, begin, end = np.array(self.lines, dtype=np.int64).T
+        a = grid.voxels_at(begin).astype(np.int64)
+        d = grid.voxels_at(end).astype(np.int64) - a
+        length = np.abs(d).max(axis=1)
+        line = np.repeat(np.arange(len(op)), length + 1)
+        k = concat_ranges(np.zeros_like(length), length + 1)[:, None]
+        whole = np.maximum(length, 1)[line][:, None]
+        place = a[line] + (2 * k * d[line] + whole) // (2 * whole)
+        return np.stack((op[line], grid.index_of(place), pen[line]))
