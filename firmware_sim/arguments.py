@@ -36,6 +36,8 @@ examples:
       usbip attach -r 127.0.0.1 -b 1-1 and push to usb:
   voxdisplay-sim --fault flip=1e-5,drop=1e-6 --seed 7
       on a bad line: bits inverted and bytes lost, at the same places each time
+  voxdisplay-sim --show day.vxs --view
+      a display that plays a recording by itself, with a live view
   voxdisplay-sim --view
       with a live view in the browser; its address is in the first line of output
 """
@@ -97,6 +99,8 @@ def parse_arguments(argv: list[str] | None) -> tuple[argparse.ArgumentParser, ar
         parser.error("--link is a name for a pseudo-terminal: leave out --tcp and --usbip")
     if options.usb_class and not options.usbip:
         parser.error("--usb-class is for --usbip")
+    if options.show and options.usbip:
+        parser.error("--show plays on --pty and --tcp: leave out --usbip")
     if options.allow_origin and not options.view:
         parser.error("--allow-origin is for --view")
     return parser, options
@@ -155,15 +159,13 @@ def _parser() -> argparse.ArgumentParser:
         "--size",
         metavar="X,Y,Z",
         type=_argument(parse_size),
-        default=default.grid,
-        help="voxels along each axis: 64x64x64 or 64,64,64 (default: 128x128x128)",
+        help="voxels along each axis: 64x64x64 or 64,64,64 (default: 128x128x128, or as --show)",
     )
     display.add_argument(
         "--format",
         choices=tuple(FORMATS),
         type=str.lower,
-        default=default.pixel_format,
-        help="pixel format (default: %(default)s)",
+        help=f"pixel format (default: {default.pixel_format}, or as --show)",
     )
     display.add_argument(
         "--refresh",
@@ -215,6 +217,12 @@ def _parser() -> argparse.ArgumentParser:
         help="seed of the random numbers of --fault (default: %(default)s)",
     )
     picture = parser.add_argument_group("picture")
+    picture.add_argument(
+        "--show",
+        metavar="FILE.vxs",
+        type=_argument(_parse_path),
+        help="play a recording, as from a card, until a host opens a session",
+    )
     picture.add_argument(
         "--dump",
         metavar="FILE.npy",

@@ -9,10 +9,12 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from firmware_sim.arguments import format_address, parse_arguments
 from firmware_sim.baud_pacing import PacedDevice, with_baud
 from firmware_sim.bench import Bench
+from firmware_sim.card_player import CardPlayer, Packets, read_head
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
@@ -53,35 +55,69 @@ def run(argv: list[str] | None, stop: int) -> int:
     """
     parser, options = parse_arguments(argv)
     try:
-        device = _device(options)
-        if options.dump:
-            _dump_swaps(device, options.dump)
-        wire = DeviceOnLine(device, options.fault, options.seed)
-        _serve(with_baud(wire, options.baud), options, stop)
+        with contextlib.ExitStack() as stack:
+            show = stack.enter_context(_open_show(options.show)) if options.show else None
+            device = _device(options, show)
+            if options.dump:
+                _dump_swaps(device, options.dump)
+            player = _player(device, show, options.show)
+            wire = DeviceOnLine(device, options.fault, options.seed, player=player)
+            _serve(with_baud(wire, options.baud), options, stop)
+            if player:
+                _note(
+                    f"{options.show}: {player.shown} frames shown, {player.wrong} of them with "
+                    f"another digest, {player.skipped} left out"
+                )
     except ValueError as error:
         parser.error(str(error))
     except OSError as error:
         _note(f"error: {error.strerror or error}")
         return 2
     except MemoryError:
-        _note(
-            "error: what is lit of {}x{}x{} {} needs more memory than there is: take a smaller "
-            "--size".format(*options.size, options.format)
-        )
+        _note("error: what is lit needs more memory than there is: take a smaller --size")
         return 2
     return 0
 
 
-def _device(options: Namespace) -> Device:
+def _open_show(path: Path) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise OSError(f"{path}: {error.strerror}") from error
+
+
+def _device(options: Namespace, show: BinaryIO | None) -> Device:
+    default = Config()
+    grid, pixel_format, max_payload = default.grid, default.pixel_format, default.max_payload
+    if show:
+        try:
+            head = read_head(Packets(show))
+        except ValueError as error:
+            raise ValueError(f"{options.show}: {error}") from error
+        grid, pixel_format = head.grid, head.pixel_format
+        max_payload = max(max_payload, head.max_payload)
     config = Config(
-        options.size,
-        options.format,
+        options.size or grid,
+        options.format or pixel_format,
         options.refresh,
         options.rx_buffer,
+        max_payload,
         features=options.features,
         lies=options.lie,
     )
     return Device(config)
+
+
+def _player(device: Device, show: BinaryIO | None, path: Path) -> CardPlayer | None:
+    """Return the player of a recording that is open, if any."""
+    if show is None:
+        return None
+    try:
+        player = CardPlayer(device, show)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    _on_swap_also(device, player.exchanged)
+    return player
 
 
 def _dump_swaps(device: Device, path: Path) -> None:

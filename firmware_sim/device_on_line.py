@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+from firmware_sim.card_player import CardPlayer
 from firmware_sim.device import Device
 from firmware_sim.fault_types import Event
 from firmware_sim.faults import FaultSpec, FaultyLine
@@ -30,6 +31,8 @@ class DeviceOnLine:
         Seed of their random numbers.
     clock
         Monotonic seconds.
+    player
+        Plays a recording on the device until a host opens a session.
 
     Attributes
     ----------
@@ -48,8 +51,10 @@ class DeviceOnLine:
         faults: tuple[FaultSpec, ...] = (),
         seed: int = 0,
         clock: Callable[[], float] = time.monotonic,
+        player: CardPlayer | None = None,
     ) -> None:
         self.device = device
+        self._player = player
         self._unplugged = False
         self._down = FaultyLine(faults, seed, "down")
         self._up = FaultyLine(faults, seed, "up")
@@ -88,8 +93,8 @@ class DeviceOnLine:
     def next_event_s(self) -> float | None:
         """Return the seconds until the next event; None if none is scheduled.
 
-        An event is a tick that swaps, or the arrival of bytes that the line has delayed. It is 0 if
-        the device has sent something during this call, by a tick that has just come.
+        An event is a tick that swaps, the arrival of bytes that the line has delayed, or a frame of
+        the player. It is 0 if the device has sent something during this call, by a tick just come.
         """
         now = self._clock()
         left = self._up.due <= now  # output that was there before this call
@@ -97,7 +102,7 @@ class DeviceOnLine:
         if self._up.due <= now and not left:
             return 0.0
         up = self._up.due if self._up.due > now else math.inf
-        at = min(self._swap_time(), self._down.due, up)
+        at = min(self._swap_time(), self._feed_time(), self._down.due, up)
         return min(at - now, _MAX_WAIT_S) if at < math.inf else None
 
     def disconnect(self) -> None:
@@ -117,12 +122,24 @@ class DeviceOnLine:
             return math.inf
         return self._epoch + self._swap_tick * 1000 / self.device.config.refresh
 
+    def _feed_time(self) -> float:
+        """Return the time of the tick after which the player feeds the device; else infinity."""
+        player = self._player
+        if player is None or player.due is None:
+            return math.inf
+        return self._epoch + player.due * 1000 / player.rate
+
     def _run_until(self, now: float) -> None:
         while True:
             self._check_plugged()
-            tick, comes = self._swap_time(), self._down.due
-            if min(tick, comes) > now:
+            tick, comes, feeds = self._swap_time(), self._down.due, self._feed_time()
+            if min(tick, comes, feeds) > now:
                 return
+            if self._player and self._player.due is not None and feeds < min(tick, comes):
+                passed = self._player.due
+                self._player.feed(passed)
+                self._collect_output(feeds, passed + 1)
+                continue
             if self._swap_tick is not None and tick <= comes:
                 self._swap_tick += 1
                 self.device.tick()
@@ -147,11 +164,22 @@ class DeviceOnLine:
         if self._unplugged:
             raise ConnectionError("the device is unplugged")
 
-    def _collect_output(self, at: float) -> None:
-        """Put the device's output on the line, and schedule the tick of a pending swap."""
+    def _collect_output(self, at: float, next_tick: int | None = None) -> None:
+        """Put the device's output on the line, and schedule the tick of a pending swap.
+
+        Parameters
+        ----------
+        at
+            The time.
+        next_tick
+            Number of the tick that is next, if it is known better than by the time.
+        """
+        if self._player and self._player.active:
+            self.device.transmit()  # no host has asked
         while self._up.backlog < _MAX_BACKLOG_BYTES and (data := self.device.transmit()):
             self._up.send(at, data)
         if not self.device.pending:
             self._swap_tick = None
         elif self._swap_tick is None:  # the frame has just become whole
-            self._swap_tick = int((at - self._epoch) * self.device.config.refresh / 1000) + 1
+            passed = int((at - self._epoch) * self.device.config.refresh / 1000)
+            self._swap_tick = passed + 1 if next_tick is None else next_tick

@@ -265,9 +265,12 @@ def serve_tcp(wire: DeviceOnLine | PacedDevice, listener: socket.socket, stop: i
     """
     stopped = False
     while not stopped:
-        readable, _ = wait_ready([listener.fileno(), stop])
+        wire.advance()  # a recording is played without a host, too
+        readable, _ = wait_ready([listener.fileno(), stop], timeout_s=wire.next_event_s())
         if stop in readable:
             return
+        if not readable:
+            continue
         connection = accept(listener, stop)
         if connection is None:
             continue

@@ -272,6 +272,39 @@ class Frame:
         if self._palette:
             self._palette.mark_used(np.flatnonzero(np.bincount(pixels, minlength=256)))
 
+    def set_voxels(self, index: NDArray[np.integer], values: NDArray[np.integer]) -> None:
+        """Replace the picture by pixels of single voxels. The palette stays as it is.
+
+        Parameters
+        ----------
+        index : (n,) integer array
+            Scan-order indices, as of `lit`: x + nx * (y + ny * z). Of equal ones the last counts.
+        values : (n,) integer array
+            Their pixel values, as of `lit`.
+
+        Raises
+        ------
+        ValueError
+            If an index is outside the grid, or there are not as many values.
+
+        """
+        places = as_array("index", index).astype(np.int64)
+        if places.ndim != 1 or np.shape(values) != places.shape:
+            raise ValueError(
+                f"index, values: expected two arrays (n,), found {places.shape} "
+                f"and {np.shape(values)}"
+            )
+        if len(places) and not 0 <= places.min() <= places.max() < self.grid.voxels:
+            raise ValueError(
+                f"index: expected 0 to {self.grid.voxels - 1}, "
+                f"found {places.min()} to {places.max()}"
+            )
+        self._raster.clear()
+        none = np.zeros(len(places), dtype=np.bool_)
+        self._raster.draw(DrawnVoxels.of_item(places, np.asarray(values), none, Kind.SET))
+        if self._palette:
+            self._palette.mark_used(np.unique(values))
+
     def clear(self) -> None:
         """Make all voxels dark."""
         self._raster.clear()

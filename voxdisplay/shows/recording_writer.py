@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from voxdisplay.errors import VoxDisplayError
 from voxdisplay.raster.grid import Grid
@@ -72,6 +72,11 @@ class RecordingFormat:
     def time_of(self, number: int) -> int:
         """Return when a frame is due, in units of 0.1 ms: n / fps, from its number alone."""
         return (2 * number * TIME_UNITS * 1000 + self.millihertz) // (2 * self.millihertz)
+
+    def number_at(self, time: int) -> int:
+        """Return the number of the frame that is due nearest to a time in units of 0.1 ms."""
+        unit = 1000 * TIME_UNITS
+        return (2 * time * self.millihertz + unit) // (2 * unit)
 
     def encode(self) -> bytes:
         """Return the bytes at the beginning of a file: 00, HELLO, INFO and META.
@@ -181,10 +186,10 @@ class RecordingWriter:
                 flags |= spec.DATA_FLAG_COMMIT
             data.append(encode_segment(spec.TYPE_DATA, flags, self._seq, number % 256, payload))
             self._seq = (self._seq + 1) % 256
-        for other in others:
-            data.append(
-                encode_segment(other.kind, other.flags, other.seq, other.frame, other.payload)
-            )
+        data += [
+            encode_segment(other.kind, other.flags, other.seq, other.frame, other.payload)
+            for other in others
+        ]
         self._write(data)
         self._sizes.append(sum(map(len, data)))
 
@@ -210,7 +215,7 @@ class RecordingWriter:
         except OSError as error:
             raise _unwritable(self.path, error) from error
 
-    def __enter__(self) -> RecordingWriter:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

@@ -21,9 +21,9 @@ from voxdisplay.wire.op_encoding import Ints
 from voxdisplay.wire.range_coded_chain_decoder import decode_range_coded
 
 # Bits of a mask or of crumbs, by byte: all, and those for the first and for the second other axis.
-_ONES: Final = bytes(bin(byte).count("1") for byte in range(256))
-_EVEN: Final = bytes(bin(byte & 0x55).count("1") for byte in range(256))
-_ODD: Final = bytes(bin(byte & 0xAA).count("1") for byte in range(256))
+_ONES: Final = bytes(byte.bit_count() for byte in range(256))
+_EVEN: Final = bytes((byte & 0x55).bit_count() for byte in range(256))
+_ODD: Final = bytes((byte & 0xAA).bit_count() for byte in range(256))
 _OPERAND: Final = 0x1F
 _LAST_BRICK: Final = spec.OP_OCT + spec.LIMIT_MAX_LEVEL
 # A host should write a voxel once (section 6): ops that write many more are hostile, and would fill
@@ -215,30 +215,36 @@ class _Parser:
 
     # Ops
 
-    def _op_end(self) -> None:
+    def read_end(self) -> None:
+        """Read END: all bytes behind it are 00."""
         if any(self._take(len(self._data) - self._at)):
             raise self._error("bytes behind END that are not 00")
 
-    def _op_pen(self) -> None:
+    def read_pen(self) -> None:
+        """Read PEN."""
         self._pen = int.from_bytes(self._take(self._format.bytes), "little")
         if self._format is PixelFormat.MONO1 and self._pen > 1:
             raise self._error("a mono1 pixel is 0 or 1")
 
-    def _op_move(self) -> None:
+    def read_move(self) -> None:
+        """Read MOVE."""
         self._cursor = self._voxel()
 
-    def _op_line(self) -> None:
+    def read_line(self) -> None:
+        """Read LINE."""
         begin, self._cursor = self._cursor_voxel(), self._voxel()
         self._reserve(max(self._grid))
         self._shapes.add_line(self._ops, self._pen, begin, self._cursor)
 
-    def _op_box(self) -> None:
+    def read_box(self) -> None:
+        """Read BOX."""
         begin, self._cursor = self._cursor_voxel(), self._voxel()
         corners = self._grid.voxels_at(np.array([begin, self._cursor])).astype(np.int64)
         self._reserve(int((np.abs(corners[1] - corners[0]) + 1).prod()))
         self._shapes.add_box(self._ops, self._pen, begin, self._cursor)
 
-    def _op_dots(self) -> None:
+    def read_dots(self) -> None:
+        """Read DOTS."""
         count = self._take(1)[0] + 1
         raw = self._take(3 * self._wide * count)
         voxels = np.frombuffer(raw, dtype="<u2" if self._wide == 2 else np.uint8).reshape(-1, 3)
@@ -249,7 +255,8 @@ class _Parser:
         self._shapes.add_dots(self._ops, self._pen, index)
         self._cursor = int(index[-1])
 
-    def _op_colors(self) -> None:
+    def read_colors(self) -> None:
+        """Read COLORS."""
         first, more = self._take(2)
         if first + more >= spec.LIMIT_MAX_COLORS:
             raise self._error("entries behind the end of the palette")
@@ -258,7 +265,8 @@ class _Parser:
             red, green, blue = raw[3 * at : 3 * at + 3]
             self._colors[first + at] = (red, green, blue)
 
-    def _op_arc(self) -> None:
+    def read_arc(self) -> None:
+        """Read ARC, which takes the rest."""
         raw = self._take(len(self._data) - self._at)
         try:
             pieces = list(decode_range_coded(raw, self._grid, self._format, self._pen))
@@ -306,14 +314,17 @@ class _Parser:
         self._reserve(voxels + nodes)
         self._bricks.add(self._ops, self._pen, (x, y, z), level, masks)
 
-    def _op_skip(self, count: int) -> None:
+    def read_skip(self, count: int) -> None:
+        """Read SKIP."""
         self._cursor = self._span_end(count)
 
-    def _op_run(self, count: int) -> None:
+    def read_run(self, count: int) -> None:
+        """Read RUN."""
         self._begin_span(count)
         self._add_span(np.full(count, self._pen, dtype=np.uint32))
 
-    def _op_literal(self, count: int) -> None:
+    def read_literal(self, count: int) -> None:
+        """Read LIT."""
         self._begin_span(count)
         if self._format is PixelFormat.MONO1:
             raw = self._take(-(-count // 8))
@@ -330,7 +341,8 @@ class _Parser:
         self._pen = int(values[-1])
         self._add_span(values)
 
-    def _op_differences(self, count: int) -> None:
+    def read_differences(self, count: int) -> None:
+        """Read DIFF."""
         if self._format is not PixelFormat.INDEX8:
             raise self._error("DIFF is an op of index8")
         self._begin_span(count)
@@ -346,18 +358,18 @@ class _Parser:
 
 
 _SIMPLE: Final = {
-    spec.OP_END: _Parser._op_end,
-    spec.OP_PEN: _Parser._op_pen,
-    spec.OP_MOVE: _Parser._op_move,
-    spec.OP_LINE: _Parser._op_line,
-    spec.OP_BOX: _Parser._op_box,
-    spec.OP_DOTS: _Parser._op_dots,
-    spec.OP_COLORS: _Parser._op_colors,
-    spec.OP_ARC: _Parser._op_arc,
+    spec.OP_END: _Parser.read_end,
+    spec.OP_PEN: _Parser.read_pen,
+    spec.OP_MOVE: _Parser.read_move,
+    spec.OP_LINE: _Parser.read_line,
+    spec.OP_BOX: _Parser.read_box,
+    spec.OP_DOTS: _Parser.read_dots,
+    spec.OP_COLORS: _Parser.read_colors,
+    spec.OP_ARC: _Parser.read_arc,
 }
 _COUNTED: Final = {
-    spec.OP_SKIP: _Parser._op_skip,
-    spec.OP_RUN: _Parser._op_run,
-    spec.OP_LIT: _Parser._op_literal,
-    spec.OP_DIFF: _Parser._op_differences,
+    spec.OP_SKIP: _Parser.read_skip,
+    spec.OP_RUN: _Parser.read_run,
+    spec.OP_LIT: _Parser.read_literal,
+    spec.OP_DIFF: _Parser.read_differences,
 }

@@ -1,4 +1,4 @@
-"""Expansion of chains, bricks and shapes into voxels, for many ops at once (protocol.md, 7.1 to 7.4).
+"""Expansion of chains, bricks and shapes into voxels, many ops at once (protocol.md, 7.1 to 7.4).
 
 Each class collects ops while they are parsed. Must not know how they are written.
 """
@@ -185,7 +185,9 @@ class Shapes:
             parts.append(self._expand_lines(grid))
         for op, pen, begin, end in self.boxes:
             a, b = grid.voxels_at(np.array([begin, end]))
-            ranges = (np.arange(low, high + 1) for low, high in zip(*np.sort((a, b), 0), strict=True))
+            ranges = (
+                np.arange(low, high + 1) for low, high in zip(*np.sort((a, b), 0), strict=True)
+            )
             x, y, z = ranges
             index = (x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])).reshape(-1)
             parts.append(np.stack((np.full_like(index, op), index, np.full_like(index, pen))))

@@ -531,7 +531,7 @@ def test_what_is_lit_exceeds_the_memory(
 
     monkeypatch.setattr(command_line, "_serve", fail)
     assert command_line.run(["--size", "3x5x7"], 0) == 2
-    text = "what is lit of 3x5x7 rgb888 needs more memory than there is: take a smaller --size"
+    text = "what is lit needs more memory than there is: take a smaller --size"
     assert text in capsys.readouterr().err
 
 
