@@ -138,6 +138,13 @@ class Recording:
     def _file(self) -> BinaryIO:
         return self.path.open("rb")
 
+    def close(self) -> None:
+        """Close the file; it is opened again when a frame is asked for."""
+        with self._lock:
+            opened = self.__dict__.pop("_file", None)
+            if opened:
+                opened.close()
+
     def recorded_frame(self, number: int) -> RecordedFrame:
         """Return a frame as it is in the file.
 
