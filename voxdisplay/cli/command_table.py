@@ -52,6 +52,8 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
             "convert", "convert", "Write the voxels of a scene or model for other programs."
         ),
         "plan": TableEntry("plan", "plan_command", "Print bytes and frames per second of a scene."),
+        "record": TableEntry("record", "record", "Record a moving scene as ready packets."),
+        "show": TableEntry("show", "show", "Examine, repair or convert recordings."),
         "schema": TableEntry(
             "document_paths", "schema", "Print the path of the JSON Schema of scenes."
         ),

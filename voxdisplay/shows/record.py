@@ -159,7 +159,6 @@ class _KeptChunks:
         for number in range(chunk[1]):
             found = kept.recorded_frame(number)
             yield EncodedFrame(found.payloads, found.header.digest)
-        kept.close()
 
     def remove(self) -> None:
         """Remove the folder."""

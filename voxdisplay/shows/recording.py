@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import json
 import os
-import threading
 from bisect import bisect
 from collections.abc import Collection, Mapping
-from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -39,6 +37,7 @@ from voxdisplay.wire.op_decoder import decode_ops
 # HELLO, INFO and META are within so many bytes of the beginning, END and the last INDEX of the end.
 _HEAD_BYTES = 1 << 18
 _END_BYTES = 64
+_MAX_GAP = 100_000  # missing frames between two that are whole
 
 
 class Recording:
@@ -68,7 +67,6 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        self._lock = threading.Lock()
         with self.path.open("rb") as file:
             self._bytes = os.fstat(file.fileno()).st_size
             self.format, self._first = _read_head(file, self.path)
@@ -97,7 +95,9 @@ class Recording:
         numbers: list[int] = []
         for frame in scan_file(file, self._first):
             number = self.format.number_at(frame.header.time)
-            if not numbers or number > numbers[-1]:  # else time goes back: it is left out
+            before = numbers[-1] if numbers else -1
+            # Frames that go back in time, or far ahead of the one before, are no part of the show.
+            if before < number <= before + _MAX_GAP:
                 places.append((frame.offset, frame.size))
                 numbers.append(number)
         return places, numbers
@@ -134,17 +134,6 @@ class Recording:
         """Size of the file."""
         return self._bytes
 
-    @cached_property
-    def _file(self) -> BinaryIO:
-        return self.path.open("rb")
-
-    def close(self) -> None:
-        """Close the file; it is opened again when a frame is asked for."""
-        with self._lock:
-            opened = self.__dict__.pop("_file", None)
-            if opened:
-                opened.close()
-
     def recorded_frame(self, number: int) -> RecordedFrame:
         """Return a frame as it is in the file.
 
@@ -160,9 +149,9 @@ class Recording:
             raise IndexError(f"number is {number}: there are frames 0 to {self.frame_count - 1}")
         at = number if self._numbers is None else bisect(self._numbers, number) - 1
         offset, size = self._places[max(at, 0)]
-        with self._lock:
-            self._file.seek(offset)
-            data = self._file.read(size)
+        with self.path.open("rb") as file:  # each time: nothing is left open, nor shared
+            file.seek(offset)
+            data = file.read(size)
         found = next(scan_frames(segments(data, offset)), None)
         if found is None or (self.whole and found.header.number_mod_256 != number % 256):
             raise RecordingError(
@@ -292,6 +281,8 @@ def _read_index(file: BinaryIO, first: int, end: End, size: int) -> list[tuple[i
     begin = first
     for segment in segments(file.read(size - end.index), end.index):
         part = segment.index()
+        if not sizes and segment.offset != end.index:
+            return None  # bytes were inserted or lost
         if part is None:
             continue
         number, start, counts = part
@@ -301,6 +292,6 @@ def _read_index(file: BinaryIO, first: int, end: End, size: int) -> list[tuple[i
             begin = start
         sizes += counts
     edges = list(accumulate(sizes, initial=begin))
-    if len(sizes) != end.frames or begin < first or edges[-1] > end.index or 0 in sizes:
+    if len(sizes) != end.frames or begin < first or edges[-1] != end.index or 0 in sizes:
         return None
     return list(zip(edges, sizes, strict=False))  # the last edge is the end of the last frame

@@ -29,6 +29,7 @@ _LAST_BRICK: Final = spec.OP_OCT + spec.LIMIT_MAX_LEVEL
 # A host should write a voxel once (section 6): ops that write many more are hostile, and would fill
 # the memory.
 _MAX_WRITES: Final = 4  # for each voxel of the grid
+_FEW_WRITES: Final = 1 << 20  # on a small grid these are no matter
 _MAX_WRITTEN: Final = 1 << 26
 
 
@@ -98,7 +99,7 @@ class _Parser:
         self._shapes = op_expansion.Shapes()
         self._colors: dict[int, tuple[int, int, int]] = {}
         self._ops = 0
-        self._left = min(_MAX_WRITES * self._voxels, _MAX_WRITTEN)
+        self._left = min(max(_MAX_WRITES * self._voxels, _FEW_WRITES), _MAX_WRITTEN)
         self._data = b""
         self._at = self._op_at = 0
         self._cursor = 0

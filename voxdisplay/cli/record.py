@@ -1,0 +1,171 @@
+"""``voxdisplay record``: moving scenes to recordings, on all processors or many machines."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+import voxdisplay as vd
+from voxdisplay.cli.options import (
+    DEFAULT_SIZE_TEXT,
+    display_size_option,
+    fit_option,
+    json_option,
+    quiet_option,
+    scene_argument,
+)
+from voxdisplay.cli.output import note, plural, print_json, progress_bar
+from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
+
+if TYPE_CHECKING:
+    from voxdisplay.frame import Fit
+    from voxdisplay.shows.render_engines import Engine
+
+_SUFFIX: Final = ".vxs"
+_DRAWING: Final = ("line", "box", "dots", "oct", "diff", "arc", "palette")
+# ARC saves bytes on slow lines, but small boards lack it and it takes long.
+_DEFAULT: Final = ("line", "box", "dots", "oct", "diff", "palette")
+_INDEXED: Final = {"diff", "palette"}
+
+
+@click.command(
+    epilog="""\b
+    Examples:
+      voxdisplay record spin.json -o spin.vxs
+      voxdisplay record spin.json -o spin.vxs --size 64x64x64 --format mono1 --jobs 4
+      voxdisplay record spin.json -o spin.vxs --dask tcp://render:8786 --check 5
+      voxdisplay play spin.vxs --port /dev/ttyUSB0
+
+    A run that is interrupted goes on where it ended when it is started again.
+    """
+)
+@scene_argument()
+@click.option(
+    "--output",
+    "-o",
+    "output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    metavar="FILE.vxs",
+    help="The recording; it appears when it is complete.",
+)
+@display_size_option(
+    f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]"
+)
+@click.option(
+    "--format",
+    "format_",
+    type=click.Choice(PIXEL_FORMATS),
+    default="rgb888",
+    help="Pixel format of the display.  [default: rgb888]",
+)
+@click.option(
+    "--features",
+    type=FeaturesType(),
+    metavar="NAMES",
+    help="Features of the display that may be used, such as line,box; all; none.  "
+    "[default: all that small boards have: all but arc]",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    default=1,
+    metavar="N",
+    help="Render in N processes.  [default: 1, in this process]",
+)
+@click.option(
+    "--dask", metavar="ADDRESS", help="Render on a Dask scheduler, such as tcp://127.0.0.1:8786."
+)
+@click.option(
+    "--check",
+    "checked",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Afterwards render N frames again in this process, and compare them.",
+)
+@fit_option
+@quiet_option
+@json_option
+def record(
+    *,
+    scene: str,
+    output: Path,
+    size: vd.Grid | None,
+    format_: str,
+    features: tuple[str, ...] | None,
+    jobs: int,
+    dask: str | None,
+    checked: int | None,
+    fit: Fit,
+    as_json: bool,
+) -> None:
+    """Record SCENE, which has a duration, as packets that a display of its size plays as they are.
+
+    SCENE is a JSON file, or - for stdin. All ways to render give the same bytes.
+    """
+    from voxdisplay.cli.scene_drawing import fit_scene  # noqa: PLC0415 - as in push
+    from voxdisplay.shows import record as recording  # noqa: PLC0415
+    from voxdisplay.shows.recording_writer import RecordingFormat  # noqa: PLC0415
+    from voxdisplay.shows.rendering import Rendering  # noqa: PLC0415
+
+    if output.suffix.lower() != _SUFFIX:
+        raise click.UsageError(f"{output.name}: a recording is a file {_SUFFIX}")
+    if dask and jobs > 1:
+        raise click.UsageError("--jobs are processes of this machine: leave it out with --dask")
+    began_s = time.monotonic()
+    loaded = vd.load_scene(scene)
+    grid = size or loaded.size or vd.Grid(128, 128, 128)
+    pixel_format = vd.PixelFormat(format_)
+    fitted = fit_scene(loaded, grid, fit)
+    name = "stdin" if scene == "-" else Path(scene).name
+    wanted = RecordingFormat(
+        grid,
+        pixel_format,
+        round(loaded.fps * 1000),
+        _usable(features, pixel_format),
+        loop=loaded.loop,
+        meta={"name": name, "software": f"voxdisplay {vd.__version__}"},
+    )
+    rendering = Rendering(fitted, wanted, own_palette="palette" in wanted.features)
+    with progress_bar("record") as progress:
+        frames = recording.record(rendering, output, engine=_engine(jobs, dask), progress=progress)
+    compared = recording.check(rendering, output, checked) if checked else 0
+    seconds = time.monotonic() - began_s
+    if as_json:
+        print_json(
+            {
+                "file": str(output),
+                "frames": frames,
+                "duration_s": frames / loaded.fps,
+                "fps": loaded.fps,
+                "bytes": output.stat().st_size,
+                "checked": compared,
+                "seconds": seconds,
+            }
+        )
+        return
+    also = f", {plural(compared, 'frame')} rendered again alike" if compared else ""
+    size_text = f"{output.stat().st_size / max(frames, 1):.0f} bytes a frame"
+    note(f"{output}: {plural(frames, 'frame')}, {size_text}{also}")
+
+
+def _usable(features: tuple[str, ...] | None, format_: vd.PixelFormat) -> tuple[str, ...]:
+    """Return the drawing features that a format allows."""
+    wanted = _DEFAULT if features is None else features
+    indexed = format_ is vd.PixelFormat.INDEX8
+    return tuple(name for name in _DRAWING if name in wanted and (indexed or name not in _INDEXED))
+
+
+def _engine(jobs: int, dask: str | None) -> Engine:
+    from voxdisplay.shows.render_engines import (  # noqa: PLC0415
+        dask_scheduler,
+        process_pool,
+        serial,
+    )
+
+    if dask:
+        return dask_scheduler(dask)
+    return process_pool(jobs) if jobs > 1 else serial
