@@ -258,7 +258,10 @@ class CardPlayer:
         time = self._past + (self._next.time if self._next else self._end_time)
         # Times are rounded: half a unit before them a tick is right, too.
         ticks = -((1 - 2 * time) * self.rate // (2 * _UNITS_MILLI))
-        self.due = (self._base or 0) - 1 + ticks
+        due = (self._base or 0) - 1 + ticks
+        if self._next is None and self.due is not None:
+            due = max(due, self.due + 1)  # the last frame is exchanged before
+        self.due = due
 
     def _open_session(self) -> None:
         self._seq = self._id = 0

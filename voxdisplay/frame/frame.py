@@ -24,7 +24,7 @@ from voxdisplay.frame.drawing import Drawing
 from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
 from voxdisplay.raster.color import Color, as_colors, colors_at
 from voxdisplay.raster.coloring import Coloring
-from voxdisplay.raster.display_list import Kind
+from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Palette
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values

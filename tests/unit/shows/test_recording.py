@@ -148,7 +148,8 @@ class TestWhole:
                 writer.append(frame)
                 raise ZeroDivisionError
 
-        pytest.raises(ZeroDivisionError, interrupted)
+        with pytest.raises(ZeroDivisionError):
+            interrupted()
         assert not path.exists()
         part = Recording(tmp_path / "a.vxs.part")
         assert (part.whole, part.frame_count) == (False, 2)
