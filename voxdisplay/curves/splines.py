@@ -378,4 +378,5 @@ class CatmullRom(Curve):
 
 def _check_degree(name: str, degree: int) -> None:
     if degree > MAX_DEGREE:
-        raise arguments.ArgumentError(name, f"make degree {degree}: more than {MAX_DEGREE}")
+        what = "is" if name == "degree" else "make a curve of degree"
+        raise arguments.ArgumentError(name, f"{what} {degree}: more than {MAX_DEGREE}")

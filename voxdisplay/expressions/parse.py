@@ -40,7 +40,7 @@ from voxdisplay.expressions.operations import (
     Operation,
 )
 from voxdisplay.expressions.program import VARIABLE, Expression, Step
-from voxdisplay.expressions.suggestions import SYNONYMS, suggest
+from voxdisplay.expressions.suggestions import ARGUMENT_HINTS, SYNONYMS, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -177,6 +177,7 @@ _SIGN = 30
 _PRODUCT_HINT = "a product is written with *"
 _NUMBER_HINT = "a number is written like 1000 or 0.5, without gaps; a product with *"
 _NUMBER_BEFORE = re.compile(r"(?:^|[^\w.])[0-9.]+\s*$")
+_OTHER_BASE = re.compile(r"(?:^|[^\w.])0[xXoObB]\w*$")
 _INFIX_WORDS = {
     "and": SYNONYMS["and"],
     "or": SYNONYMS["or"],
@@ -186,15 +187,6 @@ _INFIX_WORDS = {
     "else": "write if(condition, a, b)",
 }
 """What words between two operands, as in other languages, are here."""
-
-_ARGUMENT_HINTS = {
-    ("log", 2): "write log(x) / log(base)",
-    ("ln", 2): "write log(x) / log(base)",
-    ("round", 2): "write round(x * 10**digits) / 10**digits",
-    ("atan", 2): "write atan2(y, x)",
-    ("mod", 1): "write mod(a, b)",
-    ("atan2", 1): "write atan(x), or atan2(y, x)",
-}
 
 
 class _Parser:
@@ -217,6 +209,10 @@ class _Parser:
         self.expression(0, 0)
         if self.token.kind != "end":
             hint = self.hint_for_operand()
+            if self.token.text == "," and _NUMBER_BEFORE.search(
+                self.source[: self.token.column - 1]
+            ):
+                hint = "decimals are written with a point: 0.5"
             if self.token.text in COMPARISONS:
                 hint = "a comparison belongs into the condition of if(condition, a, b)"
             self.unexpected("an operator or the end", hint=hint)
@@ -229,6 +225,8 @@ class _Parser:
         called = self.source.startswith("(", begin + len(word))
         if word in _INFIX_WORDS and word not in self.names and not called:
             return _INFIX_WORDS[word]
+        if _OTHER_BASE.search(self.source[:begin] + word):
+            return "whole numbers are written in decimal: 16, not 0x10"
         goes_on = kind == "number" or word.strip("0123456789") == "_"
         if goes_on and _NUMBER_BEFORE.search(self.source[:begin]):
             return _NUMBER_HINT
@@ -274,7 +272,11 @@ class _Parser:
         called = self.token.text == "("
         if name in FUNCTIONS and (called or name not in self.names):
             if not called:
-                self.fail(f"the function {name!r} {self.place(token)} needs an argument in ( )")
+                raised = self.token.text in {"^", "**"}
+                hint = f"write {name}(x)**n for its power" if raised else None
+                self.fail(
+                    f"the function {name!r} {self.place(token)} needs an argument in ( )", hint
+                )
             if FUNCTIONS[name] is IF:
                 self.choice(depth)
             else:
@@ -286,7 +288,9 @@ class _Parser:
         if meaning is None:
             self.unknown(token, called=called)
         if called:
-            self.fail(f"{name!r} {self.place(token)} is not a function", hint=_PRODUCT_HINT)
+            empty = next(self.tokens).text == ")"
+            hint = f"write {name} without ( )" if empty else _PRODUCT_HINT
+            self.fail(f"{name!r} {self.place(token)} is not a function", hint=hint)
         self.emit(meaning)
 
     def unknown(self, token: _Token, *, called: bool) -> NoReturn:
@@ -303,6 +307,11 @@ class _Parser:
             self.fail(problem, hint='it runs in scenes that have a "duration"')
         known = [*CONSTANTS, *self.names, *FUNCTIONS, *self.variables]
         what, like = ("function", list(FUNCTIONS)) if called else ("name", known)
+        if self.token.text.startswith("."):  # math.sin, np.pi
+            self.fail(
+                f"unknown name {excerpt(name)} {self.place(token)}",
+                hint="write the names of functions and constants alone: sin(t), pi",
+            )
         hint = suggest(name, like) or f"known: {shorten(', '.join(like), 300)}"
         self.fail(f"unknown {what} {excerpt(name)} {self.place(token)}", hint=hint)
 
@@ -347,7 +356,7 @@ class _Parser:
             plural = "" if wanted == "1" else "s"
             self.fail(
                 f"{token.text} takes {wanted} argument{plural}, not {count}, {self.place(token)}",
-                hint=_ARGUMENT_HINTS.get((token.text, count)),
+                hint=ARGUMENT_HINTS.get((token.text, count)),
             )
 
     def emit(self, step: Step) -> None:

@@ -88,6 +88,16 @@ SYNONYMS = {
 }
 """What the functions and constants of other languages are called or made of here."""
 
+ARGUMENT_HINTS = {
+    ("log", 2): "write log(x) / log(base)",
+    ("ln", 2): "write log(x) / log(base)",
+    ("round", 2): "write round(x * 10**digits) / 10**digits",
+    ("atan", 2): "write atan2(y, x)",
+    ("mod", 1): "write mod(a, b)",
+    ("atan2", 1): "write atan(x), or atan2(y, x)",
+}
+"""What is meant by a function with so many arguments, where it takes another number."""
+
 
 def suggest(word: str, known: Iterable[str]) -> str | None:
     """Return a hint for an unknown word, or None.

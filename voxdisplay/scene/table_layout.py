@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from voxdisplay.expressions.parse import excerpt
 from voxdisplay.scene.column_names import AXES, axis_columns
 from voxdisplay.scene.table_text import (
+    COMMENTS,
     MAX_LINE,
     ROWS_HINT,
     SEPARATORS,
@@ -187,13 +188,13 @@ def _column_names(
         line for line in above if table.is_comment(line) and len(table.lines[line]) <= MAX_LINE
     ]
     for line in comments:
-        text = table.lines[line].strip().lstrip("#%").strip()
+        text = table.lines[line].strip().lstrip("".join(COMMENTS)).strip()
         for names in _possible_names(table, first, separator, line, text):
             if all(axis_columns(names)):
                 return line, names
     # Without blanks between them, as many words as columns are names, whatever they mean.
     for line in comments if separator else ():
-        names = table.fields(line, separator, table.lines[line].strip().lstrip("#%"))
+        names = table.fields(line, separator, table.lines[line].strip().lstrip("".join(COMMENTS)))
         if len(names) == len(table.fields(first, separator)) and not any(map(number, names)):
             return line, names
     return -1, []

@@ -17,6 +17,8 @@ from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 MAX_LINE = 1 << 16
 """Longest line, in characters; bounds the number of columns."""
 
+COMMENTS = ("#", "%", "//", "!")
+"""What a line of words begins with that is no row; names of columns may stand behind it."""
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", None: "blanks"}
 ROWS_HINT = (
     "each line holds x, y and z, separated by commas, semicolons, tabs or blanks; "
@@ -30,6 +32,8 @@ _INFINITE = frozenset(
     ["inf", "+inf", "-inf", "infinity", "+infinity", "-infinity", "1.#inf", "-1.#inf"]
 )
 _COMMENT = re.compile(r"#(?!(?:IND|QNAN|INF)\b)", re.IGNORECASE)
+_CONTROL = re.compile("[\\0-\\x08\\x0e-\\x1f]")
+"""Characters that no text of points has; the others separate words and lines."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+(?:e[+-]?[0-9]+)?")
 _DIGITS = re.compile(r"[0-9.]+")
@@ -65,7 +69,8 @@ class TableText:
         self.name = excerpt(name)
         utf16 = unicode_encoding(data) == "UTF-16"
         text = _decoded(data) if utf16 else data.decode("utf-8-sig", "replace")
-        if "\0" in text or data.startswith(b"PK\x03\x04"):
+        text = text.removesuffix("\x1a")  # the end of a file, as of DOS
+        if _CONTROL.search(text) or data.startswith(b"PK\x03\x04"):
             found = recognise(data)
             kind = found.kind if found else "a binary file"
             problem = f"{self.name} is {kind}, not a text of points"
@@ -81,8 +86,8 @@ class TableText:
         return CurveError(f"{self.name}, line {line + 1}: {problem}", hint=hint)
 
     def is_comment(self, line: int) -> bool:
-        """Return whether a line begins with # or, as of MATLAB, with %."""
-        return self.lines[line].lstrip().startswith(("#", "%"))
+        """Return whether a line begins with # or, as in other languages, with %, // or !."""
+        return self.lines[line].lstrip().startswith(COMMENTS)
 
     def fields(self, line: int, separator: str | None, text: str | None = None) -> list[str]:
         """Return the fields of a line, or of another text in its place, without their quotes.

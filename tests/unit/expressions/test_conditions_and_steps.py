@@ -185,6 +185,18 @@ def test_nothing_is_known_where_a_divisor_may_be_0(text: str) -> None:
         ("1_000", "found '_000'", "without gaps"),
         ("1.2.3 + t", "found '.3'", "without gaps"),
         ("t 2", "found '2'", "a product is written"),
+        ("0,5", "found ','", "decimals are written with a point"),
+        ("t,5", "found ','", "None"),
+        ("0x10", "found 'x10'", "in decimal: 16, not 0x10"),
+        ("1 + 0b1", "found 'b1'", "in decimal"),
+        ("10x", "found 'x'", "a product is written"),
+        ("pi()", "'pi' at column 1 of .* is not a function", "write pi without"),
+        ("pi(2)", "'pi' at column 1 of .* is not a function", "a product is written"),
+        ("sin^2(t)", "needs an argument", r"write sin\(x\)\*\*n for its power"),
+        ("sin**2", "needs an argument", r"write sin\(x\)\*\*n for its power"),
+        ("sin t", "needs an argument", "None"),
+        ("np.sin(t)", "unknown name 'np'", "names of functions and constants alone"),
+        ("Math.PI", "unknown name 'Math'", "names of functions and constants alone"),
     ],
 )
 def test_hints_name_what_is_meant(text: str, message: str, hint: str) -> None:

@@ -56,6 +56,9 @@ def refused(folder: Path, text: str | bytes, name: str = "data.csv") -> SceneErr
         "x,y,z,\n1,2,3,\n4,5,6.5\n",
         "x,y,z\nmm,mm,mm\n1,2,3\n4,5,6.5\n",
         "% x,y,z\n1,2,3\n4,5,6.5\n",
+        "// x,y,z\n1,2,3\n// in between\n4,5,6.5\n",
+        "! made by hand\n1,2,3\n4,5,6.5\n",
+        "1,2,3\n4,5,6.5\n\x1a",
         "1e0,2.0D0,+3\n4,5,6.5\n",
         "1.0E+00,2,3\n4,5,6.5e0\n",
     ],
@@ -275,3 +278,10 @@ def test_gaps_belong_to_files(tmp_path: Path) -> None:
 )
 def test_names_of_axes(names: list[str], axes: list[list[int]]) -> None:
     assert axis_columns(names) == axes
+
+
+@pytest.mark.parametrize(
+    "data", [b"\x1f\x8b\x08 1,2,3\n", b"1,2,3\n\x1b[2J,5,6\n", b"\x89PNG\r\n\x1a\n"]
+)
+def test_bytes_that_no_text_has_are_told_from_rows(tmp_path: Path, data: bytes) -> None:
+    assert "not a text of points" in str(refused(tmp_path, data))
