@@ -331,6 +331,7 @@ _SUBMODULES = (
     "curves",
     "display",
     "errors",
+    "files",
     "frame",
     "raster",
     "scene",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import voxdisplay as vd
 from voxdisplay.files.loading import SUFFIXES
 from voxdisplay.files.writing import WRITERS
 from voxdisplay.raster.color_map import BUILT_IN
@@ -25,3 +26,8 @@ def test_it_names_every_format_and_map():
         assert f"`{suffix}`" in TEXT or suffix == ".tiff"
     for name in BUILT_IN:
         assert f"`{name}`" in TEXT
+
+
+def test_the_package_has_what_it_names():
+    for name in re.findall(r"`vd\.files\.(\w+)", TEXT):
+        assert callable(getattr(vd.files, name))
