@@ -54,6 +54,7 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     Volume              Samples of real numbers, shown by a colour map.
     VoxelModel          Voxels with colours of their own.
     Implicit            Surface or solid by f(x, y, z).
+    Surface             Surface by formulas of u and v.
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -106,6 +107,7 @@ if TYPE_CHECKING:
         Scatter,
         Sphere,
         SphericalTriangle,
+        Surface,
         Text,
         Triangle,
         Volume,
@@ -208,6 +210,7 @@ if TYPE_CHECKING:
         "Sequence",
         "Sphere",
         "SphericalTriangle",
+        "Surface",
         "Text",
         "TorusKnot",
         "TransportClosed",
@@ -244,6 +247,7 @@ _MODULES = {
         "Scatter",
         "Sphere",
         "SphericalTriangle",
+        "Surface",
         "Text",
         "Triangle",
         "Volume",

@@ -68,6 +68,8 @@ SCENE = """{"size": [9, 9, 9], "objects": [
  {"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}]}"""
 # Arguments of a call that succeeds, by the name of what is called.
 CALLS = {
+    "Surface": {"x": "u + k", "y": "v", "z": 3, "u": (1, 4), "v": (2, 5), "fill": "shell",
+                "params": {"k": 1}},
     "Implicit": {"f": "x - k", "box": [(1, 1, 1), (4, 5, 6)], "fill": "shell", "params": {"k": 6}},
     "HeightField": {"z": "k + x", "x": (1, 4), "y": (2, 5), "params": {"k": 1}},
     "Cone": {"start": (2, 2, 2), "end": (5, 6, 7), "radius": 2, "fill": "shell"},

@@ -14,6 +14,7 @@ from voxdisplay.bodies.primitives import (
     SphericalTriangle,
 )
 from voxdisplay.bodies.scatter import Scatter
+from voxdisplay.bodies.surface import Surface
 from voxdisplay.bodies.text import Text
 from voxdisplay.bodies.volume import Volume, VoxelModel
 
@@ -32,6 +33,7 @@ __all__ = [
     "Scatter",
     "Sphere",
     "SphericalTriangle",
+    "Surface",
     "Text",
     "TransformedBody",
     "Triangle",

@@ -50,6 +50,8 @@ class TriangleMesh(Geometry):
         Images, the top row first; repeated outside of 0 to 1.
     face_textures : (F,) int64 array, optional
         Index of each triangle's texture, -1 for none. Without it all take the first.
+    notes : tuple of str
+        What was wrong with the body or left out, for people.
 
     """
 
@@ -61,6 +63,7 @@ class TriangleMesh(Geometry):
     uv: Floats | None = None
     textures: tuple[NDArray[np.uint8], ...] = ()
     face_textures: Ints | None = None
+    notes: tuple[str, ...] = ()
 
     def transformed(self, matrix: Floats, offset: Floats) -> TriangleMesh:
         """Return the transformed mesh; a map that mirrors turns the triangles round."""

@@ -65,7 +65,8 @@ def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> Voxe
     package = __name__.rpartition(".")[0]
     voxelize: Voxeliser = getattr(import_module(f"{package}.surfaces.{module}"), name)
     voxels = voxelize(geometry, box, body, certified=certified)
-    return replace(voxels, body=body, seconds=time.perf_counter() - began_s)
+    notes = (*geometry.notes, *voxels.notes) if isinstance(geometry, TriangleMesh) else voxels.notes
+    return replace(voxels, body=body, notes=notes, seconds=time.perf_counter() - began_s)
 
 
 def box_of(body: Body) -> VoxelBox:
