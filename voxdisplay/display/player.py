@@ -29,7 +29,6 @@ Late: TypeAlias = Literal["drop", "delay"]
 _MIN_WAIT_S: Final = 1e-4  # below, sums of times may not grow
 _MAX_WAIT_S: Final = 0.02  # then the observer has its turn
 _WORKER_WAIT_S: Final = 0.003  # while another process prepares frames
-_MAX_AHEAD: Final = 3  # swaps that are started and not displayed, with one for each tick
 _FLUSH_S: Final = 30.0
 
 
@@ -127,7 +126,12 @@ class Player:
     def pause(self) -> None:
         """Pause, or go on."""
         now = self._clock()
-        (self._play.resume if self.paused else self._play.pause)(now)
+        if self.paused:
+            self._play.resume(now)
+        else:
+            self._play.pause(now)
+            if self._last and self._last.begins_s > self._play.position(now):
+                self._play.seek(self._last.begins_s, now)  # not back to what was shown before
         self._restart()
 
     def seek(self, seconds: float) -> None:
@@ -311,7 +315,7 @@ class Player:
         queue = operations.queue
         now = self._clock()
         step_s = self._play.speed / ticks.refresh_hz
-        if queue.backlog >= _MAX_AHEAD or not queue.line_is_free:
+        if queue.backlog >= ticks.ahead or not queue.line_is_free:
             self._request_next(operations, ticks.next, step_s)
             return now + _MAX_WAIT_S
         waiting = [swap.tick for swap in self._swaps.values() if swap.tick is not None]

@@ -11,8 +11,9 @@ import math
 from collections import deque
 from typing import Final
 
-_WINDOW: Final = 16  # swaps, of which one was reported in time
-_OVERDUE: Final = 3.0  # ticks after which a swap did not just have a late report
+_WINDOW: Final = 32  # swaps, of which one was reported in time
+_AHEAD_S: Final = 0.1  # host or device may be kept waiting for so long, and no tick is missed
+_OVERDUE: Final = 8.0  # ticks after which a swap did not just have a late report
 _FORGET: Final = 0.98
 _OVERLOADED: Final = 10.0  # a fifth of the swaps missed their ticks
 
@@ -25,10 +26,19 @@ class TickClock:
     refresh_hz : float
         As announced.
 
+    Attributes
+    ----------
+    refresh_hz : float
+    ahead : int
+        How many swaps should be started and not displayed.
+    next : int
+        The tick of the swap to be started next.
+
     """
 
     def __init__(self, refresh_hz: float) -> None:
         self.refresh_hz = refresh_hz
+        self.ahead = max(2, min(8, round(refresh_hz * _AHEAD_S)))
         self._missed = 0.0
         self.restart()
 
