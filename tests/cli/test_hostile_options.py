@@ -1,6 +1,7 @@
 """Hostile values for every option and argument of every command: errors or results, no fault."""
 
 import click
+import numpy as np
 import pytest
 
 from voxdisplay.cli import bench_measurements
@@ -21,6 +22,7 @@ WORKING = {
     "voxelize": ["scene.json"],
     "preview": ["scene.json", "-o", "x.png", "--pixels", "40x30"],
     "plan": ["scene.json"],
+    "convert": ["volume.npy", "-o", "out.npz", "--size", "3x5x7"],
     "conformance": [*PORT, "--only", "7.1/*", "--list"],
     "annotate": ["capture.jsonl"],
     "bench": PORT,
@@ -43,6 +45,7 @@ CODES = {0, 1, 2, 3, 4}
 def here(tmp_path, monkeypatch):
     """Work in a folder with a scene and a capture; measure and serve nothing."""
     (tmp_path / "scene.json").write_text(SCENE)
+    np.save(tmp_path / "volume.npy", np.arange(105.0).reshape(7, 5, 3))
     (tmp_path / "capture.jsonl").write_text('{"voxdisplay_capture": 1, "port": "x"}\n')
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("VOXDISPLAY_PORT", raising=False)
