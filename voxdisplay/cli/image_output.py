@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
     from voxdisplay.display.device_info import DeviceInfo
     from voxdisplay.raster.pixel_format import Pixels
+    from voxdisplay.view.film import FilmJob
     from voxdisplay.view.save import ExportJob
 
 
 def save_image(
-    path: Path, job: ExportJob, progress: Callable[[int, int], None] | None = None
+    path: Path, job: ExportJob | FilmJob, progress: Callable[[int, int], None] | None = None
 ) -> None:
     """Write an image file.
 

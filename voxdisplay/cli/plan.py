@@ -27,6 +27,7 @@ from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.display.plan import Plan
+    from voxdisplay.display.show_plan import ShowPlan
     from voxdisplay.frame import Fit
 
 _TIMEOUT_S: Final = 5.0
@@ -91,7 +92,11 @@ def plan_command(
     SCENE is a JSON file, or - for stdin. Nothing is shown. Counts what `push` sends to a display
     that shows something else, once the rate of the line is known.
     """
-    from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415 - as in push
+    from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415 - as in push
+        draw_scene,
+        fit_scene,
+        note_choices,
+    )
     from voxdisplay.display.plan import COMMON_LINES, Line, Receiver, plan  # noqa: PLC0415
 
     loaded = load_shown(scene, model)
@@ -105,8 +110,21 @@ def plan_command(
         receiver = replace(receiver, features=features)
     own = "palette" in receiver.features
     frame = vd.Frame(size or grid, format_ or kind, own_palette=own)
-    draw_scene(fit_scene(loaded, frame.grid, fit), frame)
+    fitted = fit_scene(loaded, frame.grid, fit)
     lines = (Line.of_baud(baud),) if baud else COMMON_LINES
+    if fitted.duration:
+        from voxdisplay.display.show_plan import plan_show  # noqa: PLC0415
+
+        note_choices(fitted)
+        show = plan_show(
+            fitted.show_on(frame, fit="none").frame, fitted.frame_count, lines, receiver
+        )
+        if as_json:
+            print_json(_facts(show.worst_frame, show.worst_plans) | _show_facts(fitted, show))
+        else:
+            print_stdout(_show_table(fitted, show))
+        return
+    draw_scene(fitted, frame)
     plans = [plan(frame, line, receiver) for line in lines]
     if as_json:
         print_json(_facts(frame, plans))
@@ -147,6 +165,68 @@ def _facts(frame: vd.Frame, plans: list[Plan]) -> dict[str, Any]:
             for cost in plans
         ],
     }
+
+
+def _show_facts(scene: vd.Scene, show: ShowPlan) -> dict[str, Any]:
+    """Return what there is to say of a moving scene, beside the facts of its worst frame."""
+    worst = show.worst_plans[0]
+    return {
+        "frames": scene.frame_count,
+        "fps": scene.fps,
+        "duration_s": scene.duration,
+        "frames_compared": show.looked_at,
+        "worst": {
+            "frame": show.worst,
+            "time_s": show.worst / scene.fps,
+            "voxels": worst.voxels,
+            "wire_bytes": worst.wire_bytes,
+        },
+        "mean": {"voxels": show.mean_voxels, "wire_bytes": show.mean_bytes[0]},
+        "lines": [
+            {
+                "line": cost.line.name,
+                "bytes_per_s": cost.line.bytes_per_s,
+                **_sizes(cost),
+                "frame_s": cost.seconds,
+                "frames_per_s": cost.frames_per_s,
+                "mean_wire_bytes": mean,
+                "mean_frames_per_s": _mean_rate(cost, mean),
+            }
+            for cost, mean in zip(show.worst_plans, show.mean_bytes, strict=True)
+        ],
+    }
+
+
+def _mean_rate(cost: Plan, mean_bytes: float) -> float:
+    """Return the frames per second of the mean frame, as far as the device refreshes."""
+    carried = cost.line.bytes_per_s / max(mean_bytes, cost.answer_bytes)
+    most = cost.receiver.refresh_hz
+    return min(carried, most) if most else carried
+
+
+def _show_table(scene: vd.Scene, show: ShowPlan) -> str:
+    frame, worst = show.worst_frame, show.worst_plans[0]
+    display = f"{frame.grid} {frame.format.value}, {_features(worst.receiver.features)}"
+    what = f"{plural(scene.frame_count, 'frame')} in {scene.duration:g} s at {scene.fps:g} fps"
+    compared = "" if show.looked_at == scene.frame_count else f" of {show.looked_at} compared"
+    most = f"{plural(worst.voxels, 'voxel')}, {plural(worst.wire_bytes, 'byte')}"
+    mean_frame = (
+        f"{plural(round(show.mean_voxels), 'voxel')}, {plural(round(show.mean_bytes[0]), 'byte')}"
+    )
+    rows = [
+        f"{what} on a display of {display}",
+        f"worst frame{compared}: {show.worst}, at {show.worst / scene.fps:.4g} s: {most}",
+        f"mean frame: {mean_frame}, over {worst.line.name}",
+        "",
+        f"{'line':<16}{'worst bytes':>13}{'frames/s':>10}{'mean bytes':>13}{'frames/s':>10}",
+    ]
+    for cost, mean in zip(show.worst_plans, show.mean_bytes, strict=True):
+        enough = "" if cost.frames_per_s >= scene.fps else "  less than the scene has"
+        rows.append(
+            f"{cost.line.name:<16}{cost.wire_bytes:>13}{_rate(cost.frames_per_s):>10}"
+            f"{mean:>13.0f}{_rate(_mean_rate(cost, mean)):>10}{enough}"
+        )
+    return "\n".join(rows)
 
 
 def _sizes(cost: Plan) -> dict[str, int]:

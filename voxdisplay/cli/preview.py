@@ -23,9 +23,14 @@ from voxdisplay.cli.param_types import PIXEL_FORMATS, AngleType, PixelSizeType, 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
     from voxdisplay.raster.grid import Grid
+    from voxdisplay.raster.pixel_map import PixelMap
+    from voxdisplay.view.film import LazyPages
 
 # Pixels of all pictures of a film: what a GIF takes in memory, in bytes.
 _MAX_PIXELS: Final = 1 << 29
+_MAX_PICTURES: Final = 10_000
+_MAX_FPS: Final = 60.0  # of the kinds of film
+_FPS: Final = 20.0  # of a film that turns once
 
 
 @click.command(
@@ -33,6 +38,8 @@ _MAX_PIXELS: Final = 1 << 29
     Examples:
       voxdisplay preview curve.json -o curve.png
       voxdisplay preview curve.json -o curve.gif --pixels 480x360 --seconds 4
+      voxdisplay preview spin.json -o spin.mp4
+      voxdisplay preview spin.json -o moment.png --at 1.5
       voxdisplay preview curve.json -o small.png --size 16x16x32 --format mono1
     """
 )
@@ -40,7 +47,8 @@ _MAX_PIXELS: Final = 1 << 29
 @image_file_option(
     "-o",
     "--output",
-    help_text="File to write: .png, or .gif and .mp4 that turn once, or .html to turn by hand.",
+    help_text="File to write: .png, or .gif and .mp4 that turn once, or .html to turn by hand; "
+    "of a scene that has a duration its film.",
     required=True,
 )
 @click.option(
@@ -88,9 +96,16 @@ _MAX_PIXELS: Final = 1 << 29
 @click.option(
     "--fps",
     type=RangeType("frames per second", 1, 60, "25"),
-    default=20.0,
     metavar="FPS",
-    help="Pictures per second of a film, 1 to 60.  [default: 20]",
+    help="Pictures per second of a film, 1 to 60.  [default: 20, or those of a moving scene]",
+)
+@click.option(
+    "--at",
+    "at_s",
+    type=RangeType("seconds", 0, 1e9, "1.5"),
+    metavar="SECONDS",
+    help="Of a scene that has a duration: the picture at this time.  [default: its beginning; a "
+    "film shows all of it]",
 )
 @click.option("--plain", is_flag=True, help="Draw without box, axes and halo.")
 @quiet_option
@@ -106,7 +121,8 @@ def preview(
     fit: Fit,
     model: ModelOptions,
     seconds: float,
-    fps: float,
+    fps: float | None,
+    at_s: float | None,
     plain: bool,
 ) -> None:
     """Draw SCENE, a JSON file or - for stdin, as a display would show it.
@@ -116,23 +132,67 @@ def preview(
     from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
     from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
+    from voxdisplay.view.film import FilmJob  # noqa: PLC0415
     from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
     from voxdisplay.view.save import FILM_SUFFIXES, ExportJob  # noqa: PLC0415
 
     film = output.suffix.lower() in FILM_SUFFIXES
-    if film and size_px[0] * size_px[1] * seconds * fps > _MAX_PIXELS:
-        raise click.BadParameter(
-            f"{seconds * fps:.0f} pictures of {size_px[0]}x{size_px[1]} are too many: make them "
-            "smaller, or fewer by --fps or --seconds",
-            param_hint="--pixels",
-        )
+    if film:
+        _check_size(seconds * (fps or _FPS), size_px)
     fitted, grid = load_fitted_scene(load_shown(scene, model), size, fit)
     frame = vd.Frame(grid, format_)
-    draw_scene(fitted, frame)
     options = RenderOptions(size=size_px, glow=not plain, axes=not plain)
     options = options.with_view(view_angle, zoom)
     title = "voxdisplay" if scene == "-" else Path(scene).stem
-    job = ExportJob(PixelMap(*frame.lit()), grid, frame.format, options, title, seconds, fps)
+    if fitted.duration and at_s is None and output.suffix.lower() in (*FILM_SUFFIXES, ".html"):
+        pages = _film_pages(fitted, frame, fps or fitted.fps)
+        _check_size(len(pages), size_px if film else (1, 1))
+        made: ExportJob | FilmJob = FilmJob(
+            pages, grid, frame.format, options, title, min(fps or fitted.fps, _MAX_FPS)
+        )
+        what = f"{plural(len(pages), 'picture')}"
+    else:
+        draw_scene(_at(fitted, at_s), frame)
+        made = ExportJob(
+            PixelMap(*frame.lit()), grid, frame.format, options, title, seconds, fps or _FPS
+        )
+        what = plural(len(frame.lit()[0]), "voxel")
     with progress_bar("drawing") as progress:
-        save_image(output, job, progress)
-    note(f"{output}: {plural(len(frame.lit()[0]), 'voxel')} on {grid} {format_}")
+        save_image(output, made, progress)
+    note(f"{output}: {what} on {grid} {format_}")
+
+
+def _check_size(pictures: float, size_px: tuple[int, int]) -> None:
+    """Refuse a film of too many pixels, or of too many pictures."""
+    if size_px[0] * size_px[1] * pictures > _MAX_PIXELS or pictures > _MAX_PICTURES:
+        raise click.BadParameter(
+            f"{pictures:.0f} pictures of {size_px[0]}x{size_px[1]} are too many: make them "
+            "smaller, or fewer by --fps or --seconds",
+            param_hint="--pixels",
+        )
+
+
+def _at(scene: vd.Scene, at_s: float | None) -> vd.Scene:
+    """Return a scene at a time, or at its beginning."""
+    if at_s is None:
+        return scene
+    if not scene.duration:
+        raise click.UsageError("--at: the scene does not move: it has no duration")
+    if at_s > scene.duration:
+        raise click.UsageError(f"--at {at_s:g}: the scene lasts {scene.duration:g} s")
+    return scene.at(at_s)
+
+
+def _film_pages(scene: vd.Scene, blank: vd.Frame, fps: float) -> LazyPages:
+    """Return the pages of a moving scene at a rate of its own."""
+    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415 - help starts fast
+    from voxdisplay.view.film import LazyPages  # noqa: PLC0415 - an extra
+
+    show = scene.show_on(blank, fit="none")
+    count = max(1, round(scene.duration * fps))
+
+    def page(number: int) -> PixelMap:
+        found = show.frame(min(int(number / fps * scene.fps + 1e-9), show.frame_count - 1))
+        return PixelMap(*found.lit())
+
+    return LazyPages(count, page)

@@ -90,6 +90,8 @@ def push(
     with close_on_exit(display, on_exit):
         fitted = fit_scene(loaded, display.info.grid, fit)
         frame = display.frame()
+        if fitted.duration:
+            note("this scene moves: its beginning is shown; voxdisplay play shows all of it")
         draw_scene(fitted, frame)
         with progress_bar("sending") as progress:
             receipt = display.present(frame, progress=progress)

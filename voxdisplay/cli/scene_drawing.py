@@ -32,14 +32,15 @@ def voxelize_scene(scene: vd.Scene, **options: Any) -> list[vd.Sequence | vd.Vox
         If an object cannot be drawn; it names the object.
 
     """
-    _note_choices(scene)
+    note_choices(scene)
     found = scene.voxelize(**options)
     for item, voxels in zip(scene.items, found, strict=True):
         _note_remarks(item, _remarks(voxels))
     return found
 
 
-def _note_choices(scene: vd.Scene) -> None:
+def note_choices(scene: vd.Scene) -> None:
+    """Note the reader's choices."""
     for remark in scene.notes:
         note(remark)
 
@@ -106,7 +107,7 @@ def fit_scene(scene: vd.Scene | ModelFile, grid: vd.Grid, fit: Fit) -> vd.Scene:
 
 def draw_scene(scene: vd.Scene, frame: vd.Frame) -> None:
     """Draw a scene, and note what a display of the frame's kind cannot show."""
-    _note_choices(scene)
+    note_choices(scene)
     drawings = scene.draw_each(frame)
     for item, drawing in zip(scene.items, drawings, strict=True):
         _note_remarks(item, _remarks(drawing))

@@ -18,6 +18,7 @@ from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.animation import Turntable, save_gif, save_mp4
 from voxdisplay.view.atomic_write import atomic_write
+from voxdisplay.view.film import FilmJob
 from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import RenderOptions, render_page
 
@@ -52,20 +53,25 @@ class ExportJob:
     fps: float = 20.0
     palette: Colors | None = None
 
-    def turntable(self, progress: Progress | None) -> Turntable:
+    @property
+    def pages(self) -> list[NDArray[np.integer] | PixelMap]:
+        """The page, as the only one."""
+        return [self.page]
+
+    def pictures(self, progress: Progress | None) -> Turntable:
         """Return the pictures of one turn."""
         lit = lit_voxels(self.page, self.grid, self.format, self.palette)
         count = max(1, round(self.seconds * self.fps))
         return Turntable(lit, self.grid, self.options, count, progress)
 
 
-def save(path: Path, shot: ExportJob, progress: Progress | None = None) -> None:
+def save(path: Path, shot: ExportJob | FilmJob, progress: Progress | None = None) -> None:
     """Write a file of the kind that its suffix names, one of `WRITERS`.
 
     Parameters
     ----------
     path : Path
-    shot : Shot
+    shot : ExportJob or FilmJob
     progress : callable, optional
         Called with (pictures rendered, pictures in all) of a film.
 
@@ -82,25 +88,25 @@ def save(path: Path, shot: ExportJob, progress: Progress | None = None) -> None:
         writer(unfinished, shot, progress)
 
 
-def _png(path: Path, shot: ExportJob, _: Progress | None) -> None:
+def _png(path: Path, shot: ExportJob | FilmJob, _: Progress | None) -> None:
     drawn = render_page(shot.page, shot.grid, shot.format, shot.options, shot.palette)
     drawn.save(path, format="PNG")
 
 
-def _gif(path: Path, shot: ExportJob, progress: Progress | None) -> None:
-    save_gif(path, shot.turntable(progress), shot.fps)
+def _gif(path: Path, shot: ExportJob | FilmJob, progress: Progress | None) -> None:
+    save_gif(path, shot.pictures(progress), shot.fps)
 
 
-def _mp4(path: Path, shot: ExportJob, progress: Progress | None) -> None:
-    save_mp4(path, shot.turntable(progress), shot.fps)
+def _mp4(path: Path, shot: ExportJob | FilmJob, progress: Progress | None) -> None:
+    save_mp4(path, shot.pictures(progress), shot.fps)
 
 
-def _html(path: Path, shot: ExportJob, _: Progress | None) -> None:
+def _html(path: Path, shot: ExportJob | FilmJob, _: Progress | None) -> None:
     from voxdisplay.view.html_export import save_html  # noqa: PLC0415 - it brings a page of its own
 
     save_html(
         path,
-        [shot.page],
+        shot.pages,
         shot.grid,
         shot.format,
         title=shot.title,
@@ -109,7 +115,7 @@ def _html(path: Path, shot: ExportJob, _: Progress | None) -> None:
     )
 
 
-WRITERS: dict[str, Callable[[Path, ExportJob, Progress | None], None]] = {
+WRITERS: dict[str, Callable[[Path, ExportJob | FilmJob, Progress | None], None]] = {
     ".png": _png,
     ".gif": _gif,
     ".mp4": _mp4,
