@@ -110,6 +110,35 @@ class Disc(BodyObject, tag="disc", frozen=True):
         )
 
 
+class Triangle(BodyObject, tag="triangle", frozen=True):
+    """A triangle."""
+
+    points: Annotated[
+        tuple[Vector, Vector, Vector],
+        Meta(
+            title="Points",
+            description="The three corners.",
+            extra={"expected": "three points [[x, y, z], [x, y, z], [x, y, z]]"},
+        ),
+    ]
+
+    def build_body(self, context: EvaluationContext) -> Body:
+        """Return the body."""
+        return bodies.Triangle(context.points("points", self.points))
+
+
+class Polygon(BodyObject, tag="polygon", frozen=True):
+    """A flat region inside of a ring of straight lines."""
+
+    points: Annotated[
+        Vectors, Meta(description="The corners [x, y, z] in order, all in one plane.")
+    ]
+
+    def build_body(self, context: EvaluationContext) -> Body:
+        """Return the body."""
+        return bodies.Polygon(context.points("points", self.points))
+
+
 class Sphere(EnclosingObject, tag="sphere", frozen=True):
     """A sphere; solid, a ball."""
 

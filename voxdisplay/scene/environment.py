@@ -263,15 +263,19 @@ class _Rows:
         self, table: ValueTable, numbers: Mapping[str | float, float | int]
     ) -> Floats | None:
         """Return the values at the present time; ``numbers`` knows all of the expressions."""
-        if self._block is not table.block:
-            self._compute(table, numbers)
+        if self._block is not table.block and not self._compute(table, numbers):
+            return None
         if not self._finite[table.row]:
             return None
         table.touched |= self._varies
         return np.asarray(self._values[table.row])
 
-    def _compute(self, table: ValueTable, numbers: Mapping[str | float, float | int]) -> None:
-        cells = [numbers[cell] for row in self._rows for cell in row]
+    def _compute(self, table: ValueTable, numbers: Mapping[str | float, float | int]) -> bool:
+        """Compute all values; return False if an expression was not read yet."""
+        texts = [cell for row in self._rows for cell in row]
+        if not all(isinstance(text, float) or text in numbers for text in texts):
+            return False
+        cells = [text if isinstance(text, float) else numbers[text] for text in texts]
         slots = [at for at, cell in enumerate(cells) if type(cell) is int]
         values = np.empty((len(table.block), len(cells)))
         values[:] = [0.0 if type(cell) is int else cell for cell in cells]
@@ -281,3 +285,4 @@ class _Rows:
         self._finite = [bool(np.isfinite(each).all()) for each in values]
         self._values = values.reshape(len(values), len(self._rows), -1)
         self._block = table.block
+        return True

@@ -143,5 +143,6 @@ class MovingScene(Scene):
         return replace(MovingScene.of_film(self.film, grid, self.notes, fit), notes=self.notes)
 
     def _moments(self) -> Iterator[Scene]:
-        for i in range(min(_MOMENTS, self.frame_count)):
-            yield self.at_frame(i * self.frame_count // min(_MOMENTS, self.frame_count))
+        moments = min(_MOMENTS, self.frame_count)
+        for i in range(moments):
+            yield self.at_frame(i * (self.frame_count - 1) // max(1, moments - 1))

@@ -17,9 +17,11 @@ from voxdisplay.scene.body_objects import (
     HeightField,
     Implicit,
     Plane,
+    Polygon,
     Scatter,
     Sphere,
     SphericalTriangle,
+    Triangle,
 )
 from voxdisplay.scene.curve_objects import (
     Arc,
@@ -72,6 +74,8 @@ Object = (
     | HeightField
     | Implicit
     | Plane
+    | Triangle
+    | Polygon
     | Disc
     | Sphere
     | Ellipsoid
