@@ -78,6 +78,24 @@ def test_it_is_sent_where_it_was_announced_and_is_shorter():
     assert frame.payloads(1024, {"arc"})[0][0] != spec.OP_ARC
 
 
+@pytest.mark.parametrize(("count", "tried"), [(40, True), (400, False)])
+def test_it_is_not_sent_where_it_is_longer(monkeypatch, count, tried):
+    """Nor tried where LINE takes fewer bytes than it ever could."""
+    calls = []
+
+    def noted(*arguments):
+        calls.append(arguments)
+        return encode_range_coded(*arguments)
+
+    monkeypatch.setattr("voxdisplay.wire.range_coded_chains.encode_range_coded", noted)
+    frame = Frame((512, 128, 128), "rgb888")
+    length = count - 1
+    way, steps = np.array([length, 17, -22]), np.arange(count)[:, None]
+    frame.draw(np.array([3, 5, 90]) + (2 * steps * way + length) // (2 * length), "white")
+    assert frame.payloads(1024, {"arc", "line"}) == frame.payloads(1024, {"line"})
+    assert bool(calls) == tried
+
+
 @pytest.mark.parametrize(("rate", "used"), [(None, False), (11_520, True), (300_000, False)])
 def test_it_is_sent_on_slow_lines(rate, used):
     with vd.open("sim:?size=128x128x128&format=index8") as display:
