@@ -14,7 +14,8 @@ Displays and frames: ``help(voxdisplay.Display)`` and so on says more of each.
     DeviceInfo          What a device announced: grid, format, features.
     Receipt             Figures of a frame that was shown.
     PlayReport          Figures of a show that was played.
-    load_show           Read a scene or a playlist to play.
+    load_show           Read a scene, a recording or a playlist to play.
+    Recording           Show from a file, encoded already.
     Frame               One picture: draw on it, set it, save it, present it.
     Drawing             Voxel counts of one drawn object.
     Grid                Size of a display in voxels.
@@ -83,6 +84,7 @@ Errors.
     SceneError          A scene file is wrong: where, and what.
     CurveError          A curve cannot be evaluated or drawn.
     BodyError           A body cannot be evaluated or drawn.
+    RecordingError      A recording is damaged, or cannot be written.
     DesyncError         The display shows something else, after recovery was tried.
     MissingExtra        An optional library is not installed.
 """
@@ -142,6 +144,7 @@ if TYPE_CHECKING:
         MissingExtra,
         OpenError,
         ProtocolError,
+        RecordingError,
         RemoteProtocolError,
         SceneError,
         TransportClosed,
@@ -156,6 +159,7 @@ if TYPE_CHECKING:
     from voxdisplay.scene import Scene, load_scene, read_scene
     from voxdisplay.shows.loading import load_show
     from voxdisplay.shows.play_report import PlayReport
+    from voxdisplay.shows.recording import Recording
     from voxdisplay.voxelization import Report, Sequence, VoxelSet, voxelize, voxelize_many
 
     __version__: str
@@ -201,6 +205,8 @@ if TYPE_CHECKING:
         "Polyline",
         "ProtocolError",
         "Receipt",
+        "Recording",
+        "RecordingError",
         "RemoteProtocolError",
         "Report",
         "Scatter",
@@ -289,6 +295,7 @@ _MODULES = {
         "MissingExtra",
         "OpenError",
         "ProtocolError",
+        "RecordingError",
         "RemoteProtocolError",
         "SceneError",
         "TransportClosed",
@@ -319,6 +326,9 @@ _MODULES = {
     ],
     "voxdisplay.shows.play_report": [
         "PlayReport",
+    ],
+    "voxdisplay.shows.recording": [
+        "Recording",
     ],
     "voxdisplay.voxelization": [
         "Report",

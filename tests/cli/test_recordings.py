@@ -165,6 +165,44 @@ def test_bad_arguments(run, arguments, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.fixture
+def once(run, scene, tmp_path):
+    """Record the scene so that it ends."""
+    path = tmp_path / "once.vxs"
+    done = run("record", scene(SCENE | {"loop": False}), "-o", path)
+    assert done.returncode == 0, done.stderr
+    return path
+
+
+def test_recordings_are_played(run, once):
+    port = "sim:?size=16x14x12&refresh=48"
+    done = run("play", once, "--port", port, "--json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["frames"] == 12
+    assert report["shown"] > 0
+    assert report["wrong"] == 0
+
+
+def test_recordings_of_other_displays_are_played(run, once):
+    for size, format_ in (("16x14x12", "mono1"), ("8x7x6", "rgb888"), ("30x30x30", "index8")):
+        port = f"sim:?size={size}&format={format_}&refresh=48"
+        done = run("play", once, "--port", port, "--json")
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["wrong"] == 0
+
+
+def test_push_shows_the_first_frame(run, recorded):
+    path, _ = recorded
+    lit = len(Recording(path).frame(0).lit()[0])
+    done = run("push", path, "--port", "sim:?size=16x14x12", "--verify", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["voxels"] == lit
+    cut = path.with_name("cut.vxs")
+    cut.write_bytes(path.read_bytes()[:200])
+    assert "no whole frame" in run("push", cut, "--port", "sim:").stderr
+
+
 def test_the_emulator_plays_a_file(recorded, emulator, tmp_path):
     path, _ = recorded
     dump = tmp_path / "front.npy"

@@ -381,6 +381,10 @@ class Frame:
         lit = self._raster.lit
         return lit.index, lit.values
 
+    def lit_rgb(self) -> NDArray[np.uint8]:
+        """Return the colours, (n, 3), of the voxels of `lit`."""
+        return self._coloring.colors_of(self._raster.lit.values)
+
     def digest(self) -> int:
         """Return the digest that a display reports when it shows this frame (section 8)."""
         found = raster_digest(self._raster)

@@ -1,4 +1,4 @@
-"""Loading of what can be played, by the name of its file: scenes and playlists.
+"""Loading of what can be played: scenes, recordings and playlists.
 
 Must not know displays.
 """
@@ -8,18 +8,20 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from voxdisplay.errors import SceneError
+from voxdisplay.errors import RecordingError, SceneError
 from voxdisplay.scene.json_text import JsonText
+from voxdisplay.scene.model import Scene
 from voxdisplay.scene.reader import load_scene
 from voxdisplay.shows.binding import Playable
 from voxdisplay.shows.playlist import Playlist, PlaylistEntry, PlaylistFile, check_playlist
+from voxdisplay.shows.recording import Recording
 
 _MAX_PLAYLIST_BYTES = 1 << 22
 _MAX_ENTRIES = 10_000  # of a playlist with those that it includes
 
 
 def load_show(path: str | os.PathLike[str]) -> Playable:
-    """Read a scene or a playlist.
+    """Read a scene, a recording or a playlist.
 
     Parameters
     ----------
@@ -28,14 +30,14 @@ def load_show(path: str | os.PathLike[str]) -> Playable:
 
     Raises
     ------
-    SceneError
+    SceneError, RecordingError
         If it cannot be read, or a playlist includes itself. Files of a playlist that are missing or
         wrong are left out, and stand in `Playlist.notes`.
 
     """
     data = None if str(path) == "-" else _playlist_data(Path(path))
     if data is None:
-        return load_scene(path)
+        return _load_one(path)
     notes: list[str] = []
     root = _read_playlist(Path(path), data)
     entries = _entries(root, (_identity(Path(path)),), notes)
@@ -43,6 +45,19 @@ def load_show(path: str | os.PathLike[str]) -> Playable:
         why = f": {notes[0]}" if notes else ""
         raise SceneError(f"nothing of the playlist can be played{why}", file=str(path))
     return Playlist(tuple(entries), root.repeat, root.shuffle, tuple(notes))
+
+
+def _load_one(path: str | os.PathLike[str]) -> Recording | Scene:
+    """Read a recording or a scene; by its first byte, which is 00 of a recording alone."""
+    if str(path) != "-":
+        try:
+            with Path(path).open("rb") as file:
+                is_recording = file.read(1) == b"\0"
+        except (OSError, ValueError):
+            is_recording = False  # the scene's reader says what is wrong
+        if is_recording:
+            return Recording(path)
+    return load_scene(path)
 
 
 def _playlist_data(path: Path) -> str | None:
@@ -84,8 +99,8 @@ def _entries(file: PlaylistFile, chain: tuple[Path, ...], notes: list[str]) -> l
             found += item.repeat * _entries(inner, (*chain, identity), notes) * (inner.repeat or 1)
         else:
             try:
-                found.append(PlaylistEntry(item, load_scene(path)))
-            except SceneError as error:
+                found.append(PlaylistEntry(item, _load_one(path)))
+            except (SceneError, RecordingError) as error:
                 notes.append(f"left out of the playlist: {error}")
         if len(found) > _MAX_ENTRIES:
             raise SceneError(

@@ -11,7 +11,7 @@ from bisect import bisect
 from collections.abc import Collection, Mapping
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.shows import recording_spec
+from voxdisplay.shows.recording_conversion import ConvertedShow
 from voxdisplay.shows.recording_packets import (
     TIME_UNITS,
     End,
@@ -30,7 +31,7 @@ from voxdisplay.shows.recording_packets import (
 )
 from voxdisplay.shows.recording_scan import RecordedFrame, scan_file, scan_frames
 from voxdisplay.shows.recording_writer import RecordingFormat
-from voxdisplay.shows.show import EncodedFrame
+from voxdisplay.shows.show import EncodedFrame, Show
 from voxdisplay.wire import packet, spec
 from voxdisplay.wire.op_decoder import decode_ops
 
@@ -186,6 +187,21 @@ class Recording:
                 f"{self.path.name}: frame {number} draws something else than its digest says"
             )
         return frame
+
+    def show_on(
+        self, blank: Frame, *, fit: Literal["contain", "none", "content"] = "contain"
+    ) -> Show:
+        """Return the show for a display: this one, if it is of the same grid and format.
+
+        Parameters
+        ----------
+        blank, fit
+            As of `shows.recording_conversion.ConvertedShow`, which it is else.
+
+        """
+        if (blank.grid, blank.format) == (self.format.grid, self.format.format):
+            return self
+        return ConvertedShow(self, blank, fit)
 
     def encoded_frame(
         self, number: int, max_payload: int, features: Collection[str]
