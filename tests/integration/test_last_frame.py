@@ -12,6 +12,7 @@ from carriers import eventually
 from conftest import DEADLINE_S, ROOT
 from memory_pipe import assert_shows, open_display, random_frame
 from pluggable_pty import noise_frame
+from virtual_time_device import VirtualTimeDevice
 
 import voxdisplay as vd
 
@@ -164,3 +165,19 @@ def test_dark_after_a_signal_in_mid_push_on_a_slow_line(
     assert "the display is dark" in text
     assert push.returncode in (130, 143)
     eventually(lambda: not np.load(dump).any(), "darkness")
+
+
+@pytest.mark.parametrize("rate", [600, 1200, 2400])
+def test_dark_behind_a_pipe_of_unknown_rate_before_any_answer_to_a_frame(rate):
+    """How slow the line is, the handshake has shown."""
+    device = VirtualTimeDevice(baud=rate, grid=(64, 64, 64))
+    display = vd.open(device, clock=device.clock)
+    corners = np.random.default_rng(1).integers(0, 64, (400, 3))
+    frame = display.frame()
+    frame.draw(vd.Polyline(corners), "red")
+    display.present(frame, wait=False)
+    assert display.counters.packets > 0
+    assert device.bench.counters().swaps == 0
+    display.close(blank=True)
+    assert device.bench.counters().swaps == 1
+    assert not any(device.bench.snapshot().pixels)

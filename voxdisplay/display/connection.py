@@ -22,9 +22,10 @@ from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 
 MAX_WAIT_S: Final = 0.5  # of one exchange
-# Assumed of a line without a known rate before the first ACK: that of 9600 Bd.
-_SLOW_BYTES_PER_S = 960.0
-_MAX_DRAIN_S = 45.0
+# Assumed of a line without a known rate before the first ACK: what the handshake showed, from that
+# of 300 Bd, for a device may have had to start first, to that of 9600 Bd.
+_LEAST_BYTES_PER_S, _MOST_BYTES_PER_S = 30.0, 960.0
+_MAX_DRAIN_S = 60.0
 
 Clock: TypeAlias = Callable[[], float]
 
@@ -99,6 +100,7 @@ class Connection:
         )
 
     def _open_session(self) -> DeviceInfo:
+        began_s, received = self._clock(), self.link.counters.received_bytes
         try:
             while not self.link.ready:
                 self._exchange(wait=True)
@@ -107,6 +109,8 @@ class Connection:
         except TransportClosed as error:
             raise closed_before_info(error, self.link) from error
         assert self.link.info is not None  # noqa: S101 - ready
+        received = self.link.counters.received_bytes - received
+        self._handshake_bytes_per_s = received / max(self._clock() - began_s, 1e-6)
         return device_info(self.link.info)
 
     @property
@@ -222,9 +226,8 @@ class Connection:
         self._reconnector = None
         self._cancelled = False
         self._timeout_s = min(self._timeout_s, within_s)
-        bytes_per_s = (
-            self.bytes_per_s or self.link.delivery_rate.min_bytes_per_s or _SLOW_BYTES_PER_S
-        )
+        handshake = max(_LEAST_BYTES_PER_S, min(self._handshake_bytes_per_s, _MOST_BYTES_PER_S))
+        bytes_per_s = self.bytes_per_s or self.link.delivery_rate.min_bytes_per_s or handshake
         drain_s = min(self.link.in_flight_bytes / bytes_per_s, _MAX_DRAIN_S)
         if discard := getattr(self._pipe, "discard_output", None):
             discard()

@@ -110,9 +110,9 @@ class TickClock:
         behind = (origin_s - self._expected_s) * self.refresh_hz
         if abs(behind) < max(1.0, tolerance) - 0.25:
             return
-        ticks = round(behind)
+        ticks, before = round(behind), self.next
         self._leave_out(ticks)
         if ticks < 0:
             self.next += ticks
-        self._valid_from = self.next
+        self._valid_from = max(before, self.next)  # those on their way have earlier numbers
         self._origins_s.clear()
