@@ -237,14 +237,15 @@ def _evaluate(curve: Curve, t: Floats) -> Floats:
 def _check_repeatable(curve: Curve, t: Floats, points: Floats) -> None:
     """Raise CurveError if a callable returns other points for the same parameters.
 
-    The second time only some are passed, without the ends and not around the same middle: points
-    may not depend on what else is in the array, either.
+    The second time only some are passed, without the ends and not around the same middle, and in
+    reverse: points may not depend on what else is in the array, either, nor on its order.
     """
     if curve.thread_safe:
         return
     if t.size > _LEAST_FOR_SOME:
         some = slice(1, 2 * t.size // 3)
         t, points = t[some], points[:, some]
+    t, points = t[::-1], points[:, ::-1]
     again = _evaluate(curve, t)
     with np.errstate(all="ignore"):
         apart = np.abs(again - points) > REPEATABLE * (1 + np.abs(points))

@@ -101,6 +101,8 @@ def read_scene(data: bytes | str, *, folder: str | os.PathLike[str] | None = Non
         If anything is wrong with it: ``.path``, ``.line`` and ``.column`` are where.
 
     """
+    if isinstance(data, bytearray | memoryview):
+        data = bytes(data)
     if not isinstance(data, str | bytes):
         raise wrong_kind("data", "the text of a scene, str or bytes", data)
     if folder is not None and not isinstance(folder, str | os.PathLike):

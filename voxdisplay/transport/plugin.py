@@ -5,20 +5,29 @@ See the first paragraph of `voxdisplay.transport` for what an entry point must d
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from importlib.metadata import EntryPoint
 from typing import Any
 
 from voxdisplay.errors import OpenError, TransportClosed, TransportTimeout
 from voxdisplay.transport.base import Transport
-from voxdisplay.transport.library_errors import message_of
+from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
 
 
 def opener_of(entry: EntryPoint) -> Callable[[str], Any]:
     """Return a function that loads an entry point and opens a port by it."""
 
     def opener(port: str) -> Any:
-        return entry.load()(port)
+        try:
+            function = entry.load()
+        except Exception as error:  # a damaged package may raise anything while it is imported
+            raise OpenError(
+                f"{port} cannot be opened: loading {entry.value} failed: {message_of(error)}",
+                port=port,
+                hint="reinstall the package that this kind of port comes from",
+            ) from error
+        return function(port)
 
     return opener
 
@@ -33,9 +42,11 @@ def open_usb(port: str, opener: Callable[[str], Any]) -> Transport:
 def _call_opener(port: str, opener: Callable[[str], Any]) -> Any:
     try:
         return opener(port)
+    except OpenError:
+        raise
     except ValueError as error:
         raise OpenError(f"{port}: {error}", port=port) from error
-    except (OSError, ImportError, AttributeError) as error:  # the last two: a damaged package
+    except LIBRARY_ERRORS as error:
         raise OpenError(f"{port} cannot be opened: {message_of(error)}", port=port) from error
 
 
@@ -55,7 +66,7 @@ class PluginTransport:
         """See `Transport.read`."""
         try:
             return bytes(self._pipe.read(timeout_s))
-        except OSError as error:
+        except LIBRARY_ERRORS as error:
             raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def write(self, data: bytes, timeout_s: float) -> None:
@@ -64,9 +75,10 @@ class PluginTransport:
             self._pipe.write(data, timeout_s)
         except TimeoutError as error:
             raise TransportTimeout(f"{self.port} takes no bytes: {message_of(error)}") from error
-        except OSError as error:
+        except LIBRARY_ERRORS as error:
             raise TransportClosed(f"{self.port} is gone: {message_of(error)}") from error
 
     def close(self) -> None:
         """See `Transport.close`."""
-        self._pipe.close()
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            self._pipe.close()

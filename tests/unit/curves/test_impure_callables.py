@@ -101,8 +101,12 @@ def test_a_counter_of_calls_is_named() -> None:
         lambda t: t - t.mean(),
         lambda t: np.linspace(0, 9, t.size),
         lambda t: np.cumsum(np.cos(t)),
+        lambda t: 1e-3 * np.cumsum(t),
+        np.sort,
+        lambda t: np.gradient(np.sin(t)),
+        np.maximum.accumulate,
     ],
-    ids=["largest", "first", "mean", "number", "sum"],
+    ids=["largest", "first", "mean", "number", "sum", "small sum", "order", "beside", "so far"],
 )
 @pytest.mark.parametrize("t_range", [(0, 6), (-3, 3), (0.5, 700)])
 def test_a_callable_that_depends_on_the_other_parameters_is_named(height, t_range) -> None:

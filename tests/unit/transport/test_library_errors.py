@@ -14,6 +14,7 @@ from usb_gadget import GadgetDevice
 
 from firmware_sim.usb.backend import Backend
 from firmware_sim.usb.host import Bus
+from voxdisplay import transport as transport_module
 from voxdisplay.cli.main import main
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import OpenError, TransportClosed, TransportError
@@ -270,3 +271,58 @@ def test_a_libusb_that_cannot_be_loaded(monkeypatch, error):
     with pytest.raises(OpenError, match="no libusb"):
         usb_access.find_backend("usb:")
     assert usb_ports() == []
+
+
+class DamagedEntry:
+    """An entry point of a package that fails when it is imported, or later."""
+
+    value = "package.module:opener"
+
+    def __init__(self, error, *, when):
+        self.error, self.when = error, when
+
+    def load(self):
+        if self.when == "load":
+            raise self.error
+        return self.opener
+
+    def opener(self, _port):
+        if self.when == "open":
+            raise self.error
+        return self
+
+    def read(self, _timeout_s):
+        raise self.error
+
+    def write(self, _data, _timeout_s):
+        raise self.error
+
+    def close(self):
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [*UNDOCUMENTED, ImportError("no"), EOFError()], ids=repr)
+def test_another_packages_port_that_fails(error, monkeypatch):
+    """Whatever it raises, callers see errors of this package."""
+    for when in ("load", "open"):
+        entry = DamagedEntry(error, when=when)
+        monkeypatch.setattr(transport_module, "entry_points", lambda entry=entry, **_: [entry])
+        with pytest.raises(OpenError, match=r"^foo:bar"):
+            open_transport("foo:bar")
+    entry = DamagedEntry(error, when="use")
+    monkeypatch.setattr(transport_module, "entry_points", lambda **_: [entry])
+    transport = open_transport("foo:bar")
+    with pytest.raises(TransportClosed, match="foo:bar is gone"):
+        transport.read(0.1)
+    with pytest.raises(TransportError, match=r"^foo:bar"):
+        transport.write(b"a", 0.1)
+    transport.close()
+
+
+@pytest.mark.parametrize("error", [SyntaxError("x"), NameError("y"), AssertionError()], ids=repr)
+def test_a_package_that_cannot_be_imported_is_named(error, monkeypatch):
+    entry = DamagedEntry(error, when="load")
+    monkeypatch.setattr(transport_module, "entry_points", lambda **_: [entry])
+    with pytest.raises(OpenError, match=r"loading package\.module:opener failed") as refused:
+        open_transport("foo:bar")
+    assert "reinstall" in refused.value.hint
