@@ -49,6 +49,10 @@ class LitMask:
         """Return which places are lit."""
         return self._mask.take(place)
 
+    def storage(self) -> tuple[int, Ints, NDArray[np.int32], Bools]:
+        """Return digits of a brick's side, bricks along each axis, their rows, and what is lit."""
+        return 0, np.ones(3, dtype=np.int64), np.zeros(1, dtype=np.int32), self._mask
+
     def scan_index(self, place: Ints) -> Ints:
         """Return the scan-order indices of places."""
         return place
@@ -99,6 +103,11 @@ class LitBricks(LitMask):
             self._store(brick[stored < 0])
             stored = self._stored.take(brick)
         self._mask[stored, inner] = True
+
+    def storage(self) -> tuple[int, Ints, NDArray[np.int32], Bools]:
+        """Return digits of a brick's side, bricks along each axis, their rows, and what is lit."""
+        cells = np.array(self._cells, dtype=np.int64)
+        return self._digits, cells, self._stored, self._mask.reshape(-1)
 
     def _split(self, place: Ints) -> tuple[Ints, Ints]:
         digits = 3 * self._digits

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from voxdisplay.compute import kernel_backend
 from voxdisplay.voxelization.surfaces.lit_mask import lit_mask
 from voxdisplay.voxelization.surfaces.mesh_attributes import has_attributes, interpolate
 from voxdisplay.voxelization.surfaces.mesh_shell import mark_shell
@@ -35,6 +36,7 @@ def voxelize_mesh(
 ) -> VoxelSet:
     """Return the voxels of a mesh inside a box: see `body_voxelization.Voxeliser`."""
     mesh = snap(geometry, box)
+    kernel_backend.enable_if_worthwhile(len(mesh.faces))
     topology = analyse(mesh)
     notes = list(_topology_notes(topology))
     solid = body.kind == "solid"

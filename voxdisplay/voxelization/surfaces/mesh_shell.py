@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from voxdisplay.compute.array_types import Ints
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
 from voxdisplay.voxelization.surfaces.midline_crossings import (
@@ -22,6 +23,7 @@ from voxdisplay.voxelization.surfaces.snapped_mesh import SHIFT
 from voxdisplay.voxelization.voxel_box import Triple
 
 
+@with_kernel
 def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
     """Light the voxels of a mesh's triangles.
 

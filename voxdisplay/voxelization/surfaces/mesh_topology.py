@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Ints
+from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.surfaces.snapped_mesh import SnappedMesh
 
 Hashes = NDArray[np.uint64]
@@ -89,6 +90,7 @@ def analyse(mesh: SnappedMesh) -> Topology:
     )
 
 
+@with_kernel
 def vertex_hashes(points: NDArray[np.int32]) -> tuple[Hashes, Hashes]:
     """Return two independent random numbers for each place that vertices have, (V,) each."""
     x, y, z = points.view(np.uint32).astype(np.uint64)
@@ -104,6 +106,7 @@ def _scrambled(value: Hashes) -> Hashes:
     return np.asarray(value ^ (value >> np.uint64(31)))
 
 
+@with_kernel
 def chain_and_doubles(faces: Ints, one: Hashes, two: Hashes) -> tuple[bool, bool]:
     """Return whether the edges of all triangles cancel, and whether two have the same corners.
 
@@ -112,7 +115,7 @@ def chain_and_doubles(faces: Ints, one: Hashes, two: Hashes) -> tuple[bool, bool
     coordinates of one, modulo 2^64. Errs with a probability of about 2^-60.
     """
     total = np.uint64(0)
-    sums = np.empty(len(faces), dtype=np.uint64)
+    sums = np.empty(len(faces), dtype=np.uint64)  # equal for the same corners
     block = 1 << 15
     with np.errstate(over="ignore"):
         for begin in range(0, len(faces), block):

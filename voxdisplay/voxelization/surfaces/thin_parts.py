@@ -12,40 +12,22 @@ not matter how flat parts are cut into triangles.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
+from voxdisplay.voxelization.surfaces.dark_edges import EdgeCrossings, dark_edges, is_lit
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
 from voxdisplay.voxelization.surfaces.midline_crossings import TriangleBlock, triangle_blocks
-from voxdisplay.voxelization.surfaces.repeats import Repeats
 from voxdisplay.voxelization.surfaces.shape_edges import is_shape_edge
 from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, UNIT
 
 # Distances that differ by less are the same.
 SAME = 1e-9
 _AFTER = [1, 2, 0]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EdgeCrossings:
-    """Crossings of edges with mid-planes of one axis.
-
-    Attributes
-    ----------
-    triangle, corner : (n,) int64 array
-        A triangle, and at which of its corners the edge begins.
-    plane : (n,) int64 array
-        Number of the mid-plane.
-
-    """
-
-    triangle: Ints
-    corner: Ints
-    plane: Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,17 +59,11 @@ def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
     topology : Topology
 
     """
-    dark: list[list[EdgeCrossings]] = [[], [], []]
-    for block in triangle_blocks(topology.mesh):
-        for axis in range(3):
-            found = dark_edge_crossings(mask, topology, block, axis)
-            if len(found.plane):
-                dark[axis].append(found)
     lit = [
         each
-        for axis in range(3)
-        if dark[axis]
-        for each in _faces_to_light(mask, topology, axis, _joined(dark[axis]))
+        for axis, dark in enumerate(dark_edges(mask, topology))
+        if len(dark.plane)
+        for each in _faces_to_light(mask, topology, axis, dark)
     ]
     for each in lit:
         mask.mark(each.place)
@@ -97,49 +73,6 @@ def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
         lit.append(_cells_to_light(mask, topology, np.concatenate(grains, axis=1)))
         mask.mark(lit[-1].place)
     return lit
-
-
-def _joined(parts: list[EdgeCrossings]) -> EdgeCrossings:
-    return EdgeCrossings(
-        *(
-            np.concatenate([getattr(part, field.name) for part in parts])
-            for field in fields(parts[0])
-        )
-    )
-
-
-def dark_edge_crossings(
-    mask: LitMask, topology: Topology, block: TriangleBlock, axis: int
-) -> EdgeCrossings:
-    """Return the crossings of edges with mid-planes in dual faces whose nearest corner is dark."""
-    rows = np.flatnonzero(block.first[axis] <= block.last[axis])
-    u, v, w = (block.corners[(axis + k) % 3].take(rows, axis=1) for k in (1, 2, 0))
-    start, end = w, w[_AFTER]
-    low, high = start, end
-    if not topology.has_inside:  # else each edge ascends in one of its triangles
-        low, high = np.minimum(start, end), np.maximum(start, end)
-    first = np.maximum((low + (UNIT - 1 - HALF)) >> SHIFT, 0)
-    last = np.minimum((high - HALF) >> SHIFT, mask.sides[axis] - 1)
-    edge = np.flatnonzero((first <= last) & (low < high))
-    repeats = Repeats((last - first + 1).take(edge).astype(np.int64))
-    plane = repeats.ranges(first.take(edge).astype(np.int64))
-    begin = start.take(edge).astype(np.float64)
-    rise = end.take(edge) - begin
-    # From where the edge begins, so that steep slopes do no harm.
-    run = plane * float(UNIT) + repeats.of(HALF - begin)
-    columns = []
-    for each in (u, v):
-        base = each.take(edge).astype(np.float64)
-        slope = (each[_AFTER].take(edge) - base) / rise
-        found = run * repeats.of(slope)
-        found += repeats.of(base - HALF)
-        found *= 1 / UNIT
-        columns.append(np.rint(found).astype(np.int64))
-    dark = np.flatnonzero(~_is_lit(mask, axis, columns[0], columns[1], plane))
-    source = repeats.of(edge)[dark]
-    corner = source // len(rows) if len(rows) else source
-    triangle = rows.take(source - corner * len(rows)) + block.begin
-    return EdgeCrossings(triangle, corner, plane[dark])
 
 
 def _faces_to_light(
@@ -158,7 +91,7 @@ def _faces_to_light(
     corners = list(_corners(i, j, s, t))
     lit = np.zeros(len(i), dtype=bool)
     for p, q, _, exists in corners:
-        lit |= exists & _is_lit(mask, axis, p, q, crossings.plane)
+        lit |= exists & is_lit(mask, axis, p, q, crossings.plane)
     rows = np.flatnonzero(~lit)
     if not len(rows):
         return
@@ -209,17 +142,6 @@ def _corners(i: Ints, j: Ints, s: Floats, t: Floats) -> Iterator[tuple[Ints, Int
             distance = (s - up_u) ** 2 + (t - up_v) ** 2
             exists = ((s > 0) if up_u else np.ones(len(s), dtype=bool)) & ((t > 0) | (not up_v))
             yield i + up_u, j + up_v, distance, exists
-
-
-def _is_lit(mask: LitMask, axis: int, i: Ints, j: Ints, level: Ints) -> Bools:
-    """Return which voxels are in the box and lit."""
-    nu, nv, nw = (mask.sides[(axis + k) % 3] for k in (1, 2, 0))
-    lit = (i >= 0) & (i < nu) & (j >= 0) & (j < nv) & (level >= 0) & (level < nw)
-    if lit.all():
-        return mask.lit(mask.locate(axis, i, j, level))
-    rows = np.flatnonzero(lit)
-    lit[rows] = mask.lit(mask.locate(axis, i[rows], j[rows], level[rows]))
-    return np.asarray(lit)
 
 
 def _groups(key: Ints) -> Ints:
@@ -280,7 +202,7 @@ def _grains(mask: LitMask, block: TriangleBlock) -> Ints | None:
     if not len(rows):
         return None
     x, y, z = block.corners[:, 0, rows].astype(np.int64) >> SHIFT
-    rows = rows[~_is_lit(mask, 2, x, y, z)]
+    rows = rows[~is_lit(mask, 2, x, y, z)]
     if not len(rows):
         return None
     low, high = low[:, rows].astype(np.int64), high[:, rows].astype(np.int64)
@@ -289,7 +211,7 @@ def _grains(mask: LitMask, block: TriangleBlock) -> Ints | None:
     for up in np.ndindex(2, 2, 2):
         corner = cell + np.array(up)[:, None]
         exists = ~(on_wall & np.array(up, dtype=bool)[:, None]).any(axis=0)
-        lit |= exists & _is_lit(mask, 2, *corner)
+        lit |= exists & is_lit(mask, 2, *corner)
     lit |= _zero_area(block.corners[:, :, rows].astype(np.int64))
     if lit.all():
         return None

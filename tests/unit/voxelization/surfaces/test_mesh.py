@@ -2,6 +2,7 @@
 
 import itertools
 import random
+from contextlib import contextmanager
 from fractions import Fraction
 
 import mesh_reference as reference
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import voxdisplay as vd
+from voxdisplay.compute import kernel_backend
 
 SIDES = (7, 6, 5)
 
@@ -296,3 +298,35 @@ def test_far_vertices_are_refused():
 
 def test_triangles_without_an_area_light_nothing():
     assert not voxels([(1, 1, 1), (4, 4, 4), (2, 2, 2)], [(0, 1, 2)])
+
+
+@contextmanager
+def kernels(choice):
+    before = kernel_backend.set_enabled(choice)
+    try:
+        yield
+    finally:
+        kernel_backend.set_enabled(before)
+
+
+def same_compiled(mesh, clip):
+    with kernels(False):
+        plain = vd.voxelize(mesh, clip=clip)
+    with kernels(True):
+        fast = vd.voxelize(mesh, clip=clip)
+    assert plain.index.tobytes() == fast.index.tobytes()
+    assert plain.notes == fast.notes
+
+
+@pytest.mark.parametrize("fill", ["shell", "solid"])
+def test_compiled_kernels_light_the_same_voxels(fill):
+    pytest.importorskip("numba")
+    for vertices, faces in lattice_meshes(60, 20):
+        points = np.array(vertices, dtype=float)
+        same_compiled(vd.Mesh(points, faces, fill=fill), SIDES)
+        same_compiled(vd.Mesh(points, faces[::2], fill=fill), SIDES)
+    for points, faces in (tube(), tube(radius=0.02), ball()):
+        for size, clip in ((3, (2, 3, 2)), (40, (41, 39, 43)), (300, (700, 300, 301))):
+            same_compiled(vd.Mesh(points * size, faces, fill=fill), clip)
+            turned = points @ np.array([(0.6, 0.8, 0), (-0.8, 0.6, 0), (0, 0, 1)])
+            same_compiled(vd.Mesh(turned * size + 0.5, faces, fill=fill), clip)
