@@ -186,3 +186,72 @@ def test_keys_pause_seek_and_leave(emulator, scene):
     screen.read_until(lambda text: "shown in" in text)
     assert screen.process.wait(DEADLINE_S) == 0
     screen.close()
+
+
+# -- loops of one's own
+
+
+@pytest.mark.parametrize("baud", [115_200, 12_000_000])
+def test_a_plain_loop_that_sleeps_accounts_for_every_frame(emulator, baud):
+    port = emulator("--pty", "--size", "16x16x16", "--refresh", 60, "--baud", baud).port
+    with vd.open(port) as display:
+        for number in range(30):
+            frame = display.frame()
+            frame.draw([(number % 16, 1, 2)])
+            display.present(frame, wait=False)
+            time.sleep(1 / 30)
+        display.flush(DEADLINE_S)
+        counts = display.playback
+        assert counts.presented == 30 == counts.shown + counts.dropped
+        assert counts.shown > 15, "a stalled loop shows six a second"
+        display.verify(frame)
+
+
+def test_ctrl_c_ends_a_loop_at_once(emulator):
+    port = emulator("--pty", "--size", "16x16x16").port
+    code = (
+        "import voxdisplay as vd\n"
+        f"with vd.open({port!r}) as display:\n"
+        "    for time in display.clock(fps=0.001):\n"
+        "        print('waiting', flush=True)\n"
+    )
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as loop:
+        assert loop.stdout.readline() == "waiting\n"
+        loop.send_signal(signal.SIGINT)
+        _, text = loop.communicate(timeout=DEADLINE_S)
+    assert text.rstrip().endswith("KeyboardInterrupt")
+
+
+# -- what is wrong with the command line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["gone.json"], "no such file"),
+        (["{scene}", "--from", "9"], "the show ends at 2 s"),
+        (["{scene}", "--until", "0"], "until"),
+        (["{scene}", "--speed", "0"], "out of range"),
+        (["{scene}", "--clock", "sun"], "--clock"),
+        (["{scene}", "gone.json"], "no such file"),
+        ([], "SHOW..."),
+    ],
+)
+def test_bad_arguments_are_named(run, scene, arguments, message):
+    path = scene(SPIN)
+    done = run("play", *[each.format(scene=path) for each in arguments], "--port", "sim:")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_shows_are_played_in_turn_and_what_is_missing_is_named(run, scene):
+    still = scene({"type": "segment", "from": [1, 1, 1], "to": [9, 9, 9]}, "still.json")
+    playlist = scene({"playlist": [{"show": "still.json", "until": 0.1}, "gone.json"]}, "list.json")
+    done = run("play", still, playlist, "--port", "sim:?size=16x16x16", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "left out of the playlist" in done.stderr
+    assert json.loads(done.stdout)["shown"] == 2
