@@ -56,6 +56,8 @@ What to draw: points are (x, y, z) in voxels; the first voxel of an axis spans 0
     VoxelModel          Voxels with colours of their own.
     Implicit            Surface or solid by f(x, y, z).
     Surface             Surface by formulas of u and v.
+    Torus               Torus.
+    Tube                Tube about a curve.
     Body                Base class of surfaces, solids and voxel models.
     Scene               Coloured curves, as read from a scene file.
     load_scene          Read a scene from a file.
@@ -111,7 +113,9 @@ if TYPE_CHECKING:
         SphericalTriangle,
         Surface,
         Text,
+        Torus,
         Triangle,
+        Tube,
         Volume,
         VoxelModel,
     )
@@ -218,11 +222,13 @@ if TYPE_CHECKING:
         "SphericalTriangle",
         "Surface",
         "Text",
+        "Torus",
         "TorusKnot",
         "TransportClosed",
         "TransportError",
         "TransportTimeout",
         "Triangle",
+        "Tube",
         "Volume",
         "VoxDisplayError",
         "VoxelModel",
@@ -255,7 +261,9 @@ _MODULES = {
         "SphericalTriangle",
         "Surface",
         "Text",
+        "Torus",
         "Triangle",
+        "Tube",
         "Volume",
         "VoxelModel",
     ],

@@ -68,6 +68,9 @@ SCENE = """{"size": [9, 9, 9], "objects": [
  {"type": "segment", "from": [1, 1, 1], "to": [5, 5, 5]}]}"""
 # Arguments of a call that succeeds, by the name of what is called.
 CALLS = {
+    "Tube": {"along": vd.Circle((5, 5, 5), 3), "radius": "r + t/9", "fill": "solid",
+             "params": {"r": 1}},
+    "Torus": {"center": (5, 5, 5), "major": 3, "minor": 1, "normal": (0, 0, 1), "fill": "shell"},
     "Surface": {"x": "u + k", "y": "v", "z": 3, "u": (1, 4), "v": (2, 5), "fill": "shell",
                 "params": {"k": 1}},
     "Implicit": {"f": "x - k", "box": [(1, 1, 1), (4, 5, 6)], "fill": "shell", "params": {"k": 6}},

@@ -30,6 +30,8 @@ CURVES = {
     "TorusKnot": vd.TorusKnot(2, 3, (5, 5, 5), 3, 1),
 }
 BODIES = {
+    "Tube": vd.Tube(vd.Circle((5, 5, 5), 3), "1 + t/9"),
+    "Torus": vd.Torus((5, 5, 5), 3, 1, (1, 2, 3)),
     "Surface": vd.Surface("u", "v", "5 + sin(u)*k", u=(1, 6), v=(2, 5), params={"k": 2}),
     "Implicit": vd.Implicit(
         "hypot(x - 5, y - 5, z - r) - 3", box=[(1, 1, 1), (9, 9, 9)], params={"r": 4}

@@ -16,6 +16,7 @@ from voxdisplay.bodies.primitives import (
 from voxdisplay.bodies.scatter import Scatter
 from voxdisplay.bodies.surface import Surface
 from voxdisplay.bodies.text import Text
+from voxdisplay.bodies.tube import Torus, Tube
 from voxdisplay.bodies.volume import Volume, VoxelModel
 
 __all__ = [
@@ -35,8 +36,10 @@ __all__ = [
     "SphericalTriangle",
     "Surface",
     "Text",
+    "Torus",
     "TransformedBody",
     "Triangle",
+    "Tube",
     "Volume",
     "VoxelModel",
 ]

@@ -94,6 +94,8 @@ def _light(
         corner = base + step
         known = box.inside(corner)
         lit[known] |= contains(index, box.index_of(corner[known]))
+    if lit.all():
+        return index
     voxels = np.floor(points[~lit]).astype(np.int64)
     needed = box.index_of(voxels[~inside(voxels.astype(np.float64) + 0.5)])
     return distinct([index, needed]) if needed.size else index
