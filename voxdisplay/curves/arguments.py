@@ -6,7 +6,7 @@ Must not know the curves and the bodies.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 
@@ -106,6 +106,12 @@ def unmasked(value: ArrayLike) -> Floats:
 
 def vector(name: str, value: ArrayLike) -> Floats:
     """Return a finite (3,) float64 array, or raise ArgumentError."""
+    plain = type(value) is np.ndarray and value.dtype == np.float64
+    parts: Any = value.tolist() if plain else value  # type: ignore[union-attr]
+    if type(parts) in (list, tuple) and len(parts) == 3:
+        good = [type(part) is float and -MAX_MAGNITUDE <= part <= MAX_MAGNITUDE for part in parts]
+        if all(good):  # as most are, and checked sooner than by numpy
+            return np.array(parts)
     return array(name, value, (3,))
 
 

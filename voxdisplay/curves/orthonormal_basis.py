@@ -8,6 +8,7 @@ seen against n. When n is along x, u is +y. So with n = [0, 0, 1] angle 0 is +x 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,16 +32,22 @@ def orthonormal_basis(name: str, direction: ArrayLike) -> tuple[Floats, Floats, 
         Of any length but 0.
 
     """
-    n = arguments.vector(name, direction)
-    n = n / (np.abs(n).max() or 1.0)  # so that its square neither overflows nor vanishes
-    with np.errstate(under="ignore"):
-        length = np.linalg.norm(n)
-        if length == 0:
-            raise arguments.ArgumentError(name, "has no direction: it is 0")
-        n = n / length
-        towards = np.array([1.0, 0.0, 0.0])
-        if np.hypot(n[1], n[2]) < 1e-9:
-            towards = np.array([0.0, 1.0, 0.0])
-        u = towards - (towards @ n) * n
-        u /= np.linalg.norm(u)
-        return u, np.cross(n, u), n
+    # Plain numbers: thousands of circles are made one by one, and numpy takes longer to begin.
+    parts = arguments.vector(name, direction).tolist()
+    most = max(map(abs, parts)) or 1.0  # so that its square neither overflows nor vanishes
+    parts = [part / most for part in parts]
+    length = _norm(parts)
+    if length == 0:
+        raise arguments.ArgumentError(name, "has no direction: it is 0")
+    x, y, z = n = [part / length for part in parts]
+    across = math.hypot(y, z) >= 1e-9
+    u = [1.0 - x * x, -x * y, -x * z] if across else [-y * x, 1.0 - y * y, -y * z]
+    length = _norm(u)
+    a, b, c = u = [part / length for part in u]
+    v = [y * c - z * b, z * a - x * c, x * b - y * a]
+    return np.array(u), np.array(v), np.array(n)
+
+
+def _norm(parts: list[float]) -> float:
+    row = np.array(parts)
+    return math.sqrt(row.dot(row))

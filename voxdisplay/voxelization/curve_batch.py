@@ -230,20 +230,30 @@ class CurveBatch:
             definition.
 
         """
-        first = samples.bounds[:-1]
-        low = np.minimum.reduceat(samples.points, first, axis=1)
-        high = np.maximum.reduceat(samples.points, first, axis=1)
-        last = samples.bounds[1:] - 1
+        if len(self.curves) == 1:
+            first, last = np.array([0]), np.array([samples.t.size - 1])
+            low, high = (
+                bound(axis=1)[:, None] for bound in (samples.points.min, samples.points.max)
+            )
+        else:
+            first = samples.bounds[:-1]
+            last = samples.bounds[1:] - 1
+            low = np.minimum.reduceat(samples.points, first, axis=1)
+            high = np.maximum.reduceat(samples.points, first, axis=1)
         gap = samples.points.take(first, axis=1) - samples.points.take(last, axis=1)
         is_open = np.abs(gap).max(axis=0) > CLOSURE_TOLERANCE
         is_open |= (high - low).max(axis=0) <= CLOSURE_TOLERANCE  # a point, and no loop
         is_open |= np.array([curve.closed is False for curve in self.curves])
         ends = np.concatenate((first[is_open], last[is_open]))
-        fixed = np.concatenate((ends, self.corners(samples), self._first_corners(samples)))
+        fixed = np.concatenate((ends, self.corners(samples), first[~is_open]))
         points = samples.points.take(fixed, axis=1)
-        on_face = (np.abs(points - np.rint(points)) < ON_FACE).any(axis=0)
+        fixed = fixed[(np.abs(points - np.rint(points)) < ON_FACE).any(axis=0)]
         self._tie_shift = np.full(first.size, TIE_SHIFT / CORE)
-        self._tie_shift[samples.piece[fixed[on_face]]] = 0.0
+        if fixed.size:
+            begins = fixed == first[samples.piece[fixed]]
+            smooth = begins & ~is_open[samples.piece[fixed]]
+            smooth[smooth] = ~self._turns_at_start(samples, fixed[smooth])
+            self._tie_shift[samples.piece[fixed[~smooth]]] = 0.0
         if not self._tie_shift.any():
             return samples
         self._centres = (low + high) / 2
@@ -251,16 +261,16 @@ class CurveBatch:
         points[:, ends] = samples.points.take(ends, axis=1)
         return replace(samples, points=points)
 
-    def _first_corners(self, samples: Samples) -> Ints:
-        """Return the first samples of curves that would turn sharply there if they are closed."""
-        first, last = samples.bounds[:-1], samples.bounds[1:] - 1
-        points = samples.points
-        begin = points.take(np.minimum(first + 1, last), axis=1) - points.take(first, axis=1)
-        end = points.take(last, axis=1) - points.take(np.maximum(last - 1, first), axis=1)
+    def _turns_at_start(self, samples: Samples, first: Ints) -> Bools:
+        """Return which closed curves, by their first samples, turn sharply where they begin."""
+        piece, points = samples.piece[first], samples.points
+        last = samples.bounds[piece + 1] - 1
+        begin = points.take(first + 1, axis=1) - points.take(first, axis=1)
+        end = points.take(last, axis=1) - points.take(last - 1, axis=1)
         length = np.sqrt((begin * begin).sum(axis=0) * (end * end).sum(axis=0))
         turns = (begin * end).sum(axis=0) < MAX_SMOOTH_COSINE * length
-        turns |= np.array([curve.breaks.size > 0 for curve in self.curves])
-        return np.asarray(first[turns])
+        broken = [self.curves[index].breaks.size > 0 for index in piece.tolist()]
+        return np.asarray(turns | np.array(broken, dtype=bool))
 
     def _moved(self, curve: Ints, points: Floats) -> Floats:
         if self._centres is None:

@@ -38,14 +38,16 @@ TINY = float(np.finfo(float).tiny)
 
 def drop_repeats(events: VoxelEvents) -> VoxelEvents:
     """Remove consecutive events of a piece that share a voxel."""
-    same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    return events.take(np.concatenate(([True], ~same))) if same.any() else events
+    return _without_repeats(events)[0]
 
 
-def _last_parameters(events: VoxelEvents) -> Floats:
-    """Return the parameters of the last of consecutive events that share a voxel."""
+def _without_repeats(events: VoxelEvents) -> tuple[VoxelEvents, Floats]:
+    """Return events as `drop_repeats`, and the parameters of the last of those that share each."""
     same = events.joined & (events.voxels[:, 1:] == events.voxels[:, :-1]).all(axis=0)
-    return np.asarray(events.t[np.append(~same, True)])
+    if not same.any():
+        return events, events.t
+    new = ~same
+    return events.take(np.append(True, new)), events.t[np.append(new, True)]
 
 
 @with_kernel
@@ -84,8 +86,7 @@ def thin_events(
     """
     if not events.t.size:
         return events
-    full, thin = events, drop_repeats(events)
-    until = thin.t if thin is full else _last_parameters(full)
+    full, (thin, until) = events, _without_repeats(events)
     starts, stops = _shortcuts(thin, until, samples, keep_tips=keep_tips)
     if starts.size:
         starts, stops = _cheapest(thin, until, samples, starts, stops)
