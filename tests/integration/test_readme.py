@@ -15,8 +15,9 @@ def test_its_python():
     exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own text
 
 
-def test_its_scene_is_the_example():
-    (text,) = re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)
+def test_its_scenes():
+    text, moving = re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)
+    assert vd.read_scene(moving).frame_count == 120
     example = vd.load_scene("examples/paper-curve.json")
     (shown,), (meant,) = vd.read_scene(text).items, example.items
     assert (vd.voxelize(shown.curve).voxels == vd.voxelize(meant.curve).voxels).all()

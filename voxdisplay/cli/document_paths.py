@@ -1,4 +1,4 @@
-"""``voxdisplay protocol`` and ``schema``: paths of the documents installed with the package."""
+"""``voxdisplay protocol`` and ``schema``: paths of documents installed with the package."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _PACKAGE: Final = Path(__file__).resolve().parents[1]
 SCHEMA: Final = _PACKAGE / "scene.schema.json"
 
 
-def protocol_path() -> Path:
-    """Return the path of protocol.md.
+def protocol_path(name: str = "protocol.md") -> Path:
+    """Return the path of protocol.md, or of recording.md.
 
     A wheel installs it in the package; in a checkout it lies beside the package.
 
@@ -24,7 +24,7 @@ def protocol_path() -> Path:
         If the installation lacks it.
 
     """
-    return _existing(_PACKAGE / "protocol.md", _PACKAGE.parent / "protocol.md")
+    return _existing(_PACKAGE / name, _PACKAGE.parent / name)
 
 
 def _existing(*places: Path) -> Path:
@@ -41,11 +41,17 @@ def _existing(*places: Path) -> Path:
     Examples:
       voxdisplay protocol
       less "$(voxdisplay protocol)"
+      less "$(voxdisplay protocol --recording)"
     """
 )
-def protocol() -> None:
+@click.option(
+    "--recording",
+    is_flag=True,
+    help="Of recording.md instead, the description of recordings (.vxs).",
+)
+def protocol(*, recording: bool) -> None:
     """Print the path of protocol.md, the description of the wire for whoever builds a device."""
-    print_stdout(str(protocol_path()))
+    print_stdout(str(protocol_path("recording.md" if recording else "protocol.md")))
 
 
 @click.command(

@@ -35,7 +35,7 @@ _INDEXED: Final = {"diff", "palette"}
     epilog="""\b
     Examples:
       voxdisplay record spin.json -o spin.vxs
-      voxdisplay record spin.json -o spin.vxs --size 64x64x64 --format mono1 --jobs 4
+      voxdisplay record spin.json -o spin.vxs --size 64x64x64 --jobs 4
       voxdisplay record spin.json -o spin.vxs --dask tcp://render:8786 --check 5
       voxdisplay play spin.vxs --port /dev/ttyUSB0
 
