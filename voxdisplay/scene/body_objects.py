@@ -3,7 +3,7 @@
 Descriptions and types of the keys are those of the JSON Schema. Values are checked by the bodies.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, field
 
@@ -45,6 +45,24 @@ class EnclosingObject(BodyObject, kw_only=True, frozen=True):
         Literal["shell", "solid"],
         Meta(title="Fill", description="shell: the surface alone. solid: what it encloses, too."),
     ] = "shell"
+
+
+class Surface(EnclosingObject, tag="surface", frozen=True):
+    """A surface given by three expressions of u and v."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
+
+    x: Annotated[BodyFormula, Meta(title="x of u and v", description="In voxels.")]
+    y: Annotated[BodyFormula, Meta(title="y of u and v", description="In voxels.")]
+    z: Annotated[BodyFormula, Meta(title="z of u and v", description="In voxels.")]
+    u: Annotated[Range, Meta(title="Range of u", description="First and last value of u.")]
+    v: Annotated[Range, Meta(title="Range of v", description="First and last value of v.")]
+
+    def build_body(self, context: EvaluationContext) -> Body:
+        """Return the body."""
+        x, y, z = (context.formula(key, getattr(self, key), ("u", "v")) for key in ("x", "y", "z"))
+        u, v = context.pair("u", self.u), context.pair("v", self.v)
+        return bodies.Surface(x, y, z, u=u, v=v, fill=self.fill)
 
 
 class HeightField(BodyObject, tag="height_field", frozen=True):

@@ -21,6 +21,7 @@ from voxdisplay.scene.body_objects import (
     Scatter,
     Sphere,
     SphericalTriangle,
+    Surface,
     Triangle,
 )
 from voxdisplay.scene.curve_objects import (
@@ -71,6 +72,7 @@ Object = (
     | BSpline
     | CatmullRom
     | Points
+    | Surface
     | HeightField
     | Implicit
     | Plane

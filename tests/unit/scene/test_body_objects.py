@@ -20,6 +20,8 @@ CORNERS = [[1.5, 1.5, 1.5], [7.5, 1.5, 1.5], [1.5, 7.5, 1.5], [1.5, 1.5, 7.5]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
 BODIES: list[dict[str, Any]] = [
+    {"type": "surface", "x": "8 + 4*cos(u)", "y": "8 + 4*sin(u)", "z": "v", "u": [0, 6],
+     "v": [3, 9]},
     {"type": "height_field", "z": "x + y/2", "x": [0, 9], "y": [0, 5]},
     {"type": "implicit", "f": "(x-8)**2 + (y-8)**2 + (z-8)**2 - 36"},
     {"type": "plane", "point": C, "normal": [1, 1, 0]},
@@ -111,6 +113,16 @@ class TestMistakes:
             ({"type": "ellipsoid", "center": C}, "", "either the key 'radii' or 'radius'"),
             ({"type": "ellipsoid", "center": C, "radii": [1, 2, 0]}, ".radii[2]", "positive"),
             ({"type": "plane", "point": C, "normal": [0, 0, 0]}, ".normal", "normal"),
+            (
+                {"type": "surface", "x": "u", "y": "v", "z": "t", "u": [0, 1], "v": [0, 1]},
+                ".z",
+                "'t'",
+            ),
+            (
+                {"type": "surface", "x": "u", "y": "v", "z": 1, "u": [1, 0], "v": [0, 1]},
+                ".u",
+                "backwards",
+            ),
             ({"type": "implicit", "f": "x + q"}, ".f", "unknown name 'q'"),
             ({"type": "implicit", "f": "t"}, ".f", "'t'"),
             ({"type": "height_field", "z": "z", "x": [0, 1], "y": [0, 1]}, ".z", "'z'"),
