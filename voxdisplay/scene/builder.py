@@ -177,6 +177,7 @@ class _Run:
         self.items: list[SceneItem] = []
         self.spans: list[PartSpan] = []
         self._count = 0
+        self._copies = 1  # of the object that is added now, by all repeats around it
         self.notes: list[str] = []
 
     def add(
@@ -211,13 +212,16 @@ class _Run:
             count = context.number(name, source)
             if not (count.is_integer() and count >= 0):
                 raise context.error(name, f"must be a whole number, 0 or more, not {count:g}")
-            if count * total > MAX_ITEMS:
-                problem = f"{count * total:g} objects are more than {MAX_ITEMS}"
+            if count * total * self._copies > MAX_ITEMS:
+                problem = f"{count * total * self._copies:g} objects are more than {MAX_ITEMS}"
                 raise context.error(name, problem)
             counts.append(int(count))
             total *= int(count)
+        before = self._copies
+        self._copies *= total
         for each in product(*map(range, counts)):
             yield dict(zip(repeat, map(float, each), strict=True))
+        self._copies = before
 
     @staticmethod
     def _varies(name: str, environment: Environment) -> bool:

@@ -129,13 +129,20 @@ class TestRepeat:
         scene_object: dict[str, Any] = LINE | {"from": ["a + b", 2, 3], "repeat": {"c": 1000}}
         for name in "ab":
             scene_object = {"type": "group", "objects": [scene_object], "repeat": {name: 1000}}
-        assert "more than 100000 objects" in str(refused(scene_object))
+        error = refused(scene_object)
+        assert "1e+06 objects are more than 100000" in str(error), "before any is made"
+        assert error.path == "$.objects[0].objects[0].repeat.a"
+
+    def test_objects_of_repeats_side_by_side_are_counted(self) -> None:
+        inner = [LINE | {"repeat": {"i": 300}}, LINE | {"repeat": {"i": 300}}]
+        group = {"type": "group", "objects": inner, "repeat": {"k": 200}}
+        assert "the scene has more than 100000 objects" in str(refused(group))
 
     def test_empty_groups_are_bounded(self) -> None:
         scene_object: dict[str, Any] = {"type": "group", "objects": []}
         for name in "abc":
             scene_object = {"type": "group", "objects": [scene_object], "repeat": {name: 1000}}
-        assert "more than 100000 objects" in str(refused(scene_object))
+        assert "objects are more than 100000" in str(refused(scene_object))
 
 
 class TestGroup:
