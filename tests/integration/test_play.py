@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,6 +97,28 @@ def test_a_show_that_cannot_be_sent_is_prepared_by_the_player(display):
     show.key = lambda: 0  # does not pickle
     report = display.play(show)
     assert report.shown + report.dropped == 20
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks Linux")
+def test_that_process_ends_when_the_player_is_killed(emulator, tmp_path):
+    port, log = emulator("--pty", "--size", "16x16x16").port, tmp_path / "log"
+    code = (
+        f"import sys; sys.path.insert(0, {str(ROOT / 'tests')!r})\n"
+        "import slow_shows, voxdisplay as vd\n"
+        f"vd.open({port!r}).play(slow_shows.SlowShow(log={str(log)!r}), loop=True)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code]) as player:
+        eventually(lambda: len(processes_of(log)) == 2, "a process beside the player")
+        player.kill()
+    worker = processes_of(log)[1]
+
+    def has_ended():
+        try:
+            return Path(f"/proc/{worker}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+
+    eventually(has_ended, "the end of the process beside it")
 
 
 # -- the command

@@ -61,3 +61,9 @@ def test_the_table_of_scale_runs():
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     for row in ("\n32^3 mono1 ", "\n48^3 rgb888 ", "\nmoving, spread "):
         assert row in run.stdout
+
+
+def test_the_table_of_playing_runs():
+    command = [sys.executable, str(BENCH), "play", "--quick"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.count("\n") == 2 + 3 * 4
