@@ -78,7 +78,7 @@ def model_options(function: _C) -> _C:
 
 def is_model(path: str) -> bool:
     """Return whether a path is that of a mesh, volume or voxel model, by its name."""
-    from voxdisplay.files.loading import suffix_of  # noqa: PLC0415 - help starts fast
+    from voxdisplay.files.suffixes import suffix_of  # noqa: PLC0415 - help starts fast
 
     return path != "-" and (suffix_of(path) is not None or Path(path).is_dir())
 

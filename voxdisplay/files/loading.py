@@ -20,16 +20,11 @@ from voxdisplay.errors import BodyError
 from voxdisplay.files.array_files import read_npy, read_npz, read_raw, samples_of
 from voxdisplay.files.contained_files import path_inside, read_file, short_name
 from voxdisplay.files.contents import ModelVoxels, VolumeSamples
-from voxdisplay.files.mesh_files import KINDS, UP, read_mesh
+from voxdisplay.files.mesh_files import UP, read_mesh
+from voxdisplay.files.suffixes import MESH_KINDS, SUFFIXES, suffix_of
 from voxdisplay.raster.color import Color
 
 Up = Literal["y", "z"]
-
-MESHES = tuple(KINDS)
-VOLUMES = (".npy", ".npz", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".tif", ".tiff", ".dcm", ".raw")
-VOXEL_MODELS = (".vox", ".qb", ".kv6", ".binvox")
-SUFFIXES = (*MESHES, *VOLUMES, *VOXEL_MODELS)
-"""Ends of the names of files that `load_body` reads, in lower case."""
 
 _MAX_SERIES = 1 << 13
 _UP_Y = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=np.float64)
@@ -50,12 +45,6 @@ class LoadedBody:
 
     body: Body
     notes: tuple[str, ...] = ()
-
-
-def suffix_of(name: str | os.PathLike[str]) -> str | None:
-    """Return the suffix of `SUFFIXES` with which a file's name ends; None if with none."""
-    lower = str(name).lower()
-    return max((each for each in SUFFIXES if lower.endswith(each)), key=len, default=None)
 
 
 def load_body(
@@ -108,8 +97,8 @@ def load_body(
     if suffix is None:
         known = ", ".join(SUFFIXES)
         raise BodyError(f"{name} is no mesh, volume or voxel model: their names end in {known}")
-    if suffix in MESHES:
-        kind = KINDS[suffix]
+    if suffix in MESH_KINDS:
+        kind = MESH_KINDS[suffix]
         body, notes = read_mesh(name, kind, read_file(place), place.parent, fill=fill)
         turn = (up or UP.get(kind, "z")) == "y"
         if up is None and kind not in UP:

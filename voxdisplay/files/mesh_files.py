@@ -21,10 +21,6 @@ from voxdisplay.files.contained_files import path_inside, read_file
 from voxdisplay.files.library_calls import guarded
 from voxdisplay.files.mesh_checks import check, check_uri
 
-KINDS = {".stl": "stl", ".ply": "ply", ".off": "off", ".obj": "obj", ".glb": "glb",
-         ".gltf": "gltf", ".3mf": "3mf"}  # fmt: skip
-"""Kinds of mesh files by their suffixes."""
-
 UP = {"glb": "y", "gltf": "y", "stl": "z", "3mf": "z"}
 """Axis that is up by convention; formats that are not here have none."""
 
@@ -113,7 +109,7 @@ def read_mesh(
     name : str
         Of the file, for errors.
     kind : str
-        One of `KINDS`.
+        One of `MESH_KINDS`.
     data : bytes
     folder : Path or None
         Where materials, textures and buffers are that the file names; without it there are none.

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import voxdisplay as vd
-from voxdisplay.files.loading import SUFFIXES
+from voxdisplay.files.suffixes import SUFFIXES
 from voxdisplay.files.writing import WRITERS
 from voxdisplay.raster.color_map import BUILT_IN
 
@@ -31,3 +31,9 @@ def test_it_names_every_format_and_map():
 def test_the_package_has_what_it_names():
     for name in re.findall(r"`vd\.files\.(\w+)", TEXT):
         assert callable(getattr(vd.files, name))
+
+
+def test_every_name_of_the_package_has_its_module():
+    assert sorted(vd.files._MODULES) == sorted(vd.files.__all__)
+    for name in vd.files.__all__:
+        assert getattr(vd.files, name)
