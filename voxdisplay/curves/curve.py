@@ -53,6 +53,8 @@ class Curve(ABC):
         # evaluator of the formula it replaced: they would prove another curve.
         owners = {name: owner for owner in reversed(cls.__mro__) for name in vars(owner)}
         order = cls.__mro__.index
+        if isinstance(vars(cls).get("breaks"), list | tuple):
+            cls.breaks = np.array(vars(cls)["breaks"], dtype=np.float64)  # type: ignore[assignment]
         for name in _OF_THE_FORMULA:
             if order(owners["position"]) < order(owners[name]):
                 setattr(cls, name, vars(Curve)[name])

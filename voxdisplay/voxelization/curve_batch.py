@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.curves.batch_evaluation import BatchEvaluator
 from voxdisplay.curves.curve import NO_BREAKS, Curve
+from voxdisplay.curves.short_repr import short_repr
 from voxdisplay.curves.singular_points import complete, singular_points
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns
@@ -100,8 +101,11 @@ class CurveBatch:
     def __init__(self, curves: Iterable[Curve], number: int | None = None) -> None:
         self.curves = list(curves)
         self._number = number
-        ends = chain.from_iterable([curve.t_range for curve in self.curves])
-        ranges = np.fromiter(ends, dtype=float).reshape(-1, 2)
+        try:
+            ends = chain.from_iterable([curve.t_range for curve in self.curves])
+            ranges = np.fromiter(ends, dtype=float).reshape(len(self.curves), 2)
+        except (TypeError, ValueError):
+            raise self._range_error() from None
         self.first, self.last = ranges.T
         with np.errstate(all="ignore"):
             length = self.last - self.first  # which may be too long for a number
@@ -121,6 +125,19 @@ class CurveBatch:
         self._tie_shift = np.empty(0)
         # Parameters nearer to each other than this may be equal floats somewhere in the range.
         self.resolution = 2 * np.spacing(np.abs(ranges).max(axis=1))
+
+    def _range_error(self) -> CurveError:
+        """Return the error for the first curve whose range is not two numbers."""
+        index = 0
+        for index, curve in enumerate(self.curves):  # noqa: B007 - of the first that fails
+            try:
+                _, _ = map(float, curve.t_range)
+            except (TypeError, ValueError):
+                break
+        found = short_repr(self.curves[index].t_range)
+        return CurveError(
+            f"{self.message_prefix(index)}t_range must be two numbers, (first, last), not {found}"
+        )
 
     def _complete(self, index: int, curve: Curve, also: Iterable[float] = ()) -> Curve:
         try:

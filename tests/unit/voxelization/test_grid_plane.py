@@ -266,6 +266,22 @@ def test_bad_ranges_are_refused(t_range: tuple[float, float]) -> None:
         voxelize(Function(lambda t: (t, t, t), *t_range))
 
 
+@pytest.mark.parametrize("t_range", [(0,), "ab", None, (0, 1, 2)])
+def test_ranges_that_are_not_two_numbers_are_named(t_range: object) -> None:
+    curve = Function(lambda t: (t, t, t))
+    curve.t_range = t_range
+    with pytest.raises(CurveError, match="t_range must be two numbers"):
+        voxelize(curve)
+
+
+def test_breaks_may_be_a_list() -> None:
+    class Bent(Function):
+        breaks = [0.25, 0.5]  # noqa: RUF012 - as people write it
+
+    curve = Bent(lambda t: (9 * t, np.abs(t - 0.5), 0.0))
+    assert np.array_equal(voxelize(curve).voxels[0], [0, 0, 0])
+
+
 def test_a_batch_says_which_curve_is_wrong() -> None:
     good, bad = Function(lambda t: (t, t, t)), Function(lambda t: (t, np.log(t), t))
     with pytest.raises(CurveError, match=r"curve 2: y = -inf at t = 0\.0"):
