@@ -52,6 +52,8 @@ class TriangleMesh(Geometry):
         Index of each triangle's texture, -1 for none. Without it all take the first.
     notes : tuple of str
         What was wrong with the body or left out, for people.
+    is_sheet : bool
+        Whether it may have a boundary, and no outside, without anything being wrong.
 
     """
 
@@ -64,6 +66,7 @@ class TriangleMesh(Geometry):
     textures: tuple[NDArray[np.uint8], ...] = ()
     face_textures: Ints | None = None
     notes: tuple[str, ...] = ()
+    is_sheet: bool = False
 
     def transformed(self, matrix: Floats, offset: Floats) -> TriangleMesh:
         """Return the transformed mesh; a map that mirrors turns the triangles round."""

@@ -11,11 +11,15 @@ import numpy as np
 from voxdisplay.bodies.body import Body, TransformedBody, invertible
 from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds, Geometry
+from voxdisplay.bodies.surface import SurfaceBody
+from voxdisplay.bodies.tessellation import Enclosure
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.formula_arguments import Bounds as Range
 from voxdisplay.curves.formula_arguments import Formula, parse_range
 from voxdisplay.errors import BodyError
+from voxdisplay.expressions.gradient import gradient_enclosure
+from voxdisplay.expressions.interval import Interval, interval
 from voxdisplay.expressions.params import resolve_params
 
 if TYPE_CHECKING:
@@ -103,6 +107,28 @@ class HeightField(Body):
         return HeightFunction(self.function, low, high)
 
     def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:
-        """Return the body under an affine map: `Body.transformed`."""
-        by = invertible("matrix", matrix)
-        return TransformedBody(self, by, arguments.vector("offset", offset))
+        """Return the body under an affine map, a surface if it is turned: `Body.transformed`."""
+        by, move = invertible("matrix", matrix), arguments.vector("offset", offset)
+        if (by == np.diag(np.diag(by))).all():
+            return TransformedBody(self, by, move)
+        shown = {"surface": self}
+        ranges = self.x_range, self.y_range
+        surface = SurfaceBody(_OfHeights(self.function), *ranges, fill="shell", shown=shown)
+        return surface.transformed(by, move)
+
+
+class _OfHeights:
+    """A height field as a `SurfaceFunction` of u = x and v = y."""
+
+    def __init__(self, function: ScalarFunction) -> None:
+        self._function = function
+
+    def __call__(self, u: Floats, v: Floats, /) -> Floats:
+        return np.stack((u, v, self._function(u, v)))
+
+    def enclosure(self, u: Interval, v: Interval, /) -> Enclosure | None:
+        if self._function.expression is None:
+            return None
+        height, (by_u, by_v) = gradient_enclosure(self._function.expression, u, v)
+        zero, one = interval(0.0), interval(1.0)
+        return Enclosure((u, v, height), (one, zero, by_u), (zero, one, by_v))

@@ -71,6 +71,8 @@ class SurfaceBody(Body):
 
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> TriangleMesh:
         """Return triangles within the tolerance of the surface: `Body.geometry`."""
+        if self.fill == "solid":  # what is below and above the box counts
+            bounds = np.full(3, -np.inf), np.full(3, np.inf)
         try:
             found = tessellate(
                 self._function, self.u_range, self.v_range, bounds, certified=certified
@@ -79,7 +81,11 @@ class SurfaceBody(Body):
             raise BodyError(f"{self}: {error}", hint=error.hint) from None
         u, v = found.parameters.T
         return TriangleMesh(
-            found.vertices, found.faces, {"u": u.copy(), "v": v.copy()}, notes=found.notes
+            found.vertices,
+            found.faces,
+            {"u": u.copy(), "v": v.copy()},
+            notes=found.notes,
+            is_sheet=True,
         )
 
     def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:

@@ -9,6 +9,8 @@ import pytest
 from voxdisplay.bodies.geometry import TriangleMesh
 from voxdisplay.bodies.surface import Surface
 from voxdisplay.errors import BodyError, CurveError
+from voxdisplay.voxelization.body_voxelization import voxelize_body
+from voxdisplay.voxelization.voxel_box import VoxelBox
 
 BOX = np.zeros(3), np.full(3, 40.0)
 TURN, HALF = (0, "tau"), ("-pi/2", "pi/2")
@@ -139,3 +141,18 @@ def test_wrong_arguments_are_named() -> None:
         Surface("u", "v", u=(0, 1), v=(0, 1))
     with pytest.raises(BodyError, match="the surface returned shape"):
         triangles_of(Surface(lambda u, v: np.stack((u, v)), u=(0, 1), v=(0, 1)))
+
+
+def test_solids_are_filled_where_the_box_cuts_them_and_sheets_have_no_notes() -> None:
+    ball = Surface(*SPHERE, u=TURN, v=HALF, fill="solid")
+    whole = voxelize_body(ball, VoxelBox.of_grid((40, 40, 40)))
+    cut = voxelize_body(ball, VoxelBox((0, 0, 12), (40, 40, 22)))
+    inside = whole.voxels[(whole.voxels[:, 2] >= 12) & (whole.voxels[:, 2] < 22)]
+    assert cut.voxels.tolist() == inside.tolist()
+    x, y, z = np.indices((40, 40, 40)).reshape(3, -1) + 0.5
+    apart = np.sqrt((x - 20) ** 2 + (y - 20) ** 2 + (z - 20) ** 2)
+    assert (apart < 14.97).sum() <= len(whole) <= (apart <= 15).sum()
+    sheet = voxelize_body(Surface(*MOEBIUS, u=TURN, v=(-4, 4)), VoxelBox.of_grid((40, 40, 40)))
+    assert sheet.notes == ()
+    assert sheet.parameters["v"].min() < -3.5
+    assert len(sheet.parameters["u"]) == len(sheet)

@@ -38,7 +38,9 @@ def voxelize_mesh(
     mesh = snap(geometry, box)
     kernel_backend.enable_if_worthwhile(len(mesh.faces))
     topology = analyse(mesh)
-    notes = list(_topology_notes(topology))
+    # A sheet has a boundary, and maybe no outside, by its nature; only a solid needs them.
+    said = body.kind == "solid" or not geometry.is_sheet
+    notes = list(_topology_notes(topology)) if said else []
     solid = body.kind == "solid"
     samples = None
     if not solid or has_attributes(geometry):

@@ -103,6 +103,23 @@ def test_scaled_and_moved_along_the_axes_it_stays_a_height_field() -> None:
     assert (lit(moved) == lit(same)).all()
 
 
+def test_turned_it_is_a_surface() -> None:
+    body = HeightField("5 + sin(x)*y/9", x=(1, 8), y=(2, 9))
+    turn = np.eye(3)[[2, 0, 1]]
+    for certified in (False, True):
+        found = voxelize_body(
+            body.transformed(turn), VoxelBox.of_grid((13, 13, 13)), certified=certified
+        )
+        assert found.notes == ()
+        x, y, z = (found.voxels + 0.5).T
+        on = (y > 1) & (y < 8) & (z > 2) & (z < 9)
+        assert on.sum() > 40
+        assert np.abs(x - 5 - np.sin(y) * z / 9)[on].max() <= 0.9  # along x, of a slanted one
+    with_z = mask(found.voxels, (13, 13, 13)).transpose(1, 0, 2)
+    upright = lit(body, (13, 13, 13))
+    assert with_z.sum() == pytest.approx(upright.sum(), rel=0.05)
+
+
 def test_reversed_and_empty_ranges_are_errors() -> None:
     for x, words in (((3, 1), "x runs backwards"), ((2, 2), "x is empty")):
         with pytest.raises(CurveError, match=words):
