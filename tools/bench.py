@@ -1,11 +1,11 @@
 """Benchmarks of the project: medians and ratios of one run, printed as one table.
 
 ``push`` times a frame stage by stage, over a pty to an emulator in its own process; ``cold`` the
-command from a cold start; ``curves`` voxelisation beside other methods; ``link`` the encoders
-beside other codings; ``view`` pictures and the live view; ``ports`` each kind of port beside the
-bare pipe below it; ``stream`` how busy streaming keeps a line; ``goodput`` what bit errors leave
-of one; ``scale`` time and memory by the size of the volume and by what is lit; ``play`` how evenly
-shows play by line rate. Each of these is a module in `benchmarks`.
+command from a cold start; ``curves`` voxelisation beside other methods; ``bodies`` that of meshes;
+``link`` the encoders beside other codings; ``view`` pictures and the live view; ``ports`` each kind
+of port beside the bare pipe below it; ``stream`` how busy streaming keeps a line; ``goodput`` what
+bit errors leave of one; ``scale`` time and memory by the size of the volume and by what is lit;
+``play`` how evenly shows play by line rate. Each of these is a module in `benchmarks`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from benchmarks.bodies import bench_bodies
 from benchmarks.curves import bench_curves
 from benchmarks.goodput import bench_goodput
 from benchmarks.link import bench_link
@@ -231,6 +232,7 @@ def bench_views(repeats: int, *, quick: bool) -> None:
 
 
 TABLES = {
+    "bodies": bench_bodies,
     "curves": bench_curves,
     "link": bench_link,
     "view": bench_views,

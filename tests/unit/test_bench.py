@@ -14,6 +14,12 @@ def test_the_table_of_curves_runs():
     assert "bytes a voxel" in run.stdout
 
 
+def test_the_table_of_bodies_runs():
+    command = [sys.executable, str(BENCH), "bodies", "--quick", "--repeats", "1"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.count("shell  this") == run.stdout.count("solid  this") == 1
+
+
 def test_the_table_of_pictures_runs():
     command = [sys.executable, str(BENCH), "view", "--quick", "--repeats", "1"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
