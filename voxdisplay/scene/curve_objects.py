@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta, field
 
-from voxdisplay import curves
+from voxdisplay import bodies, curves
 from voxdisplay.bodies import Body
 from voxdisplay.errors import CurveError
 from voxdisplay.scene.evaluation_context import EvaluationContext
@@ -31,9 +31,24 @@ class CurveObject(SceneObject, kw_only=True, frozen=True):
         ),
     ] = None
 
+    thickness: Annotated[
+        Number | None,
+        Meta(
+            title="Thickness",
+            description="Diameter of a solid tube that is shown in place of the thin curve, in "
+            "voxels.",
+        ),
+    ] = None
+
     def build(self, context: EvaluationContext) -> list[curves.Curve | Body]:
-        """Return the curves: `SceneObject.build`."""
-        return list(self.build_curves(context))
+        """Return the curves, or solid tubes about them: `SceneObject.build`."""
+        found = self.build_curves(context)
+        if self.thickness is None:
+            return list(found)
+        radius = context.number("thickness", self.thickness) / 2
+        if radius <= 0:
+            raise context.error("thickness", f"must be positive, not {2 * radius:g}")
+        return [bodies.Tube(curve, radius, fill="solid") for curve in found]
 
     def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
         """Return the object's curves; raise SceneError or CurveError."""
@@ -340,3 +355,21 @@ class Points(CurveObject, tag="points", frozen=True):
                 {name: each[i] for name, each in values.items()} for i in range(len(strands))
             ]
         return [curves.Points(strand, closed=self.closed) for strand in strands]
+
+
+AnyCurve = (
+    Parametric
+    | Segment
+    | Polyline
+    | Arc
+    | Circle
+    | Ellipse
+    | Helix
+    | Lissajous
+    | TorusKnot
+    | Bezier
+    | BSpline
+    | CatmullRom
+    | Points
+)
+"""An object of any curve type."""

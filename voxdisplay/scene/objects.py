@@ -41,6 +41,7 @@ from voxdisplay.scene.curve_objects import (
 )
 from voxdisplay.scene.model_objects import Mesh, Text, Volume
 from voxdisplay.scene.scene_object import SceneObject
+from voxdisplay.scene.tube_objects import Torus, Tube
 from voxdisplay.scene.values import Number, Param, Size
 
 
@@ -85,6 +86,8 @@ Object = (
     | Box
     | Cylinder
     | Cone
+    | Torus
+    | Tube
     | Mesh
     | Volume
     | Text

@@ -19,6 +19,8 @@ C = [8, 9, 10]
 CORNERS = [[1.5, 1.5, 1.5], [7.5, 1.5, 1.5], [1.5, 7.5, 1.5], [1.5, 1.5, 7.5]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
+LINE = {"type": "segment", "from": [4, 4, 4], "to": [9, 4, 4]}
+
 BODIES: list[dict[str, Any]] = [
     {"type": "surface", "x": "8 + 4*cos(u)", "y": "8 + 4*sin(u)", "z": "v", "u": [0, 6],
      "v": [3, 9]},
@@ -35,6 +37,9 @@ BODIES: list[dict[str, Any]] = [
     {"type": "box", "from": [1, 2, 3], "to": [7, 8, 9]},
     {"type": "cylinder", "from": [4, 4, 2], "to": [4, 4, 9], "radius": 3},
     {"type": "cone", "from": [4, 4, 2], "to": [4, 4, 9], "radius": 3},
+    {"type": "torus", "center": C, "major": 5, "minor": 2, "normal": [0, 1, 1]},
+    {"type": "tube", "along": {"type": "segment", "from": [4, 4, 4], "to": [9, 9, 9]},
+     "radius": "2 + t"},
     {"type": "scatter", "points": [[1, 2, 3], [4, 5, 6]]},
     {"type": "mesh", "vertices": CORNERS, "faces": FACES},
     {"type": "text", "text": "Ab", "at": [1, 2, 3], "height": 8},
@@ -98,6 +103,19 @@ class TestEveryType:
         assert frame.draw(scene_of(scene_object)).voxels >= len(voxels_of(scene_object))
 
 
+def test_a_thick_curve_is_a_solid_tube() -> None:
+    tube = {"type": "tube", "along": LINE, "radius": 2, "fill": "solid"}
+    assert voxels_of(LINE | {"thickness": "2*2"}) == voxels_of(tube)
+    (item,) = scene_of(LINE | {"thickness": 4}).items
+    assert item.type == "segment"
+
+
+def test_the_curve_in_a_tube_may_be_turned() -> None:
+    turned = LINE | {"transform": [{"translate": [1, 2, 3]}]}
+    moved = {"type": "tube", "along": LINE, "radius": 2, "transform": turned["transform"]}
+    assert voxels_of({"type": "tube", "along": turned, "radius": 2}) == voxels_of(moved)
+
+
 def test_every_type_is_tried() -> None:
     curves = {name for name, kind in reader.TYPES.items() if "closed" in kind.__struct_fields__}
     tried = {each["type"] for each in BODIES} | FROM_FILES | {"group"} | curves
@@ -129,6 +147,21 @@ class TestMistakes:
             ({"type": "height_field", "z": "x", "x": [1, 0], "y": [0, 1]}, ".x", "backwards"),
             ({"type": "triangle", "points": CORNERS}, ".points", "three points"),
             ({"type": "polygon", "points": CORNERS}, ".points[", "away from the plane"),
+            ({"type": "torus", "center": C, "major": 5, "minor": 0}, ".minor", "positive"),
+            ({"type": "tube", "along": {"type": "sphere"}, "radius": 1}, ".along.type", "'sphere'"),
+            (
+                {"type": "tube", "along": LINE | {"color": "red"}, "radius": 1},
+                ".along.color",
+                "tube",
+            ),
+            (
+                {"type": "tube", "along": LINE | {"to": [1, 2, "q"]}, "radius": 1},
+                ".along.to[2]",
+                "'q'",
+            ),
+            ({"type": "tube", "along": LINE, "radius": "u"}, ".radius", "'u'"),
+            ({"type": "tube", "along": LINE, "radius": -1}, ".radius", "positive"),
+            (LINE | {"thickness": 0}, ".thickness", "positive"),
             ({"type": "scatter"}, "", "either the key 'points' or the key 'file'"),
             ({"type": "scatter", "points": [[1, 2, 3]], "gaps": "split"}, "", "'gaps'"),
             ({"type": "mesh"}, "", "needs the key 'file', or both"),
