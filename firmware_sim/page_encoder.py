@@ -84,9 +84,8 @@ class _PixelReader:
 
     def stretch(self) -> tuple[bytes, bool, int]:
         """Return the next pixel, whether it is dark, and the number of equal ones from it on."""
+        # It is in the window: a stretch that ends with the window has loaded the next one.
         at, size = self.at, self._size
-        if at == self._stop:
-            self._load(at, self.end)
         offset = (at - self._start) * size
         pixel = self._window[offset : offset + size]
         lit = any(pixel)
