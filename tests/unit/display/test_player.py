@@ -165,6 +165,7 @@ def test_a_loop_does_not_show_its_first_frame_twice():
     wanted = [show.frame(number % 4).digest() for number in range(stop_at)]
     assert [digest for digest, _ in watched.changes][:stop_at] == wanted
     assert set(watched.intervals()[: stop_at - 1]) == {2}
+    watched.display.close()
 
 
 @pytest.mark.parametrize("clock", ["device", "host"])
