@@ -105,6 +105,7 @@ CALLS = {
     "TorusKnot": {"p": 2, "q": 3, "center": (5, 5, 5), "major": 3, "minor": 1},
     "Frame": {"grid": (3, 5, 7), "format": "index8", "palette": None, "own_palette": False},
     "load_scene": {"path": "nowhere.json"},
+    "load_show": {"path": "nowhere.json"},
     "read_scene": {"data": SCENE, "folder": None},
     "volume_pixels": {"array": np.ones((3, 5, 7)), "window": (0, 1), "threshold": 0.5,
                       "map": "magma", "grid": (3, 5, 7), "spacing": (1, 1, 2),
@@ -124,6 +125,7 @@ CALLS = {
     "OpenError": {"message": "what", "port": "/dev/x", "hint": "do"},
     "ProtocolError": {"message": "what", "hint": "do"},
     "RemoteProtocolError": {"message": "what", "section": "7", "offset": 3, "raw": b""},
+    "RecordingError": {"message": "what", "hint": "do"},
     "SceneError": {"message": "what", "path": "$.x", "hint": "do"},
     "TransportClosed": {"message": "what", "hint": "do"},
     "TransportError": {"message": "what", "hint": "do"},
@@ -137,8 +139,8 @@ CALLS = {
     "VoxDisplayError": {"message": "what", "hint": "do"},
 }  # fmt: skip
 # Made by the package, plain records, an enumeration, or abstract: users do not call them.
-RECORDS = {"Body", "Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "Receipt",
-           "Report", "Scene", "Sequence", "VoxelSet"}  # fmt: skip
+RECORDS = {"Body", "Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "PlayReport",
+           "Receipt", "Recording", "Report", "Scene", "Sequence", "VoxelSet"}  # fmt: skip
 CALLS["Segment"] = dict(zip(inspect.signature(vd.Segment).parameters, POINTS, strict=False))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.errors import RecordingError, SceneError
 from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.model import Scene
@@ -35,6 +36,8 @@ def load_show(path: str | os.PathLike[str]) -> Playable:
         wrong are left out, and stand in `Playlist.notes`.
 
     """
+    if not isinstance(path, str | os.PathLike):
+        raise wrong_kind("path", "a str or path", path)
     data = None if str(path) == "-" else _playlist_data(Path(path))
     if data is None:
         return _load_one(path)
