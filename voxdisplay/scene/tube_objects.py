@@ -3,7 +3,7 @@
 Descriptions and types of the keys are those of the JSON Schema. Values are checked by the bodies.
 """
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from msgspec import Meta
 
@@ -46,8 +46,6 @@ class Torus(EnclosingObject, tag="torus", frozen=True):
 
 class Tube(EnclosingObject, tag="tube", frozen=True):
     """All that is within a radius of a curve."""
-
-    value_names: ClassVar[tuple[str, ...]] = ("t",)
 
     along: Annotated[
         AnyCurve,
