@@ -146,6 +146,10 @@ class SceneBuilder:
         table.touched |= before
         return value
 
+    def keeps(self, key: tuple[Any, ...], environment: Environment) -> bool:
+        """Return whether `once` has kept a value."""
+        return (*key, id(environment)) in self._kept
+
     def placement(self, key: tuple[Any, ...], outer: Placement | None, own: Placement) -> Placement:
         """Return the map ``own``, then ``outer``: the same object as before for the same two."""
         if outer is None:
@@ -295,16 +299,15 @@ class _Run:
             coloring = color
         else:
             names = scene_object.value_names
-            if context.wanted_columns and columns:
+            if columns:
                 names += tuple(columns[0])
             coloring = self._coloring(scene_object, context, color, names)
         if len(self.items) + len(shapes) > MAX_ITEMS:
             raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
+        stays = environment.varies and builder.keeps((path, "shapes"), environment)
         for i, shape in enumerate(shapes):
             parts = (shape, place, coloring)
-            item = (
-                builder.kept_item((path, i, id(environment)), parts) if environment.varies else None
-            )
+            item = builder.kept_item((path, i, id(environment)), parts) if stays else None
             if item is None:
                 image = shape
                 if place is not None:
@@ -322,7 +325,7 @@ class _Run:
                     columns[i] if columns else None,
                     self.fit,
                 )
-                if environment.varies:
+                if stays:
                     builder.keep_item((path, i, id(environment)), parts, item)
             self.items.append(item)
 

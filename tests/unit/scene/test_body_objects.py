@@ -255,6 +255,13 @@ class TestFiles:
         reds = [int(frame.array()[z, y, x, 0]) for x, y, z in ([1, 2, 3], [4, 5, 6], [7, 8, 9])]
         assert reds == [5, 9, 0]
 
+    def test_columns_in_a_moving_scene(self, folder: Path) -> None:
+        color = {"map": ["black", "white"], "by": "heat*(1 + time)", "range": [0, 255]}
+        points = {"type": "points", "file": "p.csv", "color": color}
+        scene = self.load(folder, points, size=[9, 9, 11], duration=2)
+        show = scene.show_on(vd.Frame((9, 9, 11)))
+        assert [show.frame(n).array()[3, 2, 1, 0] for n in (0, 30, 59)] == [5, 10, 15]
+
     def test_a_column_that_is_not_there(self, folder: Path) -> None:
         color = {"map": "gray", "by": "hat"}
         with pytest.raises(SceneError, match="unknown name 'hat'") as caught:
