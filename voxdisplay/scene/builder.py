@@ -311,8 +311,10 @@ class _Run:
             if item is None:
                 image = shape
                 if place is not None:
-                    with as_scene_error(path):
+                    try:
                         found = placed(shape, place)
+                    except (CurveError, BodyError) as error:
+                        raise SceneError(str(error), path=path, hint=error.hint) from error
                     if found is None:  # nothing is left of it
                         continue
                     image = found

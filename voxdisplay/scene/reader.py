@@ -150,7 +150,8 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
     if not isinstance(raw, dict):
         hint = _MANY_OBJECTS if isinstance(raw, list) else None
         raise SceneError(f"a scene is an object {{...}}, not {describe_value(raw)}", hint=hint)
-    if "objects" not in raw and ("type" in raw or _has_key_like("type", raw)):
+    is_group = raw.get("type") == "group"
+    if is_group or ("objects" not in raw and ("type" in raw or _has_key_like("type", raw))):
         if not isinstance(raw.pop("$schema", ""), str):
             raise SceneError("expected text in double quotes", path="$.$schema")
         scene_object: SceneObject = _convert(raw, Object, source)
@@ -238,8 +239,13 @@ def _convert(raw: Any, kind: Any, source: JsonText) -> Any:
     """Make Structs of plain JSON values."""
     try:
         return msgspec.convert(raw, kind)
+    except RecursionError:
+        raise SceneError("the file is nested too deeply", path="") from None
     except msgspec.ValidationError:
-        found = find_mismatch(raw, kind)
+        try:
+            found = find_mismatch(raw, kind)
+        except RecursionError:
+            raise SceneError("the file is nested too deeply", path="") from None
         # The message of msgspec would depend on its version.
         if found is None:
             raise SceneError("a value is of the wrong kind") from None

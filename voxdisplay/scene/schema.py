@@ -88,7 +88,7 @@ def schema() -> dict[str, Any]:
         "type": "object",
         # Offered by editors where a file has neither key yet.
         "properties": {"type": _TYPE_KEY | {"enum": list(TYPES)}},
-        "if": {"required": ["type"], "not": {"required": ["objects"]}},
+        "if": {"required": ["type"]},
         "then": _reference("Object"),
         "else": _reference("Scene"),
         "$defs": {

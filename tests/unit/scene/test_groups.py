@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
 import voxdisplay as vd
 from voxdisplay.errors import SceneError
 from voxdisplay.raster.grid import Grid
-from voxdisplay.scene import Scene, builder, read_scene
+from voxdisplay.scene import Scene, builder, read_scene, schema
 
 LINE = {"type": "segment", "from": [1, 2, 3], "to": [7, 2, 3]}
 T = np.linspace(0, 1, 5)
@@ -159,6 +160,18 @@ class TestGroup:
             "$.objects[0].objects[1]",
         ]
 
+    def test_a_file_may_be_a_group(self) -> None:
+        scene = read_scene(json.dumps({"type": "group", "objects": [LINE, LINE]}))
+        assert [item.path for item in scene.items] == ["$.objects[0]", "$.objects[1]"]
+        validator = jsonschema.Draft202012Validator(schema.schema())
+        validator.validate({"type": "group", "objects": [LINE, LINE]})
+        assert not validator.is_valid({"type": "segment", "objects": [LINE]})
+
+    def test_a_transform_that_is_too_large(self) -> None:
+        error = refused(LINE | {"transform": [{"scale": 1e60}, {"scale": 1e60}]})
+        assert error.path == "$.objects[0]"
+        assert "too large" in str(error)
+
     def test_a_mistake_inside_is_found(self) -> None:
         error = refused({"type": "group", "objects": [LINE, LINE | {"to": [1, 2, "q"]}]})
         assert error.path == "$.objects[0].objects[1].to[2]"
@@ -177,9 +190,16 @@ class TestGroup:
         with pytest.raises(SceneError, match="nested"):
             read_scene(deep_text(20_000))
 
+    @pytest.mark.parametrize("depth", [100, 200, 400, 800])
+    def test_mistakes_deep_inside_are_refused(self, depth: int) -> None:
+        for inner in (LINE, LINE | {"type": "segmen"}, 3):
+            with pytest.raises(SceneError) as caught:
+                read_scene(deep_text(depth, inner))
+            str(caught.value).encode()
 
-def deep_text(depth: int) -> str:
-    return '{"type": "group", "objects": [' * depth + json.dumps(LINE) + "]}" * depth
+
+def deep_text(depth: int, inner: object = LINE) -> str:
+    return '{"type": "group", "objects": [' * depth + json.dumps(inner) + "]}" * depth
 
 
 class TestPart:
