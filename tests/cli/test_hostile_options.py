@@ -3,6 +3,7 @@
 import click
 import numpy as np
 import pytest
+from recordings import Spin, write_recording
 
 from voxdisplay.cli import bench_measurements
 from voxdisplay.cli.command_table import ENTRIES
@@ -23,6 +24,9 @@ WORKING = {
     "preview": ["scene.json", "-o", "x.png", "--pixels", "40x30"],
     "plan": ["scene.json"],
     "convert": ["volume.npy", "-o", "out.npz", "--size", "3x5x7"],
+    "play": ["scene.json", *PORT, "--until", "0.05"],
+    "record": ["scene.json", "-o", "out.vxs", "--size", "3x5x7"],
+    "show": ["info", "show.vxs"],
     "conformance": [*PORT, "--only", "7.1/*", "--list"],
     "annotate": ["capture.jsonl"],
     "bench": PORT,
@@ -45,6 +49,7 @@ CODES = {0, 1, 2, 3, 4}
 def here(tmp_path, monkeypatch):
     """Work in a folder with a scene and a capture; measure and serve nothing."""
     (tmp_path / "scene.json").write_text(SCENE)
+    write_recording(tmp_path / "show.vxs", Spin(2))
     np.save(tmp_path / "volume.npy", np.arange(105.0).reshape(7, 5, 3))
     (tmp_path / "capture.jsonl").write_text('{"voxdisplay_capture": 1, "port": "x"}\n')
     monkeypatch.chdir(tmp_path)

@@ -1,15 +1,19 @@
 """Public exceptions and values in other processes: pickled, copied and sent to a spawned worker."""
 
+import atexit
 import copy
 import dataclasses
 import inspect
 import multiprocessing
 import pickle
+import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import Spin, write_recording
 
 import voxdisplay as vd
 from voxdisplay.curves.arguments import ArgumentError
@@ -69,6 +73,7 @@ ERRORS = {
     "LocalProtocolError": vd.LocalProtocolError("what"),
     "MissingExtra": vd.MissingExtra("what", hint="do"),
     "OpenError": vd.OpenError("what", port="/dev/x", hint="do"),
+    "RecordingError": vd.RecordingError("what", hint="do"),
     "RemoteProtocolError": vd.RemoteProtocolError("what", section="7", offset=3, raw=b"\0"),
     "SceneError": vd.SceneError("what", path="$.x", hint="do"),
     "TransportClosed": vd.TransportClosed("what"),
@@ -81,19 +86,30 @@ TWO = """{"size": [9, 9, 9], "objects": [
  {"type": "parametric", "x": "t", "y": "t**2/9", "z": "5", "t": [0, 9]}]}"""
 
 
+def recording():
+    with tempfile.NamedTemporaryFile(suffix=".vxs", delete=False) as file:
+        path = Path(file.name)
+    write_recording(path, Spin(2))
+    atexit.register(path.unlink)
+    return vd.Recording(path)
+
+
 def values():
     frame = vd.Frame((9, 9, 9), "index8", own_palette=True)
     drawing = frame.draw(vd.Circle((5, 5, 5), 3), "#010203")
     sequence = vd.voxelize(vd.Circle((5, 5, 5), 3), certified=True)
     with vd.open("sim:?size=9x9x9&format=index8") as display:
         info, receipt = display.info, display.present(frame)
+        report = display.play(frame, until=0.01)
     return {
         "DeviceInfo": info,
         "Drawing": drawing,
         "Frame": frame,
         "Grid": vd.Grid(3, 5, 7),
         "PixelFormat": vd.PixelFormat.RGB565,
+        "PlayReport": report,
         "Receipt": receipt,
+        "Recording": recording(),
         "Report": sequence.report,
         "Scene": vd.read_scene(TWO),
         "Sequence": sequence,

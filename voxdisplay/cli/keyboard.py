@@ -45,12 +45,16 @@ def open_keyboard() -> Iterator[Keyboard]:
     except ModuleNotFoundError:
         yield Keyboard(None)
         return
-    descriptor = sys.stdin.fileno()
-    # Only the program in the foreground may change the terminal: in the background it would stop.
-    if not sys.stdin.isatty() or os.getpgrp() != os.tcgetpgrp(descriptor):
+    try:
+        descriptor = sys.stdin.fileno()
+        # Only the program in the foreground may change the terminal: else it would be stopped.
+        usable = os.isatty(descriptor) and os.getpgrp() == os.tcgetpgrp(descriptor)
+        before = termios.tcgetattr(descriptor) if usable else None
+    except (AttributeError, OSError, ValueError, termios.error):  # stdin is None, closed or no file
+        before = None
+    if before is None:
         yield Keyboard(None)
         return
-    before = termios.tcgetattr(descriptor)
     try:
         tty.setcbreak(descriptor)
         yield Keyboard(descriptor)

@@ -109,6 +109,33 @@ class RangeType(ParamType[float]):
         return number
 
 
+class CountType(ParamType[int]):
+    """A whole number of 1 or more.
+
+    Parameters
+    ----------
+    name : str
+        Name of what is counted, in error messages.
+    maximum : int
+        Limit, allowed.
+
+    """
+
+    def __init__(self, name: str, maximum: int) -> None:
+        self.name = name
+        self._maximum = maximum
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Parse a whole number within the limits."""
+        text = str(value).strip()
+        if not (text.isascii() and text.isdigit()):
+            self.fail(f"{value!r} is not a number of {self.name}: write one like 4", param, ctx)
+        number = int(text[:20])
+        if not 1 <= number <= self._maximum:
+            self.fail(f"{text} is out of range: {self.name} are 1 to {self._maximum}", param, ctx)
+        return number
+
+
 def seconds_type(minimum: float) -> RangeType:
     """Return the type of a time in seconds that the system can wait for."""
     return RangeType("seconds", minimum, MAX_SECONDS, "5")

@@ -18,7 +18,7 @@ from voxdisplay.cli.options import (
     scene_argument,
 )
 from voxdisplay.cli.output import note, plural, print_json, progress_bar
-from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
+from voxdisplay.cli.param_types import PIXEL_FORMATS, CountType, FeaturesType
 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
@@ -71,7 +71,7 @@ _INDEXED: Final = {"diff", "palette"}
 )
 @click.option(
     "--jobs",
-    type=click.IntRange(min=1),
+    type=CountType("processes", 1024),
     default=1,
     metavar="N",
     help="Render in N processes.  [default: 1, in this process]",
@@ -82,7 +82,7 @@ _INDEXED: Final = {"diff", "palette"}
 @click.option(
     "--check",
     "checked",
-    type=click.IntRange(min=1),
+    type=CountType("frames", 1_000_000_000),
     metavar="N",
     help="Afterwards render N frames again in this process, and compare them.",
 )

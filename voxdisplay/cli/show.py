@@ -9,6 +9,7 @@ import click
 
 from voxdisplay.cli.options import json_option, quiet_option
 from voxdisplay.cli.output import note, plural, print_json, print_stdout
+from voxdisplay.cli.param_types import RangeType
 
 if TYPE_CHECKING:
     from voxdisplay.shows.recording import Recording
@@ -106,7 +107,7 @@ def repair(*, file: Path, output: Path | None, as_json: bool) -> None:
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(min=0.001, max=4_000_000),
+    type=RangeType("frames per second", 0.001, 4_000_000, "25"),
     metavar="N",
     help="From .npz: frames per second.  [default: as in the file, else 30]",
 )

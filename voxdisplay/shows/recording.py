@@ -87,6 +87,19 @@ class Recording:
             f"{self.fps:g} fps{cut}>"
         )
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether another recording is of the same file, as far as it has been read."""
+        if not isinstance(other, Recording):
+            return NotImplemented
+        mine, others = (
+            (each.path, each.format, each._places, each._numbers)  # noqa: SLF001 - of its kind
+            for each in (self, other)
+        )
+        return mine == others
+
+    def __hash__(self) -> int:
+        return hash(self.path)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path,)
 

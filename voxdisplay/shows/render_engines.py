@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
+import re
 import signal
+import socket
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -26,6 +28,7 @@ Rendered = tuple[Chunk, list[EncodedFrame]]
 # How often a chunk is tried again after the worker that rendered it has died.
 _ATTEMPTS = 3
 _DASK_WAIT_S = 10
+_MAX_PORT = 65_535
 
 
 class Engine(Protocol):
@@ -150,9 +153,16 @@ def dask_scheduler(address: str) -> Engine:
 def _connected(distributed: Any, address: str) -> Any:
     """Return a client of a scheduler that has workers."""
     hint = "start one: dask scheduler, and dask worker ADDRESS on each machine"
+    match = re.fullmatch(r"(?:(?:tcp|tls)://)?\[?([^\[\]/]+?)\]?:([0-9]{1,5})", address)
+    if match is None or int(match[2]) > _MAX_PORT:
+        raise RecordingError(
+            f"{address!r} is no address of a Dask scheduler", hint="write tcp://HOST:8786"
+        )
     try:
+        # The library would try again and again until its time is over.
+        socket.create_connection((match[1], int(match[2])), _DASK_WAIT_S).close()
         client = distributed.Client(address, timeout=_DASK_WAIT_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except Exception as error:  # its reader of addresses raises anything
         raise RecordingError(f"no Dask scheduler answers at {address}", hint=hint) from error
     try:
         client.wait_for_workers(1, timeout=_DASK_WAIT_S)
