@@ -20,38 +20,40 @@ struct axis {
 };
 
 /* A model is its chance of a 0, of 4096, times 8, and how many bits it has seen, at most 6. */
-static uint16_t model[MODELS];
-static struct axis axes[3];
-static uint32_t range;
-static uint32_t code_value;
-static uint32_t behind; /* bytes read behind the payload */
-static const uint8_t *next_byte;
-static const uint8_t *payload_end;
+static struct {
+    uint32_t range;
+    uint32_t code;
+    uint32_t behind; /* bytes read behind the payload; above BEHIND the op is truncated */
+    const uint8_t *next_byte;
+    const uint8_t *payload_end;
+    struct axis axes[3];
+    uint16_t model[MODELS];
+} arc;
 
 static void shift_in(void)
 {
     uint32_t byte = 0;
 
-    if (next_byte != payload_end) {
-        byte = *next_byte++;
+    if (arc.next_byte != arc.payload_end) {
+        byte = *arc.next_byte++;
     } else {
-        behind++; /* above BEHIND the op is truncated */
+        arc.behind++; /* above BEHIND the op is truncated */
     }
-    code_value = code_value << 8 | byte;
+    arc.code = arc.code << 8 | byte;
 }
 
 static uint32_t split(uint32_t bound)
 {
-    uint32_t bit = code_value >= bound;
+    uint32_t bit = arc.code >= bound;
 
     if (bit) {
-        code_value -= bound;
-        range -= bound;
+        arc.code -= bound;
+        arc.range -= bound;
     } else {
-        range = bound;
+        arc.range = bound;
     }
-    while (range < (uint32_t)1 << 24) {
-        range <<= 8;
+    while (arc.range < (uint32_t)1 << 24) {
+        arc.range <<= 8;
         shift_in();
     }
     return bit;
@@ -59,17 +61,17 @@ static uint32_t split(uint32_t bound)
 
 static void learn(uint32_t i, uint32_t bit)
 {
-    uint32_t p = model[i] >> 3;
-    uint32_t seen = model[i] & 7U;
+    uint32_t p = arc.model[i] >> 3;
+    uint32_t seen = arc.model[i] & 7U;
     uint32_t shift = 1U + (seen >> 1);
 
     p = bit ? p - (p >> shift) : p + ((4096U - p) >> shift);
-    model[i] = (uint16_t)(p << 3 | (seen < 6U ? seen + 1U : seen));
+    arc.model[i] = (uint16_t)(p << 3 | (seen < 6U ? seen + 1U : seen));
 }
 
 static uint32_t bit_of_two(uint32_t i, uint32_t j)
 {
-    uint32_t bit = split((range >> 13) * ((uint32_t)(model[i] >> 3) + (model[j] >> 3)));
+    uint32_t bit = split((arc.range >> 13) * ((uint32_t)(arc.model[i] >> 3) + (arc.model[j] >> 3)));
 
     learn(i, bit);
     if (j != i) {
@@ -88,7 +90,7 @@ static uint32_t plain(uint32_t bits)
     uint32_t value = 0;
 
     for (; bits != 0; bits--) {
-        value = value << 1 | split((range >> 13) * 4096U);
+        value = value << 1 | split((arc.range >> 13) * 4096U);
     }
     return value;
 }
@@ -175,39 +177,39 @@ static void step(uint32_t xyz[3])
     uint32_t moved[3];
 
     for (uint32_t i = 1; i < 3U; i++) {
-        if (streak(&axes[i]) > streak(&axes[m])) {
+        if (streak(&arc.axes[i]) > streak(&arc.axes[m])) {
             m = i;
         }
     }
     b = m == 2U ? 0 : m + 1U;
     c = b == 2U ? 0 : b + 1U;
     {
-        uint32_t longer = streak(&axes[b]);
+        uint32_t longer = streak(&arc.axes[b]);
 
-        if (streak(&axes[c]) > longer) {
-            longer = streak(&axes[c]);
+        if (streak(&arc.axes[c]) > longer) {
+            longer = streak(&arc.axes[c]);
         }
-        moved[m] = bit_of(MAIN + 8U * least(streak(&axes[m]), 3U) + least(longer, 7U));
+        moved[m] = bit_of(MAIN + 8U * least(streak(&arc.axes[m]), 3U) + least(longer, 7U));
     }
     if (moved[m]) {
-        turn_and_go(&axes[m], &xyz[m]);
-        moved[b] = moves_beside(&axes[b]);
+        turn_and_go(&arc.axes[m], &xyz[m]);
+        moved[b] = moves_beside(&arc.axes[b]);
     } else {
-        moved[b] = bit_of(LONE + least(streak(&axes[b]), 7U));
+        moved[b] = bit_of(LONE + least(streak(&arc.axes[b]), 7U));
     }
     if (moved[b]) {
-        turn_and_go(&axes[b], &xyz[b]);
+        turn_and_go(&arc.axes[b], &xyz[b]);
     }
     if (moved[m]) {
-        moved[c] = moves_beside(&axes[c]);
+        moved[c] = moves_beside(&arc.axes[c]);
     } else {
-        moved[c] = moved[b] ? bit_of(LONE + least(streak(&axes[c]), 7U)) : 1U;
+        moved[c] = moved[b] ? bit_of(LONE + least(streak(&arc.axes[c]), 7U)) : 1U;
     }
     if (moved[c]) {
-        turn_and_go(&axes[c], &xyz[c]);
+        turn_and_go(&arc.axes[c], &xyz[c]);
     }
     for (uint32_t i = 0; i < 3U; i++) {
-        record(&axes[i], moved[i]);
+        record(&arc.axes[i], moved[i]);
     }
 }
 
@@ -217,13 +219,13 @@ enum code draw_arc(struct decoder *d)
     bool first = true;
 
     for (uint32_t i = 0; i < MODELS; i++) {
-        model[i] = 2048U << 3;
+        arc.model[i] = 2048U << 3;
     }
-    range = (uint32_t)1 << 24;
-    code_value = 0;
-    behind = 0;
-    next_byte = d->at;
-    payload_end = d->end;
+    arc.range = (uint32_t)1 << 24;
+    arc.code = 0;
+    arc.behind = 0;
+    arc.next_byte = d->at;
+    arc.payload_end = d->end;
     d->at = d->end;
     shift_in();
     shift_in();
@@ -241,11 +243,11 @@ enum code draw_arc(struct decoder *d)
             xyz[1] = plain(bits_of(VXD_NY - 1U));
             xyz[2] = plain(bits_of(VXD_NZ - 1U));
             for (uint32_t i = 0; i < 3U; i++) {
-                axes[i] = (struct axis){0, 0, 0, 0, 0, 0};
+                arc.axes[i] = (struct axis){0, 0, 0, 0, 0, 0};
             }
         }
         n = number();
-        if (behind > BEHIND) {
+        if (arc.behind > BEHIND) {
             return TRUNCATED;
         }
         if (jump && !write_at(xyz[0], xyz[1], xyz[2], d->pen)) {
@@ -253,7 +255,7 @@ enum code draw_arc(struct decoder *d)
         }
         for (; n != 0; n--) {
             step(xyz);
-            if (behind > BEHIND) {
+            if (arc.behind > BEHIND) {
                 return TRUNCATED;
             }
             if (!write_at(xyz[0], xyz[1], xyz[2], d->pen)) {
@@ -261,10 +263,10 @@ enum code draw_arc(struct decoder *d)
             }
         }
     }
-    if (behind > BEHIND) {
+    if (arc.behind > BEHIND) {
         return TRUNCATED;
     }
-    return behind == BEHIND ? OK : PADDING;
+    return arc.behind == BEHIND ? OK : PADDING;
 }
 
 #endif

@@ -2,7 +2,12 @@
 #ifndef VXD_INTERNAL_H
 #define VXD_INTERNAL_H
 
+#include <stddef.h>
+
 #include "voxel_device.h"
+
+/* <string.h> need not be there where there is no C library. */
+void *memcpy(void *restrict to, const void *restrict from, size_t count);
 
 /* The longest packet, and the longest segment that holds one, without its 00 (section 3). */
 #define LONGEST_PACKET ((uint32_t)VXD_MAX_PAYLOAD + 7U)

@@ -8,163 +8,144 @@
  */
 #include "internal.h"
 
-#define SIZE ((uint32_t)VXD_RING + 3U)
+/* Two bytes more than the credit, rounded up to a power of two, so that indices may run freely. */
+#define FILLED(n) ((n) | (n) >> 1 | (n) >> 2 | (n) >> 3 | (n) >> 4)
+#define MASK (FILLED((uint32_t)VXD_RING + 1U) | FILLED(((uint32_t)VXD_RING + 1U) >> 5) | \
+              FILLED(((uint32_t)VXD_RING + 1U) >> 10) | FILLED(((uint32_t)VXD_RING + 1U) >> 15) | \
+              FILLED(((uint32_t)VXD_RING + 1U) >> 20) | FILLED(((uint32_t)VXD_RING + 1U) >> 25))
 
-static uint8_t ring[SIZE];
-static volatile uint32_t head;     /* where the next byte goes */
-static volatile uint32_t tail;     /* the oldest byte that is still needed */
-static volatile bool ended;        /* the byte stored last ended a segment, or there is none */
-static volatile bool lost;         /* bytes were lost behind the byte stored last */
-static volatile bool loss_is_news; /* no OVERRUN has been sent for it */
-static uint32_t scan;              /* the next byte in which to look for a 00 */
-static uint32_t release;           /* where `tail` goes when the segment found has been taken */
-static bool too_long;              /* the beginning of this segment has been thrown away */
-
-static uint32_t distance(uint32_t from, uint32_t to)
-{
-    return to >= from ? to - from : to + SIZE - from;
-}
-
-static uint32_t following(uint32_t at)
-{
-    return at + 1U == SIZE ? 0U : at + 1U;
-}
+static struct {
+    volatile uint32_t head;     /* where the next byte goes, modulo the ring's size */
+    volatile uint32_t tail;     /* the oldest byte that is still needed */
+    uint32_t scan;              /* the next byte in which to look for a 00 */
+    uint32_t release;           /* where `tail` goes when the segment found has been taken */
+    volatile bool ended;        /* the byte stored last ended a segment, or there is none */
+    volatile bool lost;         /* bytes were lost behind the byte stored last */
+    volatile bool loss_is_news; /* no OVERRUN has been sent for it */
+    bool too_long;              /* the beginning of this segment has been thrown away */
+    uint8_t bytes[MASK + 1U];
+} ring;
 
 void ring_reset(void)
 {
     VXD_LOCK();
-    head = tail = scan = release = 0;
-    ended = true;
-    lost = loss_is_news = too_long = false;
+    ring.head = ring.tail = ring.scan = ring.release = 0;
+    ring.ended = true;
+    ring.lost = ring.loss_is_news = ring.too_long = false;
     VXD_UNLOCK();
 }
 
 void vxd_receive(uint8_t byte)
 {
-    uint32_t at = head;
+    uint32_t at = ring.head;
 
-    if (byte == 0 && (ended || lost)) {
+    if (byte == 0 && (ring.ended || ring.lost)) {
         return;
     }
-    if (distance(tail, at) >= (uint32_t)VXD_RING) {
-        if (!lost) {
-            lost = true;
-            loss_is_news = true;
+    if (at - ring.tail >= (uint32_t)VXD_RING) {
+        if (!ring.lost) {
+            ring.lost = true;
+            ring.loss_is_news = true;
         }
         return;
     }
-    if (lost) {
-        ring[at] = 0;
-        at = following(at);
-        ring[at] = 0;
-        at = following(at);
-        lost = false;
+    if (ring.lost) {
+        ring.bytes[at++ & MASK] = 0;
+        ring.bytes[at++ & MASK] = 0;
+        ring.lost = false;
     }
-    ring[at] = byte;
-    ended = byte == 0;
-    head = following(at);
+    ring.bytes[at & MASK] = byte;
+    ring.ended = byte == 0;
+    ring.head = at + 1U;
 }
 
 bool ring_overrun(void)
 {
-    bool news = loss_is_news;
+    bool news = ring.loss_is_news;
 
-    loss_is_news = false;
+    ring.loss_is_news = false;
     return news;
 }
 
-/* Undo COBS from `tail` to `end`, which is not included, and check the CRC. */
-static bool decode_segment(uint32_t end, uint32_t *length)
+/* Undo COBS from `at` to `end`, which is not included, and check the CRC. */
+static bool decode_segment(uint32_t at, uint32_t end, uint32_t *length)
 {
-    uint32_t at = tail;
     uint32_t size = 0;
+    uint32_t left = 0;    /* bytes of the group that are still to come */
+    bool implied = false; /* a 00 stands before the next group */
 
-    while (at != end) {
-        uint32_t code = ring[at];
-        uint32_t left = code - 1U;
+    for (; at != end; at++) {
+        uint8_t byte = ring.bytes[at & MASK];
 
-        at = following(at);
-        for (; left != 0; left--) {
-            if (at == end || size == LONGEST_PACKET) {
-                return false;
+        if (left == 0) {
+            const bool zero = implied;
+
+            left = byte - 1U;
+            implied = byte != 255U;
+            if (!zero) {
+                continue;
             }
-            packet[size++] = ring[at];
-            at = following(at);
+            byte = 0;
+        } else {
+            left--;
         }
-        if (code != 255U && at != end) {
-            if (size == LONGEST_PACKET) {
-                return false;
-            }
-            packet[size++] = 0;
+        if (size == LONGEST_PACKET) {
+            return false;
         }
-    }
-    if (size < 7U) {
-        return false;
+        packet[size++] = byte;
     }
     *length = size - 4U;
-    return crc32(packet, size - 4U) == get_u32(packet + size - 4U);
-}
-
-/* How many 00 follow a 00, which its segment ended by itself or through a loss. */
-static uint32_t zeros_behind(uint32_t at, uint32_t until)
-{
-    uint32_t count = 0;
-
-    for (at = following(at); at != until && ring[at] == 0; at = following(at)) {
-        count++;
-    }
-    return count;
+    return left == 0 && size >= 7U && crc32(packet, size - 4U) == get_u32(packet + size - 4U);
 }
 
 enum segment ring_segment(uint32_t *length)
 {
-    uint32_t until = head;
-    uint32_t size;
-    bool was_too_long = too_long;
+    const uint32_t until = ring.head;
+    uint32_t start = ring.tail;
+    uint32_t scan = ring.scan;
+    uint32_t zeros = 0;
+    bool damaged;
 
-    while (scan != until && ring[scan] != 0) {
-        scan = following(scan);
-        if (distance(tail, scan) > LONGEST_SEGMENT) {
-            too_long = was_too_long = true;
-            tail = scan;
+    for (; scan != until && ring.bytes[scan & MASK] != 0; scan++) {
+        if (scan - start == LONGEST_SEGMENT) {
+            ring.too_long = true;
+            ring.tail = start = scan;
         }
     }
+    ring.scan = scan;
+    damaged = ring.too_long;
     if (scan == until) {
-        bool settled = false;
+        bool lost;
 
         VXD_LOCK();
-        if (lost && head == until) {
+        lost = ring.lost && ring.head == until;
+        if (lost) {
             /* What is left of the segment is all that there will be. */
-            lost = false;
-            ended = true;
-            settled = true;
+            ring.lost = false;
+            ring.ended = true;
         }
         VXD_UNLOCK();
-        if (!settled) {
+        if (!lost) {
             return SEGMENT_NONE;
         }
-        release = scan;
-        too_long = false;
+        damaged = true;
+    }
+    /* One 00 ends the segment. Two: a loss has truncated it. Three: a loss follows behind it. */
+    while (scan + zeros != until && ring.bytes[(scan + zeros) & MASK] == 0) {
+        zeros++;
+    }
+    ring.release = scan + (zeros == 2U ? 2U : zeros != 0);
+    if (damaged || zeros == 2U) {
+        ring.too_long = false;
         return SEGMENT_DAMAGED;
     }
-    size = distance(tail, scan);
-    release = following(scan);
-    if (zeros_behind(scan, until) == 1U) {
-        release = following(release);
-        too_long = false;
-        return SEGMENT_DAMAGED;
-    }
-    if (was_too_long) {
-        too_long = false;
-        return SEGMENT_DAMAGED;
-    }
-    if (size < 8U) {
+    if (scan - start < 8U) {
         return SEGMENT_SHORT;
     }
-    return decode_segment(scan, length) ? SEGMENT_PACKET : SEGMENT_DAMAGED;
+    return decode_segment(start, scan, length) ? SEGMENT_PACKET : SEGMENT_DAMAGED;
 }
 
 void ring_release(void)
 {
-    tail = scan = release;
+    ring.tail = ring.scan = ring.release;
 }

@@ -7,30 +7,33 @@ enum { SHOWN = 1, PENDING = 2, ASKED = 4 };    /* flags of ACK */
 enum { BACK = 1 };                             /* flag of READ and PAGE */
 enum state { EMPTY, FILLING, WHOLE };          /* of the back page; WHOLE waits for its tick */
 
-static const struct vxd_identity *self;
-static uint16_t session; /* 0: none is open */
-static uint16_t damaged;
-static uint32_t received; /* bit i: the packet with the number next + 1 + i */
-static uint32_t front_digest;
-static uint8_t next_number;
-static uint8_t last;
-static uint8_t newest;    /* frame id of section 6: f */
-static uint8_t shown_id;
-static uint8_t frame_clear; /* the frame's flag CLEAR */
-static uint8_t commit;    /* the lowest number with COMMIT, if `committed` */
-static bool committed;
-static bool shown;
-static bool waiting;      /* the oldest segment waits for the tick */
-static enum state state;
+/* One structure, so that a small processor needs one address for all of it. */
+static struct {
+    const struct vxd_identity *self;
+    uint32_t received; /* bit i: the packet with the number next + 1 + i */
+    uint32_t front_digest;
+    uint16_t session; /* 0: none is open */
+    uint16_t damaged;
+    uint8_t next_number;
+    uint8_t last;
+    uint8_t newest; /* frame id of section 6: f */
+    uint8_t shown_id;
+    uint8_t frame_clear; /* the frame's flag CLEAR */
+    uint8_t commit;      /* the lowest number with COMMIT, if `committed` */
+    bool committed;
+    bool shown;
+    bool waiting; /* the oldest segment waits for the tick */
+    uint8_t state; /* enum state */
+} me;
 
 void vxd_start(const struct vxd_identity *identity)
 {
-    self = identity;
-    session = damaged = 0;
-    front_digest = back_digest = 0;
-    shown = waiting = false;
-    shown_id = 0;
-    state = EMPTY;
+    me.self = identity;
+    me.session = me.damaged = 0;
+    me.front_digest = back_digest = 0;
+    me.shown = me.waiting = false;
+    me.shown_id = 0;
+    me.state = EMPTY;
     ring_reset();
     vxd_clear();
     vxd_show();
@@ -39,9 +42,9 @@ void vxd_start(const struct vxd_identity *identity)
 
 void vxd_disconnect(void)
 {
-    session = 0;
-    state = EMPTY;
-    shown = waiting = false;
+    me.session = 0;
+    me.state = EMPTY;
+    me.shown = me.waiting = false;
     ring_reset();
 }
 
@@ -54,20 +57,20 @@ static void put_header(uint32_t type, uint32_t flags, uint32_t seq, uint32_t fra
 
 static uint32_t frame_on_display(void)
 {
-    return shown ? shown_id : 0;
+    return me.shown ? me.shown_id : 0;
 }
 
 static void send_ack(uint32_t asked, uint32_t named)
 {
-    put_header(ACK, (shown ? SHOWN : 0U) | (state == WHOLE ? PENDING : 0U) | asked, next_number,
+    put_header(ACK, (me.shown ? SHOWN : 0U) | (me.state == WHOLE ? PENDING : 0U) | asked, me.next_number,
                frame_on_display());
     packet[3] = (uint8_t)named;
-    put_u16(4, session);
-    put_u16(6, self->boot);
-    put_u32(8, received);
+    put_u16(4, me.session);
+    put_u16(6, me.self->boot);
+    put_u32(8, me.received);
     put_u32(12, VXD_RING);
-    put_u32(16, VXD_DIGEST ? front_digest : 0);
-    put_u16(20, damaged);
+    put_u32(16, VXD_DIGEST ? me.front_digest : 0);
+    put_u16(20, me.damaged);
     send_packet(22);
 }
 
@@ -75,7 +78,7 @@ static void send_error(enum code code, uint32_t offset, uint32_t seq, uint32_t f
 {
     put_header(ERROR, 0, seq, frame);
     packet[3] = (uint8_t)code;
-    put_u16(4, session);
+    put_u16(4, me.session);
     put_u16(6, offset);
     send_packet(8);
 }
@@ -93,43 +96,42 @@ static uint32_t put_string(uint32_t at, const char *text)
 
 static void send_info(uint32_t of_session)
 {
+    /* The fields of section 5 that the configuration gives; pages: 2. */
+    static const uint8_t fields[32] = {
+        INFO << 4, 0, 0, 1, 0, 0, 0, 0, 0, VXD_FORMAT,
+        VXD_NX & 255, VXD_NX >> 8, VXD_NY & 255, VXD_NY >> 8, VXD_NZ & 255, VXD_NZ >> 8, 2, 0,
+        VXD_MAX_PAYLOAD & 255, VXD_MAX_PAYLOAD >> 8,
+        VXD_RING & 255, VXD_RING >> 8 & 255, (uint32_t)VXD_RING >> 16 & 255, (uint32_t)VXD_RING >> 24,
+        0, 0, 0, 0,
+        VXD_LINE | VXD_BOX << 1 | VXD_DOTS << 2 | VXD_OCT << 3 | VXD_DIFF << 4 | VXD_ARC << 5 |
+            VXD_PALETTE << 6 | VXD_READ << 7,
+        VXD_DIGEST, 0, 0};
     uint32_t at;
 
-    put_header(INFO, 0, 0, 0);
-    packet[3] = 1;
+    memcpy(packet, fields, sizeof fields);
     put_u16(4, of_session);
-    put_u16(6, self->boot);
-    packet[8] = 0;
-    packet[9] = VXD_FORMAT;
-    put_u16(10, VXD_NX);
-    put_u16(12, VXD_NY);
-    put_u16(14, VXD_NZ);
-    put_u16(16, 2); /* pages, reserved */
-    put_u16(18, VXD_MAX_PAYLOAD);
-    put_u32(20, VXD_RING);
-    put_u32(24, self->refresh);
-    put_u32(28, VXD_LINE | VXD_BOX << 1 | VXD_DOTS << 2 | VXD_OCT << 3 | VXD_DIFF << 4 |
-                    VXD_ARC << 5 | VXD_PALETTE << 6 | VXD_READ << 7 | VXD_DIGEST << 8);
-    at = put_string(32, self->name);
-    at = put_string(at, self->firmware);
-    send_packet(put_string(at, self->serial));
+    put_u16(6, me.self->boot);
+    put_u32(24, me.self->refresh);
+    at = put_string(32, me.self->name);
+    at = put_string(at, me.self->firmware);
+    send_packet(put_string(at, me.self->serial));
 }
 
 static void swap(void)
 {
     vxd_show();
-    front_digest = back_digest;
-    shown = true;
-    shown_id = newest;
-    state = EMPTY;
-    waiting = false;
+    me.front_digest = back_digest;
+    me.shown = true;
+    me.shown_id = me.newest;
+    me.state = EMPTY;
+    me.waiting = false;
 }
 
 void vxd_tick(void)
 {
-    if (state == WHOLE) {
+    if (me.state == WHOLE) {
         swap();
-        send_ack(0, last);
+        send_ack(0, me.last);
     }
 }
 
@@ -145,12 +147,12 @@ static enum code take_hello(uint32_t length, uint32_t *offset)
         return FIELD;
     }
     if (packet[3] == 1U) {
-        session = (uint16_t)asked;
-        received = 0;
-        next_number = 0;
-        last = newest = 255;
-        shown = false;
-        state = EMPTY;
+        me.session = (uint16_t)asked;
+        me.received = 0;
+        me.next_number = 0;
+        me.last = me.newest = 255;
+        me.shown = false;
+        me.state = EMPTY;
     }
     send_info(asked);
     return OK;
@@ -208,53 +210,53 @@ static enum code take_status(uint32_t length, uint32_t flags, uint32_t *offset)
     return OK;
 }
 
-/* Note that the packet at the distance d from the next number has been received. */
+/* Note that the packet at the distance d from the next number has been me.received. */
 static void note_received(uint32_t d)
 {
     if (d != 0) {
-        received |= (uint32_t)1 << (d - 1U);
+        me.received |= (uint32_t)1 << (d - 1U);
         return;
     }
-    next_number++;
-    while (received & 1U) {
-        received >>= 1;
-        next_number++;
+    me.next_number++;
+    while (me.received & 1U) {
+        me.received >>= 1;
+        me.next_number++;
     }
-    received >>= 1;
+    me.received >>= 1;
 }
 
 static void begin_frame(uint32_t flags)
 {
-    newest = packet[2];
-    committed = false;
-    frame_clear = flags & CLEAR;
-    state = FILLING;
+    me.newest = packet[2];
+    me.committed = false;
+    me.frame_clear = flags & CLEAR;
+    me.state = FILLING;
     if (flags & CLEAR) {
         vxd_clear();
         back_digest = 0;
     } else {
         vxd_keep();
-        back_digest = front_digest;
+        back_digest = me.front_digest;
     }
 }
 
 /* How far the number of a DATA packet is ahead of the next one, modulo 256. */
 static uint32_t numbers_ahead(void)
 {
-    return (packet[1] - (uint32_t)next_number) & 255U;
+    return (packet[1] - (uint32_t)me.next_number) & 255U;
 }
 
 static bool is_duplicate(void)
 {
     const uint32_t ahead = numbers_ahead();
 
-    return ahead >= 224U || (ahead >= 1U && ahead < 32U && received >> (ahead - 1U) & 1U);
+    return ahead >= 224U || (ahead >= 1U && ahead < 32U && me.received >> (ahead - 1U) & 1U);
 }
 
 /* Whether the packet waits for the tick: it is of a frame behind one that is whole. */
 static bool must_wait(void)
 {
-    return state == WHOLE && packet[0] >> 4 == DATA && packet[2] != newest && !is_duplicate();
+    return me.state == WHOLE && packet[0] >> 4 == DATA && packet[2] != me.newest && !is_duplicate();
 }
 
 static enum code take_data(uint32_t length, uint32_t flags, uint32_t *offset)
@@ -271,26 +273,26 @@ static enum code take_data(uint32_t length, uint32_t flags, uint32_t *offset)
     if (!duplicate && ahead >= 32U) {
         return SEQUENCE;
     }
-    last = packet[1];
+    me.last = packet[1];
     if (duplicate) {
-        send_ack(0, last);
+        send_ack(0, me.last);
         return OK;
     }
     *offset = 2;
-    if (packet[2] == newest) {
-        if (state != FILLING ||
-            (committed && ((number - commit) & 255U) < 128U)) {
+    if (packet[2] == me.newest) {
+        if (me.state != FILLING ||
+            (me.committed && ((number - me.commit) & 255U) < 128U)) {
             return FRAME;
         }
-        if ((flags & CLEAR) != frame_clear) {
+        if ((flags & CLEAR) != me.frame_clear) {
             *offset = 0;
             return FRAME;
         }
     } else {
-        const bool following = packet[2] == ((newest + 1U) & 255U);
+        const bool following = packet[2] == ((me.newest + 1U) & 255U);
 
-        if (ahead != 0 && (state == FILLING || !following)) {
-            send_ack(0, last); /* what is missing may belong to the frame before */
+        if (ahead != 0 && (me.state == FILLING || !following)) {
+            send_ack(0, me.last); /* what is missing may belong to the frame before */
             return OK;
         }
         if (!following) {
@@ -305,17 +307,17 @@ static enum code take_data(uint32_t length, uint32_t flags, uint32_t *offset)
     }
     if (flags & COMMIT) {
         /* Of two, the lower: the one above has been refused. */
-        committed = true;
-        commit = (uint8_t)number;
+        me.committed = true;
+        me.commit = (uint8_t)number;
     }
     note_received(ahead);
-    if (committed && ((next_number - commit - 1U) & 255U) < 128U) {
-        state = WHOLE;
-        if (self->refresh == 0) {
+    if (me.committed && ((me.next_number - me.commit - 1U) & 255U) < 128U) {
+        me.state = WHOLE;
+        if (me.self->refresh == 0) {
             swap();
         }
     }
-    send_ack(0, last);
+    send_ack(0, me.last);
     return OK;
 }
 
@@ -328,7 +330,7 @@ static void take_packet(uint32_t length)
     uint32_t offset = 0;
     enum code code = TYPE;
 
-    if (session == 0 && type != HELLO) {
+    if (me.session == 0 && type != HELLO) {
         code = NO_SESSION;
     } else if (type == DATA) {
         code = take_data(length, flags, &offset);
@@ -343,10 +345,10 @@ static void take_packet(uint32_t length)
     }
     if (code != OK) {
         send_error(code, offset, seq, frame);
-        if (type == DATA && session != 0) {
-            session = 0;
-            state = EMPTY;
-            shown = false;
+        if (type == DATA && me.session != 0) {
+            me.session = 0;
+            me.state = EMPTY;
+            me.shown = false;
         }
     }
 }
@@ -358,7 +360,7 @@ bool vxd_poll(void)
     if (ring_overrun()) {
         send_error(OVERRUN, 0, 0, 0);
     }
-    if (waiting) {
+    if (me.waiting) {
         return false;
     }
     switch (ring_segment(&length)) {
@@ -366,7 +368,7 @@ bool vxd_poll(void)
         return false;
     case SEGMENT_PACKET:
         if (must_wait()) {
-            waiting = true; /* its bytes stay in the ring, from which it is read again */
+            me.waiting = true; /* its bytes stay in the ring, from which it is read again */
             return false;
         }
         ring_release(); /* before the response grants the room anew */
@@ -374,9 +376,9 @@ bool vxd_poll(void)
         return true;
     case SEGMENT_DAMAGED:
         ring_release();
-        damaged++;
-        if (session != 0) {
-            send_ack(0, last);
+        me.damaged++;
+        if (me.session != 0) {
+            send_ack(0, me.last);
         }
         return true;
     default:
