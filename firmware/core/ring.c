@@ -1,70 +1,78 @@
 /*
  * The receive ring and the segments in it (sections 3, 9.2 and 11).
  *
- * vxd_receive, which may be an interrupt routine, is the only writer of `head`, everything else the
- * only writer of `tail`. A 00 that ends no segment is not stored, so two 00 in a row are free to
- * mean that the segment before them was truncated by a loss. The credit counts neither of them:
- * hence the two bytes more.
+ * vxd_receive, which may be an interrupt routine, is the only writer of `head` and `start` (but for
+ * segments that are too long, of which the reader throws the beginning away); the reader never
+ * looks behind `start`, so a segment that is not whole can be given up at any time. A 00 that ends
+ * nothing is not stored: an empty segment in the ring stands for one that was too long.
  */
 #include "internal.h"
 
-/* Two bytes more than the credit, rounded up to a power of two, so that indices may run freely. */
+/* The credit, rounded up to a power of two, so that indices may run freely. */
 #define FILLED(n) ((n) | (n) >> 1 | (n) >> 2 | (n) >> 3 | (n) >> 4)
-#define MASK (FILLED((uint32_t)VXD_RING + 1U) | FILLED(((uint32_t)VXD_RING + 1U) >> 5) | \
-              FILLED(((uint32_t)VXD_RING + 1U) >> 10) | FILLED(((uint32_t)VXD_RING + 1U) >> 15) | \
-              FILLED(((uint32_t)VXD_RING + 1U) >> 20) | FILLED(((uint32_t)VXD_RING + 1U) >> 25))
+#define LAST ((uint32_t)VXD_RING - 1U)
+#define MASK (FILLED(LAST) | FILLED(LAST >> 5) | FILLED(LAST >> 10) | FILLED(LAST >> 15) | \
+              FILLED(LAST >> 20) | FILLED(LAST >> 25))
+
+enum { NOT, TOO_LONG, TRUNCATED_BY_LOSS }; /* why the rest of a segment is skipped */
 
 static struct {
-    volatile uint32_t head;     /* where the next byte goes, modulo the ring's size */
-    volatile uint32_t tail;     /* the oldest byte that is still needed */
-    uint32_t scan;              /* the next byte in which to look for a 00 */
-    uint32_t release;           /* where `tail` goes when the segment found has been taken */
-    volatile bool ended;        /* the byte stored last ended a segment, or there is none */
-    volatile bool lost;         /* bytes were lost behind the byte stored last */
-    volatile bool loss_is_news; /* no OVERRUN has been sent for it */
-    bool too_long;              /* the beginning of this segment has been thrown away */
+    volatile uint32_t head;  /* where the next byte goes, modulo the ring's size */
+    volatile uint32_t start; /* the first byte of the segment that is not whole yet */
+    volatile uint32_t tail;  /* the oldest byte that is still needed */
+    uint32_t release;        /* where `tail` goes when the segment found has been taken */
+    volatile uint8_t skipping; /* one of the above */
+    volatile bool lost;      /* bytes are being lost until the device reads again */
+    volatile bool news;      /* no OVERRUN has been sent for it */
     uint8_t bytes[MASK + 1U];
 } ring;
 
 void ring_reset(void)
 {
     VXD_LOCK();
-    ring.head = ring.tail = ring.scan = ring.release = 0;
-    ring.ended = true;
-    ring.lost = ring.loss_is_news = ring.too_long = false;
+    ring.head = ring.start = ring.tail = 0;
+    ring.skipping = NOT;
+    ring.lost = ring.news = false;
     VXD_UNLOCK();
 }
 
 void vxd_receive(uint8_t byte)
 {
-    uint32_t at = ring.head;
-
-    if (byte == 0 && (ring.ended || ring.lost)) {
-        return;
-    }
-    if (at - ring.tail >= (uint32_t)VXD_RING) {
-        if (!ring.lost) {
-            ring.lost = true;
-            ring.loss_is_news = true;
+    if (!ring.lost) {
+        if (ring.skipping != NOT) {
+            if (byte != 0) {
+                return;
+            }
+            if (ring.skipping == TRUNCATED_BY_LOSS) {
+                ring.skipping = NOT;
+                return;
+            }
+        } else if (byte == 0 && ring.head == ring.start) {
+            return;
         }
-        return;
+        if (ring.head - ring.tail < (uint32_t)VXD_RING) {
+            ring.bytes[ring.head & MASK] = byte;
+            ring.head++;
+            if (byte == 0) {
+                ring.skipping = NOT;
+                ring.start = ring.head;
+            }
+            return;
+        }
+        ring.lost = true;
+        ring.news = true;
+        ring.head = ring.start;
     }
-    if (ring.lost) {
-        ring.bytes[at++ & MASK] = 0;
-        ring.bytes[at++ & MASK] = 0;
-        ring.lost = false;
-    }
-    ring.bytes[at & MASK] = byte;
-    ring.ended = byte == 0;
-    ring.head = at + 1U;
+    ring.skipping = byte != 0 ? TRUNCATED_BY_LOSS : NOT;
 }
 
 bool ring_overrun(void)
 {
-    bool news = ring.loss_is_news;
-
-    ring.loss_is_news = false;
-    return news;
+    if (!ring.news) {
+        return false;
+    }
+    ring.news = false; /* not unless it is set: a loss may happen right here */
+    return true;
 }
 
 /* Undo COBS from `at` to `end`, which is not included, and check the CRC. */
@@ -100,52 +108,31 @@ static bool decode_segment(uint32_t at, uint32_t end, uint32_t *length)
 
 enum segment ring_segment(uint32_t *length)
 {
-    const uint32_t until = ring.head;
-    uint32_t start = ring.tail;
-    uint32_t scan = ring.scan;
-    uint32_t zeros = 0;
-    bool damaged;
+    const uint32_t tail = ring.tail;
+    uint32_t end = tail;
 
-    for (; scan != until && ring.bytes[scan & MASK] != 0; scan++) {
-        if (scan - start == LONGEST_SEGMENT) {
-            ring.too_long = true;
-            ring.tail = start = scan;
-        }
-    }
-    ring.scan = scan;
-    damaged = ring.too_long;
-    if (scan == until) {
-        bool lost;
-
+    if (tail == ring.start) {
         VXD_LOCK();
-        lost = ring.lost && ring.head == until;
-        if (lost) {
-            /* What is left of the segment is all that there will be. */
-            ring.lost = false;
-            ring.ended = true;
+        if (ring.start == tail && ring.head - tail > LONGEST_SEGMENT) {
+            ring.skipping = TOO_LONG;
+            ring.head = tail;
         }
+        ring.lost = false;
         VXD_UNLOCK();
-        if (!lost) {
-            return SEGMENT_NONE;
-        }
-        damaged = true;
+        return SEGMENT_NONE;
     }
-    /* One 00 ends the segment. Two: a loss has truncated it. Three: a loss follows behind it. */
-    while (scan + zeros != until && ring.bytes[(scan + zeros) & MASK] == 0) {
-        zeros++;
+    while (ring.bytes[end & MASK] != 0) {
+        end++;
     }
-    ring.release = scan + (zeros == 2U ? 2U : zeros != 0);
-    if (damaged || zeros == 2U) {
-        ring.too_long = false;
-        return SEGMENT_DAMAGED;
-    }
-    if (scan - start < 8U) {
+    ring.release = end + 1U;
+    if (end - tail - 1U < 7U) { /* not below 8 bytes, unless it is empty */
         return SEGMENT_SHORT;
     }
-    return decode_segment(start, scan, length) ? SEGMENT_PACKET : SEGMENT_DAMAGED;
+    return decode_segment(tail, end, length) ? SEGMENT_PACKET : SEGMENT_DAMAGED;
 }
 
 void ring_release(void)
 {
-    ring.tail = ring.scan = ring.release;
+    ring.tail = ring.release;
+    ring.lost = false;
 }

@@ -353,36 +353,39 @@ static void take_packet(uint32_t length)
     }
 }
 
+static void note_damage(void)
+{
+    me.damaged++;
+    if (me.session != 0) {
+        send_ack(0, me.last);
+    }
+}
+
 bool vxd_poll(void)
 {
     uint32_t length;
+    enum segment segment;
 
     if (ring_overrun()) {
         send_error(OVERRUN, 0, 0, 0);
+        note_damage();
     }
     if (me.waiting) {
         return false;
     }
-    switch (ring_segment(&length)) {
-    case SEGMENT_NONE:
+    segment = ring_segment(&length);
+    if (segment == SEGMENT_NONE) {
         return false;
-    case SEGMENT_PACKET:
-        if (must_wait()) {
-            me.waiting = true; /* its bytes stay in the ring, from which it is read again */
-            return false;
-        }
-        ring_release(); /* before the response grants the room anew */
-        take_packet(length);
-        return true;
-    case SEGMENT_DAMAGED:
-        ring_release();
-        me.damaged++;
-        if (me.session != 0) {
-            send_ack(0, me.last);
-        }
-        return true;
-    default:
-        ring_release();
-        return true;
     }
+    if (segment == SEGMENT_PACKET && must_wait()) {
+        me.waiting = true; /* its bytes stay in the ring, from which it is read again */
+        return false;
+    }
+    ring_release(); /* before the response grants the room anew */
+    if (segment == SEGMENT_PACKET) {
+        take_packet(length);
+    } else if (segment == SEGMENT_DAMAGED) {
+        note_damage();
+    }
+    return true;
 }

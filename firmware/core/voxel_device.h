@@ -34,9 +34,9 @@
 #ifndef VXD_MAX_PAYLOAD
 #define VXD_MAX_PAYLOAD 256
 #endif
-/* The credit (section 9.2). The receive ring has two bytes more, rounded up to a power of two. */
+/* The credit (section 9.2). The receive ring is that, rounded up to a power of two. */
 #ifndef VXD_RING
-#define VXD_RING 1022
+#define VXD_RING 1024
 #endif
 
 /* Features: 1 with, 0 without. DIFF and PALETTE need VXD_INDEX8. */

@@ -31,7 +31,7 @@ def board(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[str]:
     grid, pixel_format = request.param
     options = [f"-DVXD_N{axis}={side}" for axis, side in zip("XYZ", grid, strict=True)]
     options += [f"-DVXD_FORMAT={FORMATS.index(pixel_format) + 1}"]
-    options += ["-DVXD_MAX_PAYLOAD=1024", "-DVXD_RING=16382"]
+    options += ["-DVXD_MAX_PAYLOAD=1024", "-DVXD_RING=16384"]
     make = [str(MAKE), "-s", "-C", str(FIRMWARE), "board", f"BUILD={tmp_path}"]
     subprocess.run([*make, f"OPTIONS={' '.join(options)}"], check=True)
     machine = [str(EMULATOR), "-M", "mps2-an385", "-nographic", "-monitor", "none"]
