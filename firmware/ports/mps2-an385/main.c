@@ -102,11 +102,20 @@ int main(void)
     /* The moment of the first byte is as random as a board without a clock can have it. */
     identity.boot = (uint16_t)(SYSTICK_VALUE ^ SYSTICK_VALUE >> 8 ^ ticks << 7);
     for (;;) {
-        vxd_poll();
+        heard = false;
+        while (vxd_poll()) {
+        }
         if (ticks_taken != ticks) {
             ticks_taken = ticks;
             vxd_tick();
+            continue;
         }
+        /* Sleep, unless a byte or a tick has come since; with interrupts off, one still wakes. */
+        VXD_LOCK();
+        if (!heard && ticks_taken == ticks) {
+            __asm volatile("wfi");
+        }
+        VXD_UNLOCK();
     }
 }
 
