@@ -51,6 +51,9 @@ class FrameSource:
         self._worker: WorkerProcess | None = None
         self._ready: dict[int, tuple[Slot, Picture]] = {}
         self._requested: dict[int, Slot] = {}  # of the other process
+        # What it has not answered yet, unwanted frames included: more of them would
+        # fill the pipe to it, and the player would wait for it.
+        self._unanswered: set[int] = set()
         self._seconds: deque[float] = deque(maxlen=_MEASURED)
         # Of the processor: on a busy machine another process would only have to wait, too.
         self._work_s: deque[float] = deque(maxlen=_MEASURED)
@@ -92,6 +95,8 @@ class FrameSource:
             How long it is on display.
 
         """
+        if slot.ordinal in self._unanswered:
+            self._requested[slot.ordinal] = slot  # it may have been forgotten meanwhile
         self._collect()
         if slot.ordinal in self._ready or slot.ordinal in self._requested:
             return
@@ -99,7 +104,8 @@ class FrameSource:
             self._may_use_worker = False  # once: a process that has ended is not started again
             self._worker = WorkerProcess.start(self._shows)
         if self._worker is not None and self._worker.ready:
-            if len(self._requested) < PREFETCH:
+            if len(self._unanswered) < PREFETCH:
+                self._unanswered.add(slot.ordinal)
                 self._requested[slot.ordinal] = slot
                 self._worker.request(slot.ordinal, slot.segment, slot.number, encoding)
             return
@@ -130,12 +136,14 @@ class FrameSource:
         if worker is None:
             return
         for ordinal, encoded, seconds in worker.results():
+            self._unanswered.discard(ordinal)
             if slot := self._requested.pop(ordinal, None):
                 self._ready[ordinal] = slot, encoded
                 self._seconds.append(seconds)
         if worker.ended:
             self.close()
             self._requested.clear()
+            self._unanswered.clear()
 
     def pending(self, after: int) -> list[int]:
         """Return the ordinals of frames behind one that are prepared or requested."""
