@@ -45,9 +45,9 @@ class VectorDevice:
         snapshot = self.bench.snapshot()
         nx, ny, _ = snapshot.grid
         size = document.pixel_bytes()[getattr(spec, f"FORMAT_{snapshot.pixel_format.upper()}")]
-        lit = {}
-        for index in range(len(snapshot.pixels) // size):
-            pixel = snapshot.pixels[index * size : (index + 1) * size]
+        lit, pixels = {}, snapshot.pixels  # put together when they are asked for
+        for index in range(len(pixels) // size):
+            pixel = pixels[index * size : (index + 1) * size]
             if any(pixel):
                 lit[index % nx, index // nx % ny, index // nx // ny] = pixel
         return lit

@@ -43,7 +43,7 @@ def test_slips_of_the_keys(word: str, known: tuple[str, ...], meant: str | None)
         *((word, TYPES) for word in ("line", "lines", "plane", "wire", "polygon", "t", "")),
         *((word, KEYS) for word in ("note", "comment", "axis", "fill", "stop", "dt", "t0")),
         *((word, NAMED) for word in ("none", "lightred", "rose", "sand", "rainbow", "mint")),
-        *((word, ENTRIES) for word in ("close", "import", "export", "record", "blank", "upload")),
+        *((word, ENTRIES) for word in ("close", "import", "export", "delete", "blank", "upload")),
     ],
 )
 def test_other_words_are_not_slips(word: str, known: tuple[str, ...]) -> None:

@@ -11,8 +11,6 @@ import numpy as np
 from voxdisplay.bodies.body import Body, TransformedBody, invertible
 from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds, Geometry
-from voxdisplay.bodies.surface import SurfaceBody
-from voxdisplay.bodies.tessellation import Enclosure
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.formula_arguments import Bounds as Range
@@ -24,6 +22,8 @@ from voxdisplay.expressions.params import resolve_params
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from voxdisplay.bodies.tessellation import Enclosure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +111,8 @@ class HeightField(Body):
         by, move = invertible("matrix", matrix), arguments.vector("offset", offset)
         if (by == np.diag(np.diag(by))).all():
             return TransformedBody(self, by, move)
+        from voxdisplay.bodies.surface import SurfaceBody  # noqa: PLC0415 - for turned ones alone
+
         shown = {"surface": self}
         ranges = self.x_range, self.y_range
         surface = SurfaceBody(_OfHeights(self.function), *ranges, fill="shell", shown=shown)
@@ -130,5 +132,7 @@ class _OfHeights:
         if self._function.expression is None:
             return None
         height, (by_u, by_v) = gradient_enclosure(self._function.expression, u, v)
+        from voxdisplay.bodies.tessellation import Enclosure  # noqa: PLC0415 - as above
+
         zero, one = interval(0.0), interval(1.0)
         return Enclosure((u, v, height), (one, zero, by_u), (zero, one, by_v))

@@ -31,12 +31,23 @@ class Moving:
         return frame
 
 
+@pytest.fixture(autouse=True)
+def closed_displays():
+    """Close the displays of a test, some of which have a frame under way."""
+    yield
+    while Watched.opened:
+        Watched.opened.pop().close(flush=False)
+
+
 class Watched:
     """A display of virtual time, and the ticks on which its picture changed."""
+
+    opened = []  # noqa: RUF012 - of all of them
 
     def __init__(self, refresh=60_000, baud=0, **config):
         self.device = VirtualTimeDevice(baud=baud, grid=SIZE, refresh=refresh, **config)
         self.display = vd.open(self.device, clock=self.device.clock)
+        self.opened.append(self.display)
         self.changes, self.swaps = [], 0
         self._digest = None
         self._line = self.device._wire._wire if baud else self.device._wire
