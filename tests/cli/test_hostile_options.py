@@ -43,6 +43,7 @@ HOSTILE = [
     "sim:?refresh=nan", "sim-usb:?", "hwgrep://[", "nothing://", "COM3", "page.npy", "+5", "0x10",
 ]  # fmt: skip
 CODES = {0, 1, 2, 3, 4}
+ENDLESS = {"--loop"}  # a key or a signal ends it
 
 
 @pytest.fixture
@@ -65,6 +66,8 @@ def command_lines(name):
     for parameter in cli.get_command(click.Context(cli), name).params:
         if isinstance(parameter, click.Argument):
             yield from ([value, *working[1:]] for value in HOSTILE)
+        elif parameter.opts[0] in ENDLESS:
+            continue
         elif parameter.is_flag:
             yield [*working, parameter.opts[0]]
         else:

@@ -1,6 +1,7 @@
 """Playing shows: pacing by ticks and by the host, controls, ends; all in virtual time."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from virtual_time_device import VirtualTimeDevice
 
 import voxdisplay as vd
 from voxdisplay.display import player as player_module
+from voxdisplay.shows import preparing
 from voxdisplay.shows.show import EncodedFrame
 
 SIZE = (16, 16, 16)
@@ -29,6 +31,12 @@ class Moving:
         frame.draw(np.stack((steps % 16, (steps + number) % 16, steps // 16 % 8), axis=1))
         frame.draw([(number % 16, number // 16 % 16, 15)], "red")
         return frame
+
+
+@pytest.fixture(autouse=True)
+def one_process(monkeypatch):
+    """Prepare all frames in this process: time is virtual here, and that of another is not."""
+    monkeypatch.setattr(preparing, "_WORKER_SHARE", math.inf)
 
 
 @pytest.fixture(autouse=True)

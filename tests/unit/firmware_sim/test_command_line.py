@@ -28,10 +28,12 @@ from device_packets import (
     parse_responses,
     receive,
 )
+from recordings import Spin, write_recording
 
 from firmware_sim import __main__ as entry
 from firmware_sim import command_line, faults, npy, serve
 from firmware_sim.__main__ import main
+from firmware_sim.card_player import CardPlayer
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.device_on_line import DeviceOnLine
@@ -544,3 +546,55 @@ def test_both_notations_of_sizes(size: str, capsys: pytest.CaptureFixture[str]) 
     port = open_in_process(f"sim:?size={size}")
     assert port.bench.snapshot().grid == (3, 5, 7)
     port.close()
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    """Write a recording of two frames."""
+    path = tmp_path / "show.vxs"
+    write_recording(path, Spin(2, "mono1"))
+    return path
+
+
+def test_a_recording_says_what_it_is_played_on(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(["--show", str(recorded)]) == 0
+    out, err = capsys.readouterr()
+    place = json.loads(out)
+    assert (place["size"], place["format"]) == ("12x10x9", "mono1")
+    assert f"{recorded}: 0 frames shown, 0 of them with another digest, 0 left out" in err
+
+
+def test_recordings_that_cannot_be_played(
+    recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.vxs"
+    other.write_bytes(b"GIF89a" * 100)
+    for arguments, message in (
+        (["--show", str(other)], f"{other}: it does not begin with INFO and META"),
+        (["--show", str(tmp_path / "none.vxs")], "none.vxs: No such file"),
+        (["--show", str(recorded), "--size", "3x5x7"], "leave out --size and --format"),
+        (["--show", str(recorded), "--usbip", "127.0.0.1:0"], "leave out --usbip"),
+    ):
+        assert exit_code(arguments) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_a_recording_is_played_without_a_connection(recorded: Path) -> None:
+    device = Device(Config((12, 10, 9), "mono1", 100_000))
+    stop, stopper = os.pipe()
+    swaps = []
+
+    def swapped() -> None:
+        swaps.append(device.memory.front.digest)
+        if len(swaps) == 2:
+            os.write(stopper, b"\0")
+
+    device.on_swap = swapped
+    with recorded.open("rb") as file, listen_tcp("127.0.0.1", 0) as listener:
+        wire = DeviceOnLine(device, player=CardPlayer(device, file, loop=True))
+        serve_tcp(wire, listener, stop)
+    os.close(stop)
+    os.close(stopper)
+    assert len(swaps) >= 2

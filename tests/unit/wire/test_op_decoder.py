@@ -98,3 +98,8 @@ def test_hostile_bytes_are_refused_or_drawn_on_the_grid():
         except RemoteProtocolError:
             continue
         assert ((decoded.index >= 0) & (decoded.index < grid.voxels)).all()
+
+
+def test_differences_are_of_index8_alone():
+    with pytest.raises(RemoteProtocolError, match="DIFF is an op of index8"):
+        decode_ops([b"\xe0\x01"], Grid(3, 5, 7), PixelFormat.RGB565)
