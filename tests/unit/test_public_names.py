@@ -133,7 +133,8 @@ def test_help_is_an_overview_of_every_name():
 @pytest.mark.parametrize("name", vd.__all__)
 def test_help_of_one_name_is_readable(name):
     text = pydoc.plain(pydoc.render_doc(getattr(vd, name)))
-    assert len(text.splitlines()) < 300
+    # Newer versions of Python write long signatures with a line for each argument.
+    assert len(text.splitlines()) < 400
     assert "ndarray(shape" not in text
 
 
