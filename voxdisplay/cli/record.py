@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from voxdisplay.shows.render_engines import Engine
 
 _SUFFIX: Final = ".vxs"
-_DRAWING: Final = ("line", "box", "dots", "oct", "diff", "arc", "palette")
-# ARC saves bytes on slow lines, but small boards lack it and it takes long.
-_DEFAULT: Final = ("line", "box", "dots", "oct", "diff", "palette")
-_INDEXED: Final = {"diff", "palette"}
 
 
 @click.command(
@@ -108,7 +104,10 @@ def record(
     """
     from voxdisplay.cli.scene_drawing import fit_scene  # noqa: PLC0415 - as in push
     from voxdisplay.shows import record as recording  # noqa: PLC0415
-    from voxdisplay.shows.recording_writer import RecordingFormat  # noqa: PLC0415
+    from voxdisplay.shows.recording_writer import (  # noqa: PLC0415
+        RecordingFormat,
+        drawing_features,
+    )
     from voxdisplay.shows.rendering import Rendering  # noqa: PLC0415
 
     if output.suffix.lower() != _SUFFIX:
@@ -125,7 +124,9 @@ def record(
         grid,
         pixel_format,
         round(loaded.fps * 1000),
-        _usable(features, pixel_format),
+        drawing_features(pixel_format)
+        if features is None
+        else drawing_features(pixel_format, features),
         loop=loaded.loop,
         meta={"name": name, "software": f"voxdisplay {vd.__version__}"},
     )
@@ -150,13 +151,6 @@ def record(
     also = f", {plural(compared, 'frame')} rendered again alike" if compared else ""
     size_text = f"{output.stat().st_size / max(frames, 1):.0f} bytes a frame"
     note(f"{output}: {plural(frames, 'frame')}, {size_text}{also}")
-
-
-def _usable(features: tuple[str, ...] | None, format_: vd.PixelFormat) -> tuple[str, ...]:
-    """Return the drawing features that a format allows."""
-    wanted = _DEFAULT if features is None else features
-    indexed = format_ is vd.PixelFormat.INDEX8
-    return tuple(name for name in _DRAWING if name in wanted and (indexed or name not in _INDEXED))
 
 
 def _engine(jobs: int, dask: str | None) -> Engine:

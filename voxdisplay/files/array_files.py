@@ -19,7 +19,7 @@ from voxdisplay.errors import BodyError
 from voxdisplay.files.bounded_unpacking import check_ratio
 from voxdisplay.files.contained_files import short_name
 from voxdisplay.files.contents import MAX_BYTES, ModelVoxels, VolumeSamples
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 
 _DESCR = re.compile(rb"'descr' *: *'([<>|=]?[fiub][1248])'")
 _ORDER = re.compile(rb"'fortran_order' *: *(True|False)")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.errors import BodyError, MissingExtra
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 from voxdisplay.files.volume_axes import to_canonical
 
 MAX_SLICES = 1 << 13

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from voxdisplay.errors import BodyError
 from voxdisplay.files.byte_reader import ByteReader
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 
 _MAX_UNPACKED = 1 << 28
 _MAX_RATIO = 200  # of texts of numbers it is below 20

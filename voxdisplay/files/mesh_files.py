@@ -18,7 +18,7 @@ from voxdisplay.bodies.body import Fill
 from voxdisplay.bodies.mesh import Mesh
 from voxdisplay.errors import BodyError, MissingExtra
 from voxdisplay.files.contained_files import path_inside, read_file
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 from voxdisplay.files.mesh_checks import check, check_uri
 
 UP = {"glb": "y", "gltf": "y", "stl": "z", "3mf": "z"}

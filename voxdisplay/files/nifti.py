@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from voxdisplay.errors import BodyError, MissingExtra
 from voxdisplay.files.bounded_unpacking import check_ratio, gunzip
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 from voxdisplay.files.volume_axes import to_canonical
 
 _MAX_HEADER = 1 << 20

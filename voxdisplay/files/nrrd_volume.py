@@ -17,7 +17,7 @@ from voxdisplay.errors import BodyError, MissingExtra
 from voxdisplay.files.bounded_unpacking import bunzip, check_ratio, gunzip
 from voxdisplay.files.contained_files import read_inside, short_name
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 from voxdisplay.files.volume_axes import to_canonical
 
 _MAX_HEADER = 1 << 20

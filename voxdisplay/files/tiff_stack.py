@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from voxdisplay.errors import BodyError, MissingExtra
 from voxdisplay.files.bounded_unpacking import check_ratio
 from voxdisplay.files.contents import MAX_SAMPLES, VolumeSamples
-from voxdisplay.files.library_calls import guarded
+from voxdisplay.files.guarded_calls import guarded
 
 _MAX_PAGES = 1 << 14
 

@@ -24,21 +24,7 @@ from voxdisplay.scene.body_objects import (
     Surface,
     Triangle,
 )
-from voxdisplay.scene.curve_objects import (
-    Arc,
-    Bezier,
-    BSpline,
-    CatmullRom,
-    Circle,
-    Ellipse,
-    Helix,
-    Lissajous,
-    Parametric,
-    Points,
-    Polyline,
-    Segment,
-    TorusKnot,
-)
+from voxdisplay.scene.curve_objects import AnyCurve
 from voxdisplay.scene.model_objects import Mesh, Text, Volume
 from voxdisplay.scene.scene_object import SceneObject
 from voxdisplay.scene.tube_objects import Torus, Tube
@@ -60,19 +46,7 @@ class Group(SceneObject, tag="group", kw_only=True, frozen=True):
 
 
 Object = (
-    Parametric
-    | Segment
-    | Polyline
-    | Arc
-    | Circle
-    | Ellipse
-    | Helix
-    | Lissajous
-    | TorusKnot
-    | Bezier
-    | BSpline
-    | CatmullRom
-    | Points
+    AnyCurve
     | Surface
     | HeightField
     | Implicit

@@ -8,13 +8,15 @@ from pathlib import Path
 from voxdisplay.errors import RecordingError
 from voxdisplay.shows.frame_arrays import FrameArrays, write_frames
 from voxdisplay.shows.recording import Recording
-from voxdisplay.shows.recording_writer import RecordingFormat, RecordingWriter
+from voxdisplay.shows.recording_writer import (
+    RecordingFormat,
+    RecordingWriter,
+    drawing_features,
+)
 from voxdisplay.shows.show import EncodedFrame
 
 _READ = (".vxs", ".npz")
 _WRITTEN = (".npz", ".vxs")
-_FEATURES = ("line", "box", "dots", "oct")
-_OF_INDEX8 = ("diff", "palette")
 
 
 def convert_show(source: Path, target: Path, fps: float | None = None) -> int:
@@ -58,8 +60,7 @@ def _either(suffixes: Collection[str]) -> str:
 
 
 def _record_arrays(arrays: FrameArrays, target: Path) -> int:
-    indexed = arrays.format.value == "index8"
-    features = (*_FEATURES, *_OF_INDEX8) if indexed else _FEATURES
+    features = drawing_features(arrays.format)
     wanted = RecordingFormat(arrays.grid, arrays.format, round(arrays.fps * 1000), features)
     with RecordingWriter(target, wanted) as writer:
         for frame in _encoded(arrays, wanted):

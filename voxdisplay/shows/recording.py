@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 from bisect import bisect
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -226,10 +226,6 @@ class Recording:
         if max(map(len, found.payloads), default=0) > max_payload:
             return None
         return EncodedFrame(found.payloads, found.header.digest)
-
-    def meta(self) -> Mapping[str, Any]:
-        """Return all keys of META but ``version`` and ``loop``."""
-        return self.format.meta
 
 
 def _read_head(file: BinaryIO, path: Path) -> tuple[RecordingFormat, int]:

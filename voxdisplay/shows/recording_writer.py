@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -38,6 +38,28 @@ DEFAULT_MAX_PAYLOAD: Final = 1024
 
 _MAX_TIME = 0xFFFF_FFFF
 _MAX_META_BYTES = spec.LIMIT_MAX_PAYLOAD
+
+
+_DRAWING = ("line", "box", "dots", "oct", "diff", "arc", "palette")
+# ARC saves bytes on slow lines, but small boards lack it and it takes long.
+_USUAL = ("line", "box", "dots", "oct", "diff", "palette")
+_OF_INDEX8 = ("diff", "palette")
+
+
+def drawing_features(format_: PixelFormat, wanted: Collection[str] = _USUAL) -> tuple[str, ...]:
+    """Return the features of a recording that draw and that a pixel format allows.
+
+    Parameters
+    ----------
+    format_ : PixelFormat
+    wanted : collection of str
+        Others are left out. By default those that small boards have, too.
+
+    """
+    indexed = format_ is PixelFormat.INDEX8
+    return tuple(
+        name for name in _DRAWING if name in wanted and (indexed or name not in _OF_INDEX8)
+    )
 
 
 @dataclass(frozen=True)

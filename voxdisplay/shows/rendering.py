@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from voxdisplay.errors import RecordingError
-from voxdisplay.frame import Frame
+from voxdisplay.frame import Fit, Frame
 from voxdisplay.shows.recording_writer import RecordingFormat
 from voxdisplay.shows.show import EncodedFrame, EncodedShow, Show, ShowSource
 
@@ -28,7 +28,7 @@ class Rendering:
     format : RecordingFormat
     own_palette : bool
         For index8: colours that the default palette lacks get entries of their own.
-    fit : {"contain", "none"}
+    fit : {"contain", "none", "content"}
         As of `Frame.draw`.
 
     """
@@ -36,14 +36,14 @@ class Rendering:
     source: Show | ShowSource
     format: RecordingFormat
     own_palette: bool = False
-    fit: str = "contain"
+    fit: Fit = "contain"
 
     @cached_property
     def show(self) -> Show:
         """The show on the device."""
         if isinstance(self.source, ShowSource):
             blank = Frame(self.format.grid, self.format.format, own_palette=self.own_palette)
-            return self.source.show_on(blank, fit="none" if self.fit == "none" else "contain")
+            return self.source.show_on(blank, fit=self.fit)
         return self.source
 
     def __getstate__(self) -> dict[str, object]:
