@@ -119,10 +119,20 @@ def _from_array(colors: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
-    """Return ``count`` colours that lead evenly through k colours, blending: (count, 3) uint8."""
+    """Return ``count`` colours that lead evenly through k colours, blending: (count, 3) uint8.
+
+    Integers decide, with ties upwards, so that a device can compute the same.
+    """
     if len(colors) == 1:
         return np.broadcast_to(colors, (count, 3))
-    return colors_at(colors, np.linspace(0, len(colors) - 1, count))
+    steps = max(count - 1, 1)
+    stop, rest = np.divmod(np.arange(count, dtype=np.int64) * (len(colors) - 1), steps)
+    first = colors.astype(np.int64)[stop]
+    change = colors.astype(np.int64)[np.minimum(stop + 1, len(colors) - 1)] - first
+    blended: NDArray[np.uint8] = (
+        first + (2 * rest[:, None] * change + steps) // (2 * steps)
+    ).astype(np.uint8)
+    return blended
 
 
 def colors_at(colors: NDArray[np.uint8], index: NDArray[np.float64]) -> NDArray[np.uint8]:
