@@ -1,43 +1,31 @@
-"""One picture of a display: display list in drawing order, and its raster.
+"""One picture of a display: drawing of curves, bodies and scenes, and output as images.
 
 A frame turns curves into voxels and colours into pixels of the display's grid and format. It must
-not know packets in flight, holds no array of the grid's size that it was not given, and leaves the
-encoding to `wire`.
+not know how they are kept and encoded.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
-from itertools import chain
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from voxdisplay import voxelization
-from voxdisplay.argument_checks import flag, instance, wrong_kind
+from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
 from voxdisplay.frame.drawing import Drawing
-from voxdisplay.raster.array_arguments import as_array, as_voxels, is_array_like
+from voxdisplay.frame.framebuffer import Framebuffer
+from voxdisplay.raster.array_arguments import as_voxels, is_array_like
 from voxdisplay.raster.color import Color, as_colors, colors_at
-from voxdisplay.raster.coloring import Coloring
-from voxdisplay.raster.display_list import DrawnVoxels, Kind
-from voxdisplay.raster.grid import Grid
-from voxdisplay.raster.palette import DEFAULT, Palette
-from voxdisplay.raster.pixel_format import PixelFormat, Pixels, Values
-from voxdisplay.raster.sparse_raster import SparseRaster
+from voxdisplay.raster.display_list import Kind
 from voxdisplay.voxelization.body_voxelization import voxelize_body
 from voxdisplay.voxelization.corner_rows import corner_rows
 from voxdisplay.voxelization.voxel_box import VoxelBox
-from voxdisplay.wire import spec
-from voxdisplay.wire.differences import encode_difference
-from voxdisplay.wire.digest import palette_digest, raster_digest
-from voxdisplay.wire.op_encoding import EncoderConfig
-from voxdisplay.wire.palette_ops import changed_color_blocks
-from voxdisplay.wire.raster_encoding import encode_raster
 
 Fit = Literal["contain", "none", "content"]
 FITS = ("contain", "none", "content")
@@ -51,7 +39,7 @@ class Drawable(Protocol):
         """Draw on a frame; `fit` is that of `Frame.draw`."""
 
 
-class Frame:
+class Frame(Framebuffer):
     """One complete picture: see the methods `draw`, `set`, `array`, `save` and `show`.
 
     Frames are equal if a display shows the same for them: grid, format, pixels and palette.
@@ -72,58 +60,6 @@ class Frame:
     Only displays with the feature ``palette`` show another palette than the default one.
 
     """
-
-    def __init__(
-        self,
-        grid: tuple[int, int, int],
-        format: PixelFormat | str = "rgb888",  # noqa: A002 - the word of the wire and of the command line
-        *,
-        palette: NDArray[np.uint8] | None = None,
-        own_palette: bool = False,
-    ) -> None:
-        self.grid = Grid.of(grid)
-        self.format = PixelFormat.of(format)
-        self._raster = SparseRaster(self.grid, self.format)
-        if palette is not None and self.format is not PixelFormat.INDEX8:
-            raise ValueError(f"a {self.format.value} display has no palette: leave it out")
-        self._palette: Palette | None = None  # None: the default palette, or a format without
-        own_palette = flag("own_palette", own_palette)
-        if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
-            self._palette = Palette(palette, grows=palette is None)
-
-    def __repr__(self) -> str:
-        lit = len(self.lit()[0])
-        palette = ", own palette" if self.has_own_palette else ""
-        return f"<Frame {self.grid} {self.format.value}, {lit} voxels lit{palette}>"
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Frame):
-            return NotImplemented
-        if (self.grid, self.format) != (other.grid, other.format):
-            return False
-        mine, others = self.palette, other.palette
-        if mine is not None and others is not None and not np.array_equal(mine, others):
-            return False
-        return not len(self._raster.differing(other._raster))
-
-    __hash__ = None  # type: ignore[assignment]  # it can be drawn on
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        """Return `array`, for numpy; always a copy."""
-        if copy is False:
-            raise ValueError("the array of a frame is a copy: np.array(frame, copy=False) is not")
-        return self.array() if dtype is None else self.array().astype(dtype, copy=False)
-
-    def copy(self) -> Frame:
-        """Return another frame of the same picture; quick, until one of the two is drawn on."""
-        twin = type(self).__new__(type(self))
-        twin.__dict__.update(self.__dict__)
-        twin._raster = self._raster.copy()  # noqa: SLF001 - of its own kind
-        twin._palette = self._palette.copy() if self._palette else None  # noqa: SLF001
-        return twin
-
-    def __copy__(self) -> Frame:
-        return self.copy()
 
     def draw(
         self,
@@ -243,88 +179,6 @@ class Frame:
         self._raster.draw(item)
         return Drawing(len(voxels), clipped, exact)
 
-    @property
-    def _coloring(self) -> Coloring:
-        return Coloring(self.grid, self.format, self._palette)
-
-    def set(self, array: NDArray[np.generic]) -> None:
-        """Replace the picture by an array. The palette stays as it is.
-
-        Parameters
-        ----------
-        array : ndarray
-            The display's memory, indexed [z, y, x]: (nz, ny, nx) uint8 for mono1 and index8,
-            uint16 for rgb565; (nz, ny, nx, 3) uint8 for rgb888. Lists of whole numbers are taken
-            if they fit.
-
-        Raises
-        ------
-        ValueError
-            If shape, type or a mono1 value is another; the message says what is wanted.
-
-        """
-        given, array = array, as_array("array", array)
-        if not hasattr(given, "dtype"):
-            array = self.format.from_integers(array)
-        self.format.validate(array, self.grid.array_shape)
-        pixels: Pixels = np.array(array, order="C").reshape(self.format.shape((self.grid.voxels,)))
-        self._raster.set(pixels)
-        if self._palette:
-            self._palette.mark_used(np.flatnonzero(np.bincount(pixels, minlength=256)))
-
-    def set_voxels(self, index: NDArray[np.integer], values: NDArray[np.integer]) -> None:
-        """Replace the picture by pixels of single voxels. The palette stays as it is.
-
-        Parameters
-        ----------
-        index : (n,) integer array
-            Scan-order indices, as of `lit`: x + nx * (y + ny * z). Of equal ones the last counts.
-        values : (n,) integer array
-            Their pixel values, as of `lit`.
-
-        Raises
-        ------
-        ValueError
-            If an index is outside the grid, or there are not as many values.
-
-        """
-        places = as_array("index", index).astype(np.int64)
-        if places.ndim != 1 or np.shape(values) != places.shape:
-            raise ValueError(
-                f"index, values: expected two arrays (n,), found {places.shape} "
-                f"and {np.shape(values)}"
-            )
-        if len(places) and not 0 <= places.min() <= places.max() < self.grid.voxels:
-            raise ValueError(
-                f"index: expected 0 to {self.grid.voxels - 1}, "
-                f"found {places.min()} to {places.max()}"
-            )
-        self._raster.clear()
-        none = np.zeros(len(places), dtype=np.bool_)
-        self._raster.draw(DrawnVoxels.of_item(places, np.asarray(values), none, Kind.SET))
-        if self._palette:
-            self._palette.mark_used(np.unique(values))
-
-    def clear(self) -> None:
-        """Make all voxels dark."""
-        self._raster.clear()
-
-    @property
-    def palette(self) -> NDArray[np.uint8] | None:
-        """Copy of the palette, (256, 3) uint8: colours of the pixel values. None if not index8."""
-        if self.format is not PixelFormat.INDEX8:
-            return None
-        return (self._palette.colors if self._palette else DEFAULT).copy()
-
-    @property
-    def has_own_palette(self) -> bool:
-        """True if the palette is not the default one."""
-        return self._palette is not None and len(self._palette.entries_differing(DEFAULT)) > 0
-
-    def array(self) -> Pixels:
-        """Return the frame as the display will hold it, indexed [z, y, x]: a copy, as for `set`."""
-        return self._raster.pixels().reshape(self.format.shape(self.grid.array_shape))
-
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a picture of the frame.
 
@@ -368,100 +222,3 @@ class Frame:
         from voxdisplay.view.rich_display import page_png  # noqa: PLC0415 - needs an extra
 
         return page_png(self._raster.lit, self.grid, self.format, self.palette)
-
-    def rgb(self) -> NDArray[np.uint8]:
-        """Return the colours shown, (nz, ny, nx, 3) uint8, whatever the format."""
-        lit = self._raster.lit
-        colors = np.zeros((self.grid.voxels, 3), dtype=np.uint8)
-        colors[lit.index] = self._coloring.colors_of(lit.values)
-        return colors.reshape(*self.grid.array_shape, 3)
-
-    def lit(self) -> tuple[NDArray[np.int64], Values]:
-        """Return the scan-order indices of lit voxels, ascending, and their pixel values."""
-        lit = self._raster.lit
-        return lit.index, lit.values
-
-    def lit_rgb(self) -> NDArray[np.uint8]:
-        """Return the colours, (n, 3), of the voxels of `lit`."""
-        return self._coloring.colors_of(self._raster.lit.values)
-
-    def digest(self) -> int:
-        """Return the digest that a display reports when it shows this frame (section 8)."""
-        found = raster_digest(self._raster)
-        if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
-            found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
-        return found & 0xFFFFFFFF
-
-    def payloads(self, max_payload: int, features: Collection[str] = ()) -> list[bytes]:
-        """Return payloads that draw the frame on a dark page, in whatever order they arrive.
-
-        Parameters
-        ----------
-        max_payload : int
-            Bytes of the longest payload that the device takes.
-        features : collection of str
-            Features that the device announced: `DeviceInfo.features`. No others are used.
-
-        """
-        return list(chain.from_iterable(self.iter_payloads(max_payload, features)))
-
-    def iter_payloads(
-        self, max_payload: int, features: Collection[str] = (), bytes_per_s: float = 0.0
-    ) -> Iterator[list[bytes]]:
-        """Yield the payloads of `payloads` while they are encoded, a few at a time or none.
-
-        The frame must not be changed until all have been taken.
-
-        Parameters
-        ----------
-        max_payload, features
-            As of `payloads`.
-        bytes_per_s : float
-            Rate of the line; 0 for a slow one. On a fast line, searches that take longer than they
-            save are skipped.
-
-        """
-        config = self._encoder_config(max_payload, features, bytes_per_s)
-        first = changed_color_blocks(self._palette, DEFAULT, config)
-        yield from encode_raster(self._raster, config, first)
-
-    def difference(
-        self, base: Frame, max_payload: int, features: Collection[str] = ()
-    ) -> list[bytes]:
-        """Return payloads that draw the frame on a page which shows another.
-
-        Parameters
-        ----------
-        base : Frame
-            The frame shown, of the same grid and format.
-        max_payload, features
-            As of `payloads`.
-
-        """
-        config = self._encoder_config(max_payload, features)
-        self._check_comparable(base)
-        old = base._palette.colors if base._palette else DEFAULT
-        first = changed_color_blocks(self._palette, old, config)
-        return encode_difference(self._raster, base._raster, config, first)
-
-    def changed_indices(self, base: Frame) -> NDArray[np.int64]:
-        """Return the scan-order indices, ascending, of voxels that differ from another frame."""
-        self._check_comparable(base)
-        return self._raster.differing(base._raster)
-
-    def _check_comparable(self, base: Frame) -> None:
-        instance("base", base, Frame, "a frame")
-        if (base.grid, base.format) != (self.grid, self.format):
-            raise ValueError(
-                f"base: expected a frame of {self.grid} {self.format.value}, found {base}"
-            )
-
-    def _encoder_config(
-        self, max_payload: int, features: Collection[str], bytes_per_s: float = 0.0
-    ) -> EncoderConfig:
-        config = EncoderConfig.of_device(self.grid, self.format, max_payload, features, bytes_per_s)
-        if self.has_own_palette and not config.has(spec.FEATURE_PALETTE):
-            raise ValueError(
-                "the frame has a palette of its own, and the device cannot set its palette"
-            )
-        return config
