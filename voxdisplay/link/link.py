@@ -8,7 +8,7 @@ frames are payloads here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.link.bandwidth_delay import DeliveryRate
@@ -23,9 +23,9 @@ from voxdisplay.link.events import (
     StatusReceived,
 )
 from voxdisplay.link.info_validation import check_info
-from voxdisplay.link.outgoing_frames import OutgoingFrames, PictureId
+from voxdisplay.link.link_requests import LinkRequests
+from voxdisplay.link.outgoing_frames import PictureId
 from voxdisplay.link.payload_size import clamp_payload
-from voxdisplay.link.readback import ReadRequests
 from voxdisplay.link.sender import Sender
 from voxdisplay.link.session_opening import HELLO_INTERVAL_S, SessionOpening, too_many_restarts
 from voxdisplay.link.silence_timer import SilenceTimer
@@ -38,7 +38,7 @@ MAX_CALL_DELAY_S = 0.25
 MAX_RESTARTS = 8  # without a frame displayed
 
 
-class Link:
+class Link(LinkRequests):
     """Endpoint of one host that drives one device.
 
     Parameters
@@ -71,12 +71,11 @@ class Link:
         timeout_s: float = 5.0,
         hello_interval_s: float = HELLO_INTERVAL_S,
     ) -> None:
+        super().__init__()
         self.info: packets.Info | None = None
         self.counters = LinkCounters()
         self.stream = PacketStream()
         self._timeout_s = timeout_s
-        self._frames = OutgoingFrames()
-        self._reads = ReadRequests()
         self._sender = Sender(self._frames, self._reads, self.counters)
         self._shown_ticket = 0  # of this session
         self._restarts = 0
@@ -99,11 +98,6 @@ class Link:
         return not (self._frames or self._reads or self._sender.outstanding)
 
     @property
-    def backlog(self) -> int:
-        """Number of frames that are queued and not displayed yet."""
-        return len(self._frames)
-
-    @property
     def needs_frame(self) -> bool:
         """True if the line will run idle unless another frame is queued now."""
         return self.delivery_rate.drains_early(self._frames.unsent_bytes)
@@ -112,11 +106,6 @@ class Link:
     def has_more(self) -> bool:
         """True if the last burst ended at its size, so that another may follow at once."""
         return self.ready and self._sender.has_more
-
-    @property
-    def payload_count(self) -> int:
-        """Number of payloads of all frames in the backlog, as far as they are encoded."""
-        return self._frames.payload_count
 
     @property
     def unacknowledged_payloads(self) -> int:
@@ -158,39 +147,6 @@ class Link:
     def displayed(self) -> PictureId:
         """Id of the displayed picture; another whenever that picture may have changed."""
         return self.counters.sessions, self._shown_ticket
-
-    def present(self, payloads: list[bytes], *, clear: bool = True) -> int:
-        """Queue a frame and return its ticket, which `FrameShown` carries.
-
-        See `OutgoingFrames.present`.
-        """
-        return self._frames.present(payloads, clear=clear)
-
-    def open_frame(self) -> int:
-        """Queue a frame that is still being encoded: see `OutgoingFrames.open_frame`."""
-        return self._frames.open_frame()
-
-    def append_payloads(self, ticket: int, payloads: list[bytes], *, last: bool) -> None:
-        """Append payloads to an open frame: see `OutgoingFrames.append_payloads`."""
-        self._frames.append_payloads(ticket, payloads, last=last)
-
-    def abandon_open_frame(self) -> None:
-        """Abandon a frame that is still being encoded: see `OutgoingFrames.abandon_open_frame`."""
-        self._frames.abandon_open_frame()
-
-    def present_difference(
-        self, base: PictureId, payloads: list[bytes], whole: Callable[[], list[bytes]]
-    ) -> int:
-        """Queue a difference from the displayed picture: see `OutgoingFrames`."""
-        return self._frames.present_difference(base, payloads, whole)
-
-    def read(self, start: int, count: int, *, back: bool = False) -> None:
-        """Request a range of voxels; `PageReceived` brings it, or its beginning."""
-        self._reads.add(start, count, back=back)
-
-    def cancel_reads(self) -> None:
-        """Cancel all requests for voxels."""
-        self._reads.clear()
 
     def request_status(self) -> None:
         """Request the digest of the front page; `StatusReceived` brings it."""
