@@ -19,11 +19,15 @@ import time
 import urllib.request
 
 import numpy as np
+import pytest
 from PIL import Image
 from websockets.sync.client import connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PROGRAM = next(filter(None, map(shutil.which, NAMES)), None)
+NEEDED = pytest.mark.skipif(
+    PROGRAM is None, reason=f"no browser: none of {', '.join(NAMES)} is installed"
+)
 DEADLINE_S = 60  # for what never comes; nothing is measured by it
 FLAGS = [
     "--headless=new",

@@ -1,12 +1,10 @@
-"""Live view without a browser: messages, sources, and the server's responses."""
+"""Server of the live view, without a browser: its responses, its pace and its end."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import socket
-import struct
 import threading
 import time
 import urllib.error
@@ -16,193 +14,20 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from live_messages import read_back
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import voxdisplay as vd
-from firmware_sim.config import Config
-from firmware_sim.device import Device
-from firmware_sim.tap import Tap
-from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.errors import TransportClosed
 from voxdisplay.view.live.address import parse_address
-from voxdisplay.view.live.message import Snapshot, encode
-from voxdisplay.view.live.page import page_html as page_text
+from voxdisplay.view.live.message import Snapshot
 from voxdisplay.view.live.server import open_server
-from voxdisplay.view.live.sources import DisplaySource, StaticSource, TapSource
+from voxdisplay.view.live.sources import StaticSource
 
 WAIT = 20
 GRID = vd.Grid(3, 5, 7)
-
-
-# -- messages
-
-
-def read_back(message):
-    """Read a message by its description; give its head, and the page that it tells of."""
-    (start,) = struct.unpack_from("<I", message)
-    head = json.loads(message[4:start])
-    assert start % 8 == 0
-    nx, ny, nz = head["size"]
-    count, data = head["voxels"], message[start:]
-    if head["bitmap"]:
-        size = -(-nx * ny * nz // 8)
-        bits = np.unpackbits(np.frombuffer(data[:size], np.uint8), bitorder="little")
-        index = np.flatnonzero(bits)
-        x, y, z = index % nx, index // nx % ny, index // nx // ny
-    else:
-        kind = np.dtype("<u2" if head["wide"] else "u1")
-        size = 3 * count * kind.itemsize
-        x, y, z = np.frombuffer(data[:size], kind).reshape(3, count).astype(int)
-    assert len(x) == count
-    format_ = vd.PixelFormat(head["format"])
-    planes = np.frombuffer(data[size:], np.uint8)
-    if format_ is vd.PixelFormat.INDEX8:
-        head["palette"], planes = planes[-768:].reshape(3, 256).T, planes[:-768]
-    planes = planes.reshape(0 if format_ is vd.PixelFormat.MONO1 else format_.bytes, count)
-    page = np.zeros(format_.shape((nz, ny, nx)), format_.dtype)
-    if format_ is vd.PixelFormat.MONO1:
-        assert len(planes) == 0
-        page[z, y, x] = 1
-    elif format_ is vd.PixelFormat.RGB888:
-        page[z, y, x] = planes.T
-    elif format_ is vd.PixelFormat.RGB565:
-        page[z, y, x] = planes[0] + planes[1] * np.uint16(256)
-    else:
-        page[z, y, x] = planes[0]
-    return head, page
-
-
-@given(
-    st.sampled_from(list(vd.PixelFormat)),
-    st.sampled_from([(3, 5, 7), (257, 2, 3), (1, 1, 1)]),
-    st.sampled_from([0.0, 0.01, 0.5, 1.0]),
-    st.integers(0, 1000),
-)
-def test_a_message_has_every_voxel(format_, size, density, seed):
-    grid, rng = vd.Grid(*size), np.random.default_rng(seed)
-    shape = format_.shape(grid.array_shape)
-    top = 2 if format_ is vd.PixelFormat.MONO1 else np.iinfo(format_.dtype).max + 1
-    page = rng.integers(1, top, shape).astype(format_.dtype)
-    page[rng.random(grid.array_shape) >= density] = 0
-    head, got = read_back(encode(Snapshot(page, grid, format_, 12, "a", 0xBEEF, {"Lost": 3})))
-    assert np.array_equal(got, page)
-    assert (head["number"], head["title"], head["digest"]) == (12, "a", "0000beef")
-    assert head["counters"] == {"Lost": 3}
-
-
-def test_a_message_has_the_palette():
-    palette = vd.Frame(GRID, "index8").palette
-    page = np.zeros(GRID.array_shape, np.uint8)
-    plain, _ = read_back(encode(Snapshot(page, GRID, vd.PixelFormat.INDEX8, 1, "")))
-    assert np.array_equal(plain["palette"], palette)
-    assert plain["own"] == []
-    palette[[3, 200]] = (1, 2, 3), (4, 5, 6)
-    snapshot = Snapshot(page, GRID, vd.PixelFormat.INDEX8, 1, "", palette=palette)
-    own, _ = read_back(encode(snapshot))
-    assert np.array_equal(own["palette"], palette)
-    assert own["own"] == [3, 200]
-
-
-def test_the_page_stays_small():
-    assert len(page_text().encode()) < 44_000
-
-
-# -- sources
-
-
-def test_a_tap_is_read():
-    device = Device(Config(GRID, "rgb565", refresh=0, boot=9))
-    with Tap(device) as tap:
-        device.on_swap = tap.notify_swap
-        source = TapSource(*parse_address(tap.address), "title")
-        _, snapshot = source.next()
-        assert (snapshot.grid, snapshot.format, snapshot.digest) == (GRID, vd.PixelFormat.RGB565, 0)
-        device.memory.back.put(17, b"\x34\x12")
-        with device.page_lock:
-            device.memory.swap()
-            device.swaps += 1
-        tap.notify_swap()
-        (boot, swaps), snapshot = source.next()
-        assert (boot, swaps, snapshot.number, snapshot.title) == (9, 1, 1, "title")
-        assert np.flatnonzero(snapshot.page).tolist() == [17]
-        assert snapshot.page.flat[17] == 0x1234
-        source.check_alive()
-        source.resend()
-        assert source.next()[0] == (9, 1)
-    with pytest.raises(TransportClosed, match="is gone"):
-        source.check_alive()
-    with pytest.raises(TransportClosed, match="is gone"):
-        source.next()
-    source.close()
-    with pytest.raises(OpenError, match="cannot be reached"):
-        TapSource(*parse_address(tap.address), "")
-
-
-def test_a_tap_brings_the_palette():
-    device = Device(Config(GRID, "index8", refresh=0))
-    device.memory.front.palette[9:12] = b"\x01\x02\x04"
-    with Tap(device) as tap:
-        source = TapSource(*parse_address(tap.address), "")
-        _, snapshot = source.next()
-        assert snapshot.palette[3].tolist() == [1, 2, 4]
-        assert np.array_equal(snapshot.palette[4:], vd.Frame(GRID, "index8").palette[4:])
-        source.close()
-
-
-def test_what_is_no_tap_is_refused(tmp_path):
-    del tmp_path
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        source = TapSource("127.0.0.1", listener.getsockname()[1], "")
-        peer, _ = listener.accept()
-        with peer:
-            peer.sendall(b"HTTP/1.1 400 Bad Request\r\nServer: none, and more of it")
-            with pytest.raises(TransportClosed, match="no tap of this version"):
-                source.next()
-        source.close()
-
-
-class Panel:
-    """A display that counts how often it is read."""
-
-    port = "panel"
-
-    def __init__(self, *, digest=True):
-        self.page = np.zeros((7, 5, 3), np.uint8)
-        self.reads = 0
-        self._digest = digest
-
-    def digest(self):
-        return int(self.page.sum()) if self._digest else None
-
-    def read(self):
-        self.reads += 1
-        return self.page.copy()
-
-
-@pytest.mark.parametrize("digest", [True, False])
-def test_a_display_is_read_when_it_shows_something_else(digest, monkeypatch):
-    monkeypatch.setattr("voxdisplay.view.live.sources._FULL_READ_POLL_S", 0.001)
-    monkeypatch.setattr("voxdisplay.view.live.sources._POLL_S", 0.001)
-    panel = Panel(digest=digest)
-    source = DisplaySource(panel, GRID, vd.PixelFormat.INDEX8, lambda: {"Bytes sent": 5})
-    key, snapshot = source.next()
-    assert (snapshot.number, snapshot.counters, snapshot.title) == (1, {"Bytes sent": 5}, "panel")
-    threading.Timer(0.05, lambda: panel.page.fill(7)).start()
-    other, snapshot = source.next()
-    assert other != key
-    assert snapshot.page.all()
-    assert panel.reads == 2 or not digest
-    source.resend()
-    assert source.next()[0] == other
-    source.close()
-    with pytest.raises(TransportClosed):
-        source.next()
-
-
-# -- the server
 
 
 @contextlib.contextmanager
