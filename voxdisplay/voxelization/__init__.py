@@ -166,9 +166,17 @@ def voxelize_many(
         return digitise(curves, certified=certified)
     if certified:
         raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
+    many = len(curves) > 1
     return [
-        tangent_march.march(curve, variant, tangent=tangent, pitch=pitch, reach=reach)
-        for curve in curves
+        tangent_march.march(
+            curve,
+            variant,
+            tangent=tangent,
+            pitch=pitch,
+            reach=reach,
+            number=index if many else None,
+        )
+        for index, curve in enumerate(curves)
     ]
 
 

@@ -1,9 +1,12 @@
 """Tangent march: the paper's tables II to IV, and the limits of the method."""
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import pytest
 from space_curves import Function, fourier_curve, paper_curve
 
+import voxdisplay as vd
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization import voxelize
 from voxdisplay.voxelization.tangent_march import MarchTrace, follow, march
@@ -113,6 +116,138 @@ def test_a_curve_within_a_voxel(variant: int) -> None:
     assert march(Function(lambda t: (3.2 + t / 2, 4.4, 5.6)), variant).voxels.tolist() == [
         [3, 4, 5]
     ]
+
+
+ALIKE = [
+    (variant, tangent) for variant in (1, 2, 3) for tangent in ("analytic", "difference", None)
+]
+
+
+def along(x: str, y: str, z: str, t: tuple[float, float]) -> Iterator[vd.Parametric]:
+    """Yield a curve by formulas, and by a callable."""
+    formulas = vd.Parametric(x, y, z, t=t)
+    yield formulas
+    yield vd.Parametric(formulas.position, t=t, derivative=formulas.derivative)
+
+
+def distinct_jumps(sequence: vd.Sequence) -> np.ndarray:
+    """Return the jumps; what has a value of its own at one, as floor has, is no piece."""
+    return np.unique(np.round(sequence.jumps, 9))
+
+
+@pytest.mark.parametrize(("variant", "tangent"), ALIKE)
+@pytest.mark.parametrize(
+    ("x", "y", "t", "jumps"),
+    [
+        ("10*t", "10*t/abs(t) + 0.5", (-1, 1), [0]),
+        ("10*t", "20*sign(t)", (-1, 1), [0]),
+        ("10*t", "9*floor(t) + 4*t", (-0.5, 2.5), [0, 1, 2]),
+        ("10*t", "if(t < 2, 5, 50)", (0, 3), [2]),
+        # The parameter is an angle around z, on either side.
+        ("20 + 10*cos(t)", "20 + 10*sin(t)", (-3, 3), [0.5]),
+    ],
+)
+def test_nothing_is_drawn_across_a_jump(
+    x: str, y: str, t: tuple[float, float], jumps: list[float], variant: int, tangent: str | None
+) -> None:
+    z = "9 + 8*sign(t - 0.5)" if "cos" in x else "5"
+    for curve in along(x, y, z, t):
+        sequence = voxelize(curve, method="march", variant=variant, tangent=tangent)
+        report = sequence.report
+        assert distinct_jumps(sequence) == pytest.approx(jumps, abs=1e-9)
+        assert report.pieces == len(voxelize(curve).starts) > len(jumps)
+        assert report.gaps == 0
+        assert report.e_max < 0.8661
+        assert not report.closed
+
+
+@pytest.mark.parametrize(("variant", "tangent"), ALIKE)
+@pytest.mark.parametrize(
+    ("formulas", "t", "undefined"),
+    [
+        (("10*t", "20*sin(t)/t", "5"), (-3, 3), [0.0]),
+        (("10*t", "20*sin(t)/t", "5"), (0, 3), [0.0]),
+        (("10*t", "8*(t**2-0.09)/(t-0.3)", "5"), (-1, 2), [0.3]),
+        (("20 + 10*cos(t)", "20 + 10*sin(t)", "30*sin(t)/t"), (-3, 3), [0.0]),
+        (("20 + 10*cos(t)", "20 + 10*sin(t)", "30*sin(t)/t"), (0, 3), [0.0]),
+        # Slopes without a bound at the ends of the range, and no values outside of it.
+        (("10*t", "20*sqrt(t)", "5"), (0, 2), []),
+        (("10*t", "10*asin(t)", "5"), (-1, 1), []),
+        (("20 + 10*cos(t)", "20 + 10*sin(t)", "10*sqrt(t)"), (0, 3), []),
+        (("20 + 10*cos(t)", "20 + 10*sin(t)", "10*sqrt(2 - t)"), (-2, 2), []),
+        (("20 + 10*cos(t)", "20 + 10*sin(t)", "30*t*log(t)"), (0, 2), [0.0]),
+    ],
+)
+def test_a_point_without_a_value_is_drawn_through(
+    formulas: tuple[str, str, str],
+    t: tuple[float, float],
+    undefined: list[float],
+    variant: int,
+    tangent: str | None,
+) -> None:
+    for curve in along(*formulas, t):
+        sequence = voxelize(curve, method="march", variant=variant, tangent=tangent)
+        assert [point.t for point in sequence.undefined] == undefined
+        assert sequence.report.pieces == 1
+        assert sequence.report.gaps == 0
+        assert sequence.report.e_max < 0.8661
+
+
+@pytest.mark.parametrize("variant", [1, 2, 3])
+def test_a_point_that_only_the_march_finds_undefined_is_drawn_through(variant: int) -> None:
+    met: list[float] = []
+
+    def line(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        return 30 * t, np.where(np.isin(t, met), np.nan, 30 * t), 0.5
+
+    curve = Function(line)
+    whole = voxelize(curve, method="march", variant=variant)
+    sampled: set[float] = set()
+    voxelize(Function(lambda t: (sampled.update(t.tolist()), line(t))[1]))
+    met.append(next(t for t in whole.t.tolist()[2:] if t not in sampled))
+    assert not voxelize(curve).undefined
+    sequence = voxelize(curve, method="march", variant=variant)
+    assert [(point.axis, point.t) for point in sequence.undefined] == [("y", met[0])]
+    assert np.array_equal(sequence.voxels, whole.voxels)
+
+
+@pytest.mark.parametrize("variant", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("y", "t", "where"),
+    [
+        ("1/(t-0.25)", (-1, 1), "y = inf at t = 0.25 is not finite: y grows without bound"),
+        ("sqrt(t)", (-1, 1), "y = nan at t = -1.0 is not finite, nor is y beside it"),
+        ("sin(1/t)", (-1, 1), "y = nan at t = 0.0 is not finite, and y does not settle"),
+    ],
+)
+def test_no_value_and_no_limit_is_an_error(
+    y: str, t: tuple[float, float], where: str, variant: int
+) -> None:
+    bad = vd.Parametric("10*t", y, "5", t=t)
+    with pytest.raises(CurveError) as alone:
+        voxelize(bad, method="march", variant=variant)
+    assert str(alone.value).startswith(where)
+    assert alone.value.axis == "y"
+    with pytest.raises(CurveError) as second:
+        vd.voxelize_many([vd.Segment((0, 0, 0), (5, 5, 5)), bad], method="march", variant=variant)
+    assert str(second.value).startswith(f"curve 1: {where}")
+
+
+@pytest.mark.parametrize("variant", [1, 2, 3])
+def test_a_callable_is_not_needed_outside_of_its_range(variant: int) -> None:
+    def raising(error: Exception) -> Callable[[np.ndarray], np.ndarray]:
+        def arc(t: np.ndarray) -> np.ndarray:
+            if (t < 0).any() or (t > 3).any():
+                raise error
+            return np.stack((20 + 10 * np.cos(t), 20 + 10 * np.sin(t), 0.5 + 0 * t))
+
+        return arc
+
+    whole = voxelize(vd.Parametric("20+10*cos(t)", "20+10*sin(t)", "0.5", t=(0, 3)))
+    for error in (ValueError("below the range"), IndexError("no such knot"), ZeroDivisionError()):
+        curve = vd.Parametric(raising(error), t=(0, 3))
+        sequence = voxelize(curve, method="march", variant=variant)
+        assert np.array_equal(sequence.voxels, whole.voxels)
 
 
 def test_a_march_that_loses_its_way() -> None:
