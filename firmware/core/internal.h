@@ -1,4 +1,4 @@
-/* What the parts of the core share; no concern of the maker. */
+/* Declarations that the parts of the core share; makers of devices need none of them. */
 #ifndef VXD_INTERNAL_H
 #define VXD_INTERNAL_H
 
@@ -87,7 +87,7 @@ void write_color(uint8_t entry, uint32_t color);
 uint32_t encode_page(bool back, uint32_t start, uint32_t *count, uint32_t at);
 #endif
 
-/* ---- Ops (ops.c, shapes.c, arc.c) ---- */
+/* ---- Ops (ops.c, shapes.c, range_coded_chains.c) ---- */
 
 struct decoder {
     const uint8_t *at;  /* the next byte */

@@ -1,4 +1,4 @@
-"""What commands print to stderr besides their results: notes and progress bars."""
+"""Notes and progress bars of commands, on stderr, besides their results."""
 
 import io
 

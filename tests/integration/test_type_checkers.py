@@ -1,4 +1,4 @@
-"""What type checkers report of users' code: the README's examples, and calls that must fail."""
+"""Reports of type checkers on users' code: the README's examples, and calls that must fail."""
 
 import json
 import re

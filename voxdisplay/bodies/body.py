@@ -49,7 +49,7 @@ class Body(ABC):
 
     @property
     def kind(self) -> Kind:
-        """What its voxels are: ``"surface"``, ``"solid"``, ``"volume"`` or ``"points"``."""
+        """Kind of its voxels: ``"surface"``, ``"solid"``, ``"volume"`` or ``"points"``."""
         return "solid" if self.fill == "solid" else "surface"
 
     @abstractmethod

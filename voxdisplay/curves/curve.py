@@ -93,7 +93,7 @@ class Curve(ABC):
 
     @property
     def thread_safe(self) -> bool:
-        """Whether `position` may be called from several threads at once."""
+        """True if `position` may be called from several threads at once."""
         return False
 
     @abstractmethod

@@ -273,7 +273,7 @@ class Display(PacedDisplay):
             If a frame cannot be drawn.
 
         """
-        from voxdisplay.display.playing import play_show  # noqa: PLC0415 - push needs none of it
+        from voxdisplay.display.play_show import play_show  # noqa: PLC0415 - push needs none of it
 
         return play_show(
             show, self.frame(), self._turn, self._check_frame, self._clock, speed=speed,

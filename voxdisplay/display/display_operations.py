@@ -73,7 +73,7 @@ class DisplayOperations:
 
     @property
     def reconnects(self) -> int:
-        """How often the device was gone and has come back."""
+        """Number of times that the device was gone and has come back."""
         return self._connection.reconnects
 
     @property

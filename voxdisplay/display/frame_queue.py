@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import TypeAlias
 
 from voxdisplay.display.connection import Connection
-from voxdisplay.display.playback import PlaybackMeter
+from voxdisplay.display.playback_counts import PlaybackMeter
 from voxdisplay.display.receipt import WRONG_TWICE_HINT, describe_wrong_digest
 from voxdisplay.errors import DesyncError
 from voxdisplay.frame import Frame
@@ -204,7 +204,7 @@ class FrameQueue:
 
     @property
     def displayed(self) -> Frame | None:
-        """What is displayed, if that is proved; must not be changed."""
+        """Frame that is displayed, if that is proved; must not be changed."""
         if self._displayed and self._displayed[1] == self._link.displayed:
             return self._displayed[0]
         return None

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 
 from voxdisplay.argument_checks import duration, finite, positive
-from voxdisplay.display.playback import Playback
+from voxdisplay.display.playback_counts import Playback
 from voxdisplay.display.shared_display import SharedDisplay
 
 _MAX_TURN_S = 0.02  # of a wait: other threads may use the display in between

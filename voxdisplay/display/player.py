@@ -109,7 +109,7 @@ class Player:
 
     @property
     def position_s(self) -> float:
-        """Where it is, in seconds of the timeline."""
+        """Position in seconds of the timeline."""
         return min(self._play.position(self._clock()), self.timeline.duration_s)
 
     @property

@@ -15,7 +15,7 @@ WRONG_TWICE_HINT = "the device does not draw as protocol.md requires, or its mem
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Receipt:
-    """What it took to show a frame.
+    """Figures of one frame that is displayed: time, bytes, packets, and the proof.
 
     Attributes
     ----------

@@ -60,7 +60,7 @@ class SharedDisplay:
 
     @contextlib.contextmanager
     def _turn(self) -> Iterator[DisplayOperations]:
-        """Have the display to oneself, as long as it is open and this process's."""
+        """Lock the display for one call, as long as it is open and this process's."""
         if self._connection.is_inherited:
             raise LocalProtocolError(
                 "this display was opened by the process that this one was forked from",

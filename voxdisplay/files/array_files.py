@@ -31,6 +31,13 @@ _HEADER_BYTES = 1 << 16
 def read_npy(name: str, data: bytes) -> NDArray[Any]:
     """Return the array of real numbers in a .npy file, of any shape.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+
     Raises
     ------
     BodyError
@@ -71,6 +78,13 @@ def read_npz(name: str, data: bytes) -> ModelVoxels | VolumeSamples:
     """Read a .npz file: voxels with their colours, or the one volume in it.
 
     Voxels are arrays named ``voxels``, (N, 3), columns x, y, z, and perhaps ``colors``, (N, 3).
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
 
     Raises
     ------
@@ -142,6 +156,13 @@ def _voxels(name: str, voxels: NDArray[Any], colors: NDArray[Any] | None = None)
 
 def samples_of(name: str, array: NDArray[Any]) -> ModelVoxels | VolumeSamples:
     """Return an array as a volume, or as coloured voxels if it has a last axis of 3 bytes.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    array : (nz, ny, nx) array, or (nz, ny, nx, 3) uint8 array
+        Voxels of which all three bytes are 0 are dark.
 
     Raises
     ------

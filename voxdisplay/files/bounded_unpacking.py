@@ -13,13 +13,31 @@ _RATIO = 500  # of scans it is below 10, of sparse masks some 300; deflate has 1
 
 
 def check_ratio(name: str, unpacked: int, packed: int) -> None:
-    """Raise `BodyError` if data would grow so much that they are hardly a picture of anything."""
+    """Raise `BodyError` if data are packed more densely than those of volumes and masks are.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    unpacked, packed : int
+        Bytes.
+
+    """
     if unpacked > _SMALL and unpacked > _RATIO * packed:
         raise BodyError(f"{name} would be {unpacked >> 20} MiB unpacked, from {packed} bytes")
 
 
 def gunzip(name: str, data: bytes, most: int) -> bytes:
-    """Return at most so many bytes of what a gzip or zlib stream holds.
+    """Return the beginning of what a gzip or zlib stream holds.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        The stream.
+    most : int
+        Bytes at most.
 
     Raises
     ------
@@ -31,7 +49,7 @@ def gunzip(name: str, data: bytes, most: int) -> bytes:
 
 
 def bunzip(name: str, data: bytes, most: int) -> bytes:
-    """Return at most so many bytes of what a bzip2 stream holds; errors as of `gunzip`."""
+    """Return the beginning of what a bzip2 stream holds: as `gunzip`."""
     return _unpack(name, data, most, bz2.BZ2Decompressor)
 
 

@@ -88,7 +88,7 @@ def read_file(path: Path, most: int = MAX_BYTES) -> bytes:
 
 
 def names_in(folder: Path, most: int = _COMPARED) -> list[str]:
-    """Return names of files in a folder, at most so many, in no order."""
+    """Return the names of at most `most` files in a folder, in no order."""
     with os.scandir(folder) as entries:
         return [entry.name for entry, _ in zip(entries, range(most), strict=False)]
 

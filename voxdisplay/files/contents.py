@@ -1,4 +1,4 @@
-"""What readers of files return: voxels, volumes and meshes, with remarks for people."""
+"""Values that readers of files return: voxels, volumes and meshes, with remarks for people."""
 
 from __future__ import annotations
 

@@ -15,6 +15,16 @@ def guarded(name: str, what: str, call: Callable[[], Any]) -> Any:
     """Return what a call into a library returns; whatever it raises becomes a `BodyError`.
 
     Warnings of the library are not shown: what matters is checked here.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    what : str
+        What the library reads, for errors: ``"the header"``.
+    call : callable
+        Takes no arguments.
+
     """
     try:
         # Users may have told numpy to raise.

@@ -59,7 +59,7 @@ class _Node:
 
 @dataclass(slots=True)
 class _Contents:
-    """What a file holds."""
+    """Contents of a file."""
 
     models: list[_Model] = field(default_factory=list)
     nodes: dict[int, _Node] = field(default_factory=dict)

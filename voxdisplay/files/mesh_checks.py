@@ -28,7 +28,7 @@ _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "
 
 
 class Claims(NamedTuple):
-    """What a file claims to hold.
+    """Sizes that the header of a file claims.
 
     Attributes
     ----------

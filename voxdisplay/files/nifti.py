@@ -21,6 +21,13 @@ _MAX_HEADER = 1 << 20
 def read_nifti(name: str, data: bytes) -> VolumeSamples:
     """Read a NIfTI file, .nii or .nii.gz: its axes are turned to right, anterior, superior.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+
     Raises
     ------
     BodyError

@@ -36,6 +36,15 @@ _SPACES = {
 def read_nrrd(name: str, data: bytes, folder: Path | None = None) -> VolumeSamples:
     """Read an NRRD file, or the header of one whose samples are in a file beside it.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+    folder : Path, optional
+        Where that file is; without a folder, samples must be in the file itself.
+
     Raises
     ------
     BodyError

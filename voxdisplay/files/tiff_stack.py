@@ -19,6 +19,13 @@ _MAX_PAGES = 1 << 14
 def read_tiff(name: str, data: bytes) -> VolumeSamples:
     """Read a stack of TIFF pages: page k is plane z = k, row j of it y = j.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+
     Raises
     ------
     BodyError

@@ -24,6 +24,13 @@ _CODE, _NEXT_SLICE = 2, 6
 def read_qb(name: str, data: bytes) -> ModelVoxels:
     """Read a Qubicle Binary file, version 1.1: y is up, its matrices are placed side by side.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+
     Raises
     ------
     BodyError
@@ -82,6 +89,13 @@ def _read_slices(reader: ByteReader, size: NDArray[np.int64]) -> NDArray[np.uint
 def read_kv6(name: str, data: bytes) -> ModelVoxels:
     """Read a KV6 file: voxels of the surface, in columns; z is down.
 
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
+
     Raises
     ------
     BodyError
@@ -117,6 +131,13 @@ _BINVOX_DIM = re.compile(rb"\ndim (\d{1,9}) (\d{1,9}) (\d{1,9})\s")
 
 def read_binvox(name: str, data: bytes) -> ModelVoxels:
     """Read a binvox file: runs of cells, y fastest, then z, then x.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    data : bytes
+        What is in it.
 
     Raises
     ------

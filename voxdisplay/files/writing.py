@@ -20,7 +20,7 @@ _COLORS = 255
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LitPage:
-    """What a display shows.
+    """Voxels that a display shows.
 
     Attributes
     ----------

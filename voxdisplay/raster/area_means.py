@@ -1,8 +1,7 @@
 """Resampling of volumes by area means: each voxel takes the mean of the samples that it covers.
 
 A sample is a box of constant value. The weights of the three axes are independent, so the mean is
-three
-passes, each over one axis. Must not know what the values mean, and where they came from.
+three passes, each over one axis. Must not know what the values mean, and where they came from.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class ColoredItem(NamedTuple):
 
 
 class Coloring(NamedTuple):
-    """What makes pixels of colours: grid, format, and palette if it is not the default one."""
+    """Conversion of colours to pixels; without a palette, by the default one."""
 
     grid: Grid
     format: PixelFormat

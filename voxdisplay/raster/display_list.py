@@ -19,7 +19,7 @@ _ROW_BITS = 32  # of a sort key: an index and a row fit one int64 together
 
 
 class Kind(enum.IntEnum):
-    """What is known of the order of an item's voxels.
+    """Order of an item's voxels.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ MAX_DEPTH = 32
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What a scene shows at one time.
+    """Items that a scene shows at one time.
 
     Attributes
     ----------

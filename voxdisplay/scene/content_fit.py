@@ -29,7 +29,7 @@ Box = tuple["Floats", "Floats"]
 
 
 class Content(Protocol):
-    """What a scene shows at one time."""
+    """Items that a scene shows at one time."""
 
     @property
     def items(self) -> tuple[SceneItem, ...]:

@@ -49,7 +49,7 @@ class Environment(ABC):
 
     @property
     def varies(self) -> bool:
-        """Whether values may depend on the time."""
+        """True if values may depend on the time."""
         return False
 
     def table_of(self, rows: Sequence[Sequence[str | float]]) -> Floats | None:  # noqa: ARG002 - as above

@@ -188,7 +188,7 @@ class Scene:
 
     @property
     def loop(self) -> bool:
-        """Whether a moving scene is meant to start again at its end."""
+        """True if a moving scene is meant to start again at its end."""
         return False
 
     @property

@@ -29,7 +29,7 @@ _MOMENTS = 24  # at which the extent of what is there is looked at
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """What a moving scene is made from.
+    """Parsed parts of a moving scene, from which each frame is built.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class MovingScene(Scene):
 
     @property
     def loop(self) -> bool:
-        """Whether it is meant to start again at its end."""
+        """True if it is meant to start again at its end."""
         return self.film.timeline.loop
 
     @property

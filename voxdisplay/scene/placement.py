@@ -59,7 +59,7 @@ class Placement:
 
     @property
     def flattens(self) -> bool:
-        """Whether it makes a body flat."""
+        """True if it makes a body flat."""
         stretch = np.linalg.svd(self.matrix, compute_uv=False)
         return bool(stretch[2] <= _FLAT * stretch[0])
 

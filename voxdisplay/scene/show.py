@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Moment(Protocol):
-    """What a scene shows at one time."""
+    """Items that a scene shows at one time."""
 
     @property
     def items(self) -> tuple[SceneItem, ...]:
@@ -79,7 +79,7 @@ class SceneShow:
 
     @property
     def loop(self) -> bool:
-        """Whether it is meant to start again at its end."""
+        """True if it is meant to start again at its end."""
         return self.scene.loop
 
     @property

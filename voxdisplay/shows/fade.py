@@ -1,6 +1,6 @@
 """A show that begins and ends dark: brightness rises and falls in linear light.
 
-Must not know why.
+Must not know playlists.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class PlayReport:
-    """What became of a show.
+    """Figures of a show that was played.
 
     Attributes
     ----------

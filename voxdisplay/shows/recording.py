@@ -140,7 +140,7 @@ class Recording:
 
     @property
     def loop(self) -> bool:
-        """Whether it is meant to start again at its end."""
+        """True if it is meant to start again at its end."""
         return self.format.loop
 
     @property

@@ -19,7 +19,7 @@ from voxdisplay.shows.show import EncodedFrame, EncodedShow, Show, ShowSource
 
 @dataclass(frozen=True)
 class Rendering:
-    """What is rendered, and for which device.
+    """Arguments of a rendering: the show, and the device for which.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Rendering:
             yield EncodedFrame(tuple(payloads), frame.digest())
 
     def fingerprint(self) -> str:
-        """Return a text that is another one if anything that is rendered is."""
+        """Return the SHA-256 of the arguments: equal ones render equal bytes."""
         return hashlib.sha256(
             pickle.dumps((self.source, self.format, self.own_palette, self.fit))
         ).hexdigest()

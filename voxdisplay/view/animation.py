@@ -1,4 +1,4 @@
-"""Turntable films of a page, written as animated GIF or MP4.
+"""Writers of animations, GIF and MP4, and the turntable film of a page.
 
 A film has one exposure, and a GIF one palette, so that nothing flickers. Knows no file suffixes.
 """

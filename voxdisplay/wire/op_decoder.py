@@ -35,7 +35,7 @@ _MAX_WRITTEN: Final = 1 << 26
 
 @dataclass(frozen=True, eq=False)
 class DecodedOps:
-    """What ops draw.
+    """Pixels that ops draw.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ _VOLUME_ERROR = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """What is known of how the triangles of a mesh hang together.
+    """Incidence of the triangles of a mesh.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Topology:
 
     @property
     def has_inside(self) -> bool:
-        """Whether each edge is run along as often in either direction."""
+        """True if each edge is run along as often in either direction."""
         return self.closed and self.oriented
 
     @cached_property

@@ -1,4 +1,4 @@
-/* The op ARC: range-coded chains (section 7.7). */
+/* Range-coded chains: the decoder of the op ARC (section 7.7). */
 #include "internal.h"
 
 #if VXD_ARC

@@ -13,7 +13,7 @@ _KEPT_INTERVALS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """What became of the frames that were presented.
+    """Counts of the frames that were presented, and the intervals between their swaps.
 
     Attributes
     ----------

@@ -10,7 +10,7 @@ from memory_pipe import assert_shows, open_display, random_frame
 from virtual_time_device import VirtualTimeDevice
 
 import voxdisplay as vd
-from voxdisplay.display.playback import PlaybackMeter
+from voxdisplay.display.playback_counts import PlaybackMeter
 
 SIZE = (16, 16, 16)
 
