@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import shutil
 import subprocess
 import sys
 import time
+import zipfile
 
 import numpy as np
 import pytest
+from PIL import Image
 from recordings import Spin, write_recording
 
 from voxdisplay.shows.recording import Recording
@@ -106,6 +110,97 @@ def test_arrays_both_ways(run, recorded, tmp_path):
     assert all(first.frame(n) == second.frame(n) for n in range(12))
 
 
+def test_magicavoxel_both_ways(run, recorded, tmp_path):
+    path, _ = recorded
+    model, again = tmp_path / "a.vox", tmp_path / "b.vxs"
+    assert run("show", "convert", path, "-o", model).returncode == 0
+    done = run("show", "convert", model, "-o", again, "--fps", 24)
+    assert done.returncode == 0, done.stderr
+    first, second = Recording(path), Recording(again)
+    assert (second.fps, second.format.grid) == (24, first.format.grid)
+    assert all(first.frame(n) == second.frame(n) for n in range(12))
+
+
+@pytest.mark.parametrize("suffix", ["gif", "mp4", "html"])
+def test_films_of_recordings(run, recorded, tmp_path, suffix):
+    if suffix == "mp4" and not has_mp4():
+        pytest.skip("neither PyAV nor ffmpeg is installed")
+    film, other = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
+    done = run("show", "convert", recorded[0], "-o", film, "--pixels", "96x64", "--fps", 12)
+    assert done.returncode == 0, done.stderr
+    assert "6 pictures" in done.stderr
+    done = run("preview", recorded[0], "-o", other, "--pixels", "96x64", "--fps", 12)
+    assert done.returncode == 0, done.stderr
+    assert "6 pictures on 16x14x12" in done.stderr
+    if suffix == "gif":
+        with Image.open(film) as pictures:
+            assert (pictures.n_frames, pictures.size) == (6, (96, 64))
+        assert film.read_bytes() == other.read_bytes()
+
+
+def has_mp4():
+    return shutil.which("ffmpeg") or importlib.util.find_spec("av")
+
+
+def test_a_film_of_one_bit_a_voxel_is_white(run, tmp_path):
+    write_recording(tmp_path / "a.vxs", Spin(3, "mono1"))
+    film = tmp_path / "a.gif"
+    done = run("show", "convert", tmp_path / "a.vxs", "-o", film, "--pixels", "96x64")
+    assert done.returncode == 0, done.stderr
+    with Image.open(film) as pictures:
+        colors = np.asarray(pictures.convert("RGB")).reshape(-1, 3).astype(int)
+    brightest = colors[colors.sum(axis=1).argmax()]
+    assert brightest.min() > 150
+
+
+def test_moments_of_recordings(run, recorded, tmp_path):
+    done = run("preview", recorded[0], "-o", tmp_path / "a.png", "--at", "0.26")
+    lit = len(Recording(recorded[0]).frame(6).lit()[0])
+    assert f"{lit} voxels on 16x14x12" in done.stderr
+    done = run("preview", recorded[0], "-o", tmp_path / "a.png", "--at", "0.51")
+    assert done.returncode == 2
+    assert "the show lasts 0.5 s" in done.stderr
+
+
+def test_plan_of_a_recording_counts_what_is_played(run, recorded):
+    path, _ = recorded
+    done = run("plan", path, "--json")
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert (facts["frames"], facts["fps"], facts["size"]) == (12, 24, [16, 14, 12])
+    assert {"worst", "mean"} <= set(facts)
+    sizes = {line["wire_bytes"] for line in facts["lines"]}
+    assert len(sizes) == 1, "it is sent as it is, whatever the line"
+    recording = Recording(path)
+    ops = [recording.recorded_frame(n).header.size for n in range(12)]
+    assert facts["worst"]["frame"] == int(np.argmax(ops))
+    other = json.loads(run("plan", path, "--json", "--size", "8x8x8").stdout)
+    assert other["size"] == [8, 8, 8]
+    assert other["worst"]["voxels"] < facts["worst"]["voxels"]
+    assert "12 frames in 0.5 s at 24 fps" in run("plan", path).stdout
+
+
+def test_an_animation_of_an_led_cube(run, tmp_path):
+    path = tmp_path / "cube.lcanimraw"
+    manifest = {
+        "formatVersion": 1, "name": "a", "size": {"x": 3, "y": 5, "z": 7}, "ledFormat": "Rgb",
+        "frameCount": 4, "frameTimeUs": 50_000,
+        "keyframes": [{"at": 0, "id": 1}, {"at": 3, "id": 0}],
+    }  # fmt: skip
+    pool = np.zeros((2, 7, 5, 3, 3), np.uint8)
+    pool[1, 6, 0, 2] = 255
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("manifest.json", json.dumps(manifest))
+        archive.writestr("frames.bin", pool.tobytes())
+    done = run("show", "convert", path, "-o", tmp_path / "b.vxs")
+    assert done.returncode == 0, done.stderr
+    made = Recording(tmp_path / "b.vxs")
+    assert (made.fps, made.frame_count) == (20, 4)
+    assert [int(made.frame(n).array().any(axis=-1).sum()) for n in range(4)] == [1, 1, 1, 0]
+    played = run("play", path, "--port", "sim:?size=3x5x7&refresh=0", "--json")
+    assert json.loads(played.stdout)["frames"] == 4
+
+
 @pytest.mark.parametrize("format_", ["mono1", "index8", "rgb565"])
 def test_arrays_of_numpy_alone(run, tmp_path, format_):
     write_recording(tmp_path / "a.vxs", Spin(4, format_))
@@ -148,7 +243,9 @@ def test_arrays_that_are_no_frames(run, tmp_path, content, message):
         (("show", "info", "none.vxs"), "No such file"),
         (("show", "info", "README.md"), "no recording"),
         (("show", "convert", "README.md", "-o", "a.npz"), "cannot be read"),
-        (("show", "convert", "a.vxs", "-o", "a.doc"), "cannot be written"),
+        (("show", "convert", "a.vxs", "-o", "a.doc"), "No such file"),
+        (("show", "convert", "a.vxs", "-o", "a.gif", "--fps", "90"), "at most 60"),
+        (("show", "convert", "examples/star.obj", "-o", "a.gif"), "cannot be read"),
         (("show", "convert", "a.vxs", "-o", "b.vxs"), "already"),
         (("show", "convert", "a.vxs", "-o", "b.npz"), "No such file"),
         (("record", "examples/trefoil.json", "-o", "a.npz"), "a recording is a file .vxs"),

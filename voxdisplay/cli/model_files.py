@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 import click
 
 from voxdisplay.cli.param_types import NumbersType, RangeType
+from voxdisplay.cli.show_films import is_show_file, open_show_file
 
 if TYPE_CHECKING:
     import voxdisplay as vd
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from voxdisplay.frame import Fit
 
 _C = TypeVar("_C", bound=Callable[..., Any])
-_RECORDING: Final = ".vxs"
 _MARGIN: Final = 1.0  # voxels that stay free at each wall, as with `into` of scenes
 
 
@@ -129,7 +129,7 @@ def load_shown(path: str, model: ModelOptions) -> vd.Scene | ModelFile:
             names = ", ".join(f"--{name}" for name in given)
             raise click.UsageError(f"{names}: only for meshes, volumes and voxel models; a scene "
                                    "has keys for them")  # fmt: skip
-        return _first_picture(path) if path.endswith(_RECORDING) else vd.load_scene(path)
+        return _first_picture(path) if is_show_file(path) else vd.load_scene(path)
     from voxdisplay.files.loading import load_body  # noqa: PLC0415
 
     color = given.pop("color", None)
@@ -137,19 +137,12 @@ def load_shown(path: str, model: ModelOptions) -> vd.Scene | ModelFile:
 
 
 def _first_picture(path: str) -> vd.Scene:
-    """Return what a recording shows at time 0, as a scene of its voxels."""
+    """Return what a file of frames shows at time 0, as a scene of its voxels."""
     import voxdisplay as vd  # noqa: PLC0415 - help starts fast
     from voxdisplay.bodies.scatter import Scatter  # noqa: PLC0415
     from voxdisplay.scene.item import SceneItem  # noqa: PLC0415
-    from voxdisplay.shows.recording import Recording  # noqa: PLC0415
 
-    try:
-        recording = Recording(path)
-    except OSError as error:
-        raise click.ClickException(f"cannot read {path}: {error.strerror}") from error
-    if not recording.frame_count:
-        raise vd.RecordingError(f"{Path(path).name} has no whole frame")
-    frame = recording.frame(0)
+    frame = open_show_file(path, None, None, "none").frame(0)
     index, _ = frame.lit()
     points = frame.grid.voxels_at(index) + 0.5
     items = [SceneItem("scatter", Scatter(points), frame.lit_rgb(), path)] if len(index) else []

@@ -23,12 +23,14 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import note, plural, print_json, print_stdout
 from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
+from voxdisplay.cli.show_films import is_show_file, open_show_file
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.display.plan import Plan
     from voxdisplay.display.show_plan import ShowPlan
     from voxdisplay.frame import Fit
+    from voxdisplay.shows.show import Show
 
 _TIMEOUT_S: Final = 5.0
 _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what limits them
@@ -42,6 +44,7 @@ _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what
       voxdisplay plan curve.json --baud 921600 --size 64x64x64 --format mono1
       voxdisplay plan curve.json --features line,box
       voxdisplay plan curve.json --port /dev/ttyUSB0 --json
+      voxdisplay plan day.vxs
     """,
 )
 @scene_argument()
@@ -89,8 +92,8 @@ def plan_command(
 ) -> None:
     """Print how many packets and bytes SCENE takes, and how many frames per second a line carries.
 
-    SCENE is a JSON file, or - for stdin. Nothing is shown. Counts what `push` sends to a display
-    that shows something else, once the rate of the line is known.
+    SCENE is a JSON file, - for stdin, or a recording. Nothing is shown. Counts what `push` sends to
+    a display that shows something else, once the rate of the line is known.
     """
     from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415 - as in push
         draw_scene,
@@ -100,7 +103,10 @@ def plan_command(
     from voxdisplay.display.plan import COMMON_LINES, Line, Receiver, plan  # noqa: PLC0415
 
     loaded = load_shown(scene, model)
+    played = open_show_file(scene, None, None, fit) if is_show_file(scene) else None
     grid, kind, receiver = loaded.size or vd.Grid(128, 128, 128), "rgb888", Receiver()
+    if played:
+        kind = played.frame(0).format.value
     if port:
         info, baud = _ask(port, baud)
         grid, kind, receiver = info.grid, info.format.value, Receiver.of_device(info)
@@ -110,19 +116,22 @@ def plan_command(
         receiver = replace(receiver, features=features)
     own = "palette" in receiver.features
     frame = vd.Frame(size or grid, format_ or kind, own_palette=own)
-    fitted = fit_scene(loaded, frame.grid, fit)
     lines = (Line.of_baud(baud),) if baud else COMMON_LINES
-    if fitted.duration:
+    if played:
+        show = open_show_file(scene, frame.grid, frame.format.value, fit)
+    else:
+        fitted = fit_scene(loaded, frame.grid, fit)
+        show = fitted.show_on(frame, fit="none")
+    if played or fitted.duration:
         from voxdisplay.display.show_plan import plan_show  # noqa: PLC0415
 
-        note_choices(fitted)
-        show = plan_show(
-            fitted.show_on(frame, fit="none").frame, fitted.frame_count, lines, receiver
-        )
+        if not played:
+            note_choices(fitted)
+        costs = plan_show(show, lines, receiver)
         if as_json:
-            print_json(_facts(show.worst_frame, show.worst_plans) | _show_facts(fitted, show))
+            print_json(_facts(costs.worst_frame, costs.worst_plans) | _show_facts(show, costs))
         else:
-            print_stdout(_show_table(fitted, show))
+            print_stdout(_show_table(show, costs))
         return
     draw_scene(fitted, frame)
     plans = [plan(frame, line, receiver) for line in lines]
@@ -167,21 +176,21 @@ def _facts(frame: vd.Frame, plans: list[Plan]) -> dict[str, Any]:
     }
 
 
-def _show_facts(scene: vd.Scene, show: ShowPlan) -> dict[str, Any]:
-    """Return what there is to say of a moving scene, beside the facts of its worst frame."""
-    worst = show.worst_plans[0]
+def _show_facts(show: Show, costs: ShowPlan) -> dict[str, Any]:
+    """Return what there is to say of a show, beside the facts of its worst frame."""
+    worst = costs.worst_plans[0]
     return {
-        "frames": scene.frame_count,
-        "fps": scene.fps,
-        "duration_s": scene.duration,
-        "frames_compared": show.looked_at,
+        "frames": show.frame_count,
+        "fps": show.fps,
+        "duration_s": show.duration,
+        "frames_compared": costs.looked_at,
         "worst": {
-            "frame": show.worst,
-            "time_s": show.worst / scene.fps,
+            "frame": costs.worst,
+            "time_s": costs.worst / show.fps,
             "voxels": worst.voxels,
             "wire_bytes": worst.wire_bytes,
         },
-        "mean": {"voxels": show.mean_voxels, "wire_bytes": show.mean_bytes[0]},
+        "mean": {"voxels": costs.mean_voxels, "wire_bytes": costs.mean_bytes[0]},
         "lines": [
             {
                 "line": cost.line.name,
@@ -192,7 +201,7 @@ def _show_facts(scene: vd.Scene, show: ShowPlan) -> dict[str, Any]:
                 "mean_wire_bytes": mean,
                 "mean_frames_per_s": _mean_rate(cost, mean),
             }
-            for cost, mean in zip(show.worst_plans, show.mean_bytes, strict=True)
+            for cost, mean in zip(costs.worst_plans, costs.mean_bytes, strict=True)
         ],
     }
 
@@ -204,24 +213,24 @@ def _mean_rate(cost: Plan, mean_bytes: float) -> float:
     return min(carried, most) if most else carried
 
 
-def _show_table(scene: vd.Scene, show: ShowPlan) -> str:
-    frame, worst = show.worst_frame, show.worst_plans[0]
+def _show_table(show: Show, costs: ShowPlan) -> str:
+    frame, worst = costs.worst_frame, costs.worst_plans[0]
     display = f"{frame.grid} {frame.format.value}, {_features(worst.receiver.features)}"
-    what = f"{plural(scene.frame_count, 'frame')} in {scene.duration:g} s at {scene.fps:g} fps"
-    compared = "" if show.looked_at == scene.frame_count else f" of {show.looked_at} compared"
+    what = f"{plural(show.frame_count, 'frame')} in {show.duration:g} s at {show.fps:g} fps"
+    compared = "" if costs.looked_at == show.frame_count else f" of {costs.looked_at} compared"
     most = f"{plural(worst.voxels, 'voxel')}, {plural(worst.wire_bytes, 'byte')}"
     mean_frame = (
-        f"{plural(round(show.mean_voxels), 'voxel')}, {plural(round(show.mean_bytes[0]), 'byte')}"
+        f"{plural(round(costs.mean_voxels), 'voxel')}, {plural(round(costs.mean_bytes[0]), 'byte')}"
     )
     rows = [
         f"{what} on a display of {display}",
-        f"worst frame{compared}: {show.worst}, at {show.worst / scene.fps:.4g} s: {most}",
+        f"worst frame{compared}: {costs.worst}, at {costs.worst / show.fps:.4g} s: {most}",
         f"mean frame: {mean_frame}, over {worst.line.name}",
         "",
         f"{'line':<16}{'worst bytes':>13}{'frames/s':>10}{'mean bytes':>13}{'frames/s':>10}",
     ]
-    for cost, mean in zip(show.worst_plans, show.mean_bytes, strict=True):
-        enough = "" if cost.frames_per_s >= scene.fps else "  less than the scene has"
+    for cost, mean in zip(costs.worst_plans, costs.mean_bytes, strict=True):
+        enough = "" if cost.frames_per_s >= show.fps else "  less than the show has"
         rows.append(
             f"{cost.line.name:<16}{cost.wire_bytes:>13}{_rate(cost.frames_per_s):>10}"
             f"{mean:>13.0f}{_rate(_mean_rate(cost, mean)):>10}{enough}"

@@ -23,13 +23,8 @@ from voxdisplay.cli.param_types import PIXEL_FORMATS, AngleType, PixelSizeType, 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
     from voxdisplay.raster.grid import Grid
-    from voxdisplay.raster.pixel_map import PixelMap
-    from voxdisplay.view.film import LazyPages
+    from voxdisplay.view.film import FilmJob
 
-# Pixels of all pictures of a film: what a GIF takes in memory, in bytes.
-_MAX_PIXELS: Final = 1 << 29
-_MAX_PICTURES: Final = 10_000
-_MAX_FPS: Final = 60.0  # of the kinds of film
 _FPS: Final = 20.0  # of a film that turns once
 
 
@@ -125,51 +120,56 @@ def preview(
     at_s: float | None,
     plain: bool,
 ) -> None:
-    """Draw SCENE, a JSON file or - for stdin, as a display would show it.
+    """Draw SCENE, a JSON file or - for stdin, or a recording, as a display would show it.
 
     Needs the extra `view`: pip install 'voxdisplay[view]'.
     """
     from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
     from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
+    from voxdisplay.cli.show_films import (  # noqa: PLC0415
+        FILM_SUFFIXES,
+        check_film_size,
+        film_of,
+        frame_at,
+        is_show_file,
+        open_show_file,
+    )
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
-    from voxdisplay.view.film import FilmJob  # noqa: PLC0415
     from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
-    from voxdisplay.view.save import FILM_SUFFIXES, ExportJob  # noqa: PLC0415
+    from voxdisplay.view.save import FILM_SUFFIXES as TURNED  # noqa: PLC0415
+    from voxdisplay.view.save import ExportJob  # noqa: PLC0415
 
-    film = output.suffix.lower() in FILM_SUFFIXES
-    if film:
-        _check_size(seconds * (fps or _FPS), size_px)
-    fitted, grid = load_fitted_scene(load_shown(scene, model), size, fit)
-    frame = vd.Frame(grid, format_)
+    suffix = output.suffix.lower()
+    if suffix in TURNED:
+        check_film_size(seconds * (fps or _FPS), size_px)
     options = RenderOptions(size=size_px, glow=not plain, axes=not plain)
     options = options.with_view(view_angle, zoom)
     title = "voxdisplay" if scene == "-" else Path(scene).stem
-    if fitted.duration and at_s is None and output.suffix.lower() in (*FILM_SUFFIXES, ".html"):
-        pages = _film_pages(fitted, frame, fps or fitted.fps)
-        _check_size(len(pages), size_px if film else (1, 1))
-        made: ExportJob | FilmJob = FilmJob(
-            pages, grid, frame.format, options, title, min(fps or fitted.fps, _MAX_FPS)
-        )
-        what = f"{plural(len(pages), 'picture')}"
+    show, frame = None, vd.Frame((1, 1, 1))
+    if is_show_file(scene):
+        load_shown(scene, model)  # refuses options of models
+        show = open_show_file(scene, size, format_, fit)
+        frame = frame_at(show, at_s or 0.0)
     else:
-        draw_scene(_at(fitted, at_s), frame)
+        fitted, grid = load_fitted_scene(load_shown(scene, model), size, fit)
+        frame = vd.Frame(grid, format_)
+        if fitted.duration:
+            show = fitted.show_on(frame, fit="none")
+    made: ExportJob | FilmJob
+    if show and at_s is None and suffix in FILM_SUFFIXES:
+        made = film_of(show, options, title, fps=fps, drawn=suffix in TURNED)
+        what = plural(len(made.pages), "picture")
+    else:
+        if not is_show_file(scene):
+            draw_scene(_at(fitted, at_s), frame)
         made = ExportJob(
-            PixelMap(*frame.lit()), grid, frame.format, options, title, seconds, fps or _FPS
-        )
+            PixelMap(*frame.lit()), frame.grid, frame.format, options, title, seconds, fps or _FPS,
+            frame.palette,
+        )  # fmt: skip
         what = plural(len(frame.lit()[0]), "voxel")
     with progress_bar("drawing") as progress:
         save_image(output, made, progress)
-    note(f"{output}: {what} on {grid} {format_}")
-
-
-def _check_size(pictures: float, size_px: tuple[int, int]) -> None:
-    """Refuse a film of too many pixels, or of too many pictures."""
-    if size_px[0] * size_px[1] * pictures > _MAX_PIXELS or pictures > _MAX_PICTURES:
-        raise click.BadParameter(
-            f"{pictures:.0f} pictures of {size_px[0]}x{size_px[1]} are too many: make them "
-            "smaller, or fewer by --fps or --seconds",
-            param_hint="--pixels",
-        )
+    note(f"{output}: {what} on {frame.grid} {format_}")
 
 
 def _at(scene: vd.Scene, at_s: float | None) -> vd.Scene:
@@ -181,18 +181,3 @@ def _at(scene: vd.Scene, at_s: float | None) -> vd.Scene:
     if at_s > scene.duration:
         raise click.UsageError(f"--at {at_s:g}: the scene lasts {scene.duration:g} s")
     return scene.at(at_s)
-
-
-def _film_pages(scene: vd.Scene, blank: vd.Frame, fps: float) -> LazyPages:
-    """Return the pages of a moving scene at a rate of its own."""
-    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415 - help starts fast
-    from voxdisplay.view.film import LazyPages  # noqa: PLC0415 - an extra
-
-    show = scene.show_on(blank, fit="none")
-    count = max(1, round(scene.duration * fps))
-
-    def page(number: int) -> PixelMap:
-        found = show.frame(min(int(number / fps * scene.fps + 1e-9), show.frame_count - 1))
-        return PixelMap(*found.lit())
-
-    return LazyPages(count, page)

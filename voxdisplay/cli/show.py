@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from voxdisplay.cli.options import json_option, quiet_option
-from voxdisplay.cli.output import note, plural, print_json, print_stdout
-from voxdisplay.cli.param_types import RangeType
+from voxdisplay.cli.output import note, plural, print_json, print_stdout, progress_bar
+from voxdisplay.cli.param_types import PixelSizeType, RangeType
+from voxdisplay.cli.show_films import MAX_FPS
+from voxdisplay.errors import RecordingError
 
 if TYPE_CHECKING:
     from voxdisplay.shows.recording import Recording
@@ -24,6 +26,8 @@ _file_argument = click.argument("file", type=click.Path(path_type=Path))
       voxdisplay show repair day.vxs.part -o day.vxs
       voxdisplay show convert day.vxs -o day.npz
       voxdisplay show convert frames.npz -o day.vxs
+      voxdisplay show convert day.vxs -o day.gif
+      voxdisplay show convert cube.lcanimraw -o cube.vxs
     """
 )
 def show() -> None:
@@ -103,21 +107,59 @@ def repair(*, file: Path, output: Path | None, as_json: bool) -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     required=True,
     metavar="FILE",
-    help="Its suffix says what is written: .npz, an array of all frames; .vxs; .gif, .mp4.",
+    help="Its suffix says what is written: .npz, an array of all frames; .vxs; .vox, MagicaVoxel; "
+    ".gif, .mp4 or .html, a film.",
 )
 @click.option(
     "--fps",
     type=RangeType("frames per second", 0.001, 4_000_000, "25"),
     metavar="N",
-    help="From .npz: frames per second.  [default: as in the file, else 30]",
+    help="From .npz and .vox: frames per second; of a film: pictures per second.  [default: as in "
+    "the file, else 30]",
+)
+@click.option(
+    "--pixels",
+    "size_px",
+    type=PixelSizeType(),
+    default="800x600",
+    metavar="WxH",
+    help="Size of the pictures of a film.  [default: 800x600]",
 )
 @quiet_option
-def convert(*, file: Path, output: Path, fps: float | None) -> None:
-    """Convert FILE, a recording or an .npz of frames, into another kind of file."""
-    from voxdisplay.shows.conversion import convert_show  # noqa: PLC0415
+def convert(*, file: Path, output: Path, fps: float | None, size_px: tuple[int, int]) -> None:
+    """Convert FILE into another kind of file.
 
-    frames = convert_show(file, output, fps=fps)
-    note(f"{output}: {plural(frames, 'frame')}")
+    FILE is a recording (.vxs), an array of frames (.npz), or an animation of MagicaVoxel (.vox) or
+    of an LED cube (.lcanimraw). `preview` has more options for films.
+    """
+    from voxdisplay.cli.show_films import FILM_SUFFIXES, film_of  # noqa: PLC0415 - help starts fast
+    from voxdisplay.shows.conversion import write_show  # noqa: PLC0415
+    from voxdisplay.shows.show_files import open_show  # noqa: PLC0415
+
+    suffix = output.suffix.lower()
+    if file.suffix.lower() == suffix:
+        raise click.UsageError(f"{file.name} is a file {suffix} already")
+    if suffix not in FILM_SUFFIXES:
+        converted = open_show(file, fps)
+        if remark := write_show(converted, output):
+            note(f"{output}: {remark}")
+        note(f"{output}: {plural(converted.frame_count, 'frame')}")
+        return
+    from voxdisplay.cli.image_output import save_image  # noqa: PLC0415
+    from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
+    from voxdisplay.view.save import FILM_SUFFIXES as DRAWN  # noqa: PLC0415
+
+    if fps is not None and fps > MAX_FPS:
+        raise click.BadParameter(f"{fps:g}: films have at most {MAX_FPS:g}", param_hint="--fps")
+    converted = open_show(file, None)
+    if not converted.frame_count:
+        raise RecordingError(f"{file.name} has no whole frame")
+    film = film_of(
+        converted, RenderOptions(size=size_px), file.stem, fps=fps, drawn=suffix in DRAWN
+    )
+    with progress_bar("drawing") as progress:
+        save_image(output, film, progress)
+    note(f"{output}: {plural(len(film.pages), 'picture')}")
 
 
 def _open(path: Path) -> Recording:

@@ -7,6 +7,7 @@ know ports or sessions; a device is what it announces.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final, Self
@@ -141,7 +142,12 @@ class Plan:
         return min(carried, most) if most else carried
 
 
-def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
+def plan(
+    frame: Frame,
+    line: Line,
+    receiver: Receiver = Receiver(),
+    encoded: Sequence[bytes] | None = None,
+) -> Plan:
     """Return the wire cost of a frame.
 
     Parameters
@@ -152,11 +158,15 @@ def plan(frame: Frame, line: Line, receiver: Receiver = Receiver()) -> Plan:
         The line. The frame is encoded as the driver does when it knows that line.
     receiver : Receiver
         The device.
+    encoded : sequence of bytes, optional
+        Payloads of the frame, if it is encoded already, as in a recording.
 
     """
     longest, speed = receiver.payload_bytes, line.bytes_per_s
-    coded = frame.iter_payloads(longest, select_features(receiver.features, speed), speed)
-    payloads = list(chain.from_iterable(coded)) or [b""]
+    if encoded is None:
+        coded = frame.iter_payloads(longest, select_features(receiver.features, speed), speed)
+        encoded = list(chain.from_iterable(coded))
+    payloads = encoded or [b""]
     config = EncoderConfig(frame.grid, frame.format, longest)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()

@@ -5,12 +5,13 @@ Long ones are sampled, so that the work is bounded. Must not know ports, session
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from voxdisplay.display.plan import Line, Plan, Receiver, plan
 from voxdisplay.frame import Frame
+from voxdisplay.shows.show import EncodedShow, Show
 
 MOST_RANKED: Final = 240
 """Frames of which the worst is found."""
@@ -47,40 +48,45 @@ class ShowPlan:
     looked_at: int
 
 
-def plan_show(
-    frame: Callable[[int], Frame],
-    count: int,
-    lines: Sequence[Line],
-    receiver: Receiver,
-) -> ShowPlan:
-    """Return the wire cost of frames, each sent as a whole.
+def plan_show(show: Show, lines: Sequence[Line], receiver: Receiver) -> ShowPlan:
+    """Return the wire cost of the frames of a show, each sent as a whole.
+
+    Those of a recording that the receiver takes are sent as they are, by every line.
 
     Parameters
     ----------
-    frame : callable
-        Returns the frame of a number from 0 to ``count - 1``.
-    count : int
+    show : Show
+        Of one grid and pixel format.
     lines : sequence of Line
     receiver : Receiver
 
     """
-    ranked = _spread(count, MOST_RANKED)
-    sizes = [plan(frame(number), _RANKING, receiver) for number in ranked]
+    ranked = _spread(show.frame_count, MOST_RANKED)
+    sizes = [_plans(show, number, (_RANKING,), receiver)[0] for number in ranked]
     worst = ranked[max(range(len(ranked)), key=lambda at: sizes[at].wire_bytes)]
-    planned = [frame(number) for number in _spread(count, MOST_PLANNED)]
-    means = [
-        sum(plan(each, line, receiver).wire_bytes for each in planned) / len(planned)
-        for line in lines
+    planned = [
+        _plans(show, number, lines, receiver) for number in _spread(show.frame_count, MOST_PLANNED)
     ]
-    heaviest = frame(worst)
     return ShowPlan(
         worst=worst,
-        worst_frame=heaviest,
-        worst_plans=[plan(heaviest, line, receiver) for line in lines],
+        worst_frame=show.frame(worst),
+        worst_plans=_plans(show, worst, lines, receiver),
         mean_voxels=sum(each.voxels for each in sizes) / len(sizes),
-        mean_bytes=means,
+        mean_bytes=[
+            sum(each.wire_bytes for each in of_line) / len(of_line)
+            for of_line in zip(*planned, strict=True)
+        ],
         looked_at=len(ranked),
     )
+
+
+def _plans(show: Show, number: int, lines: Sequence[Line], receiver: Receiver) -> list[Plan]:
+    """Return the cost of a frame on each line."""
+    frame, encoded = show.frame(number), None
+    if isinstance(show, EncodedShow):
+        ready = show.encoded_frame(number, receiver.payload_bytes, receiver.features)
+        encoded = None if ready is None else ready.payloads
+    return [plan(frame, line, receiver, encoded) for line in lines]
 
 
 def _spread(count: int, most: int) -> list[int]:

@@ -6,8 +6,11 @@ entry i - 1 of the palette; coordinates are z up.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +27,7 @@ _MAX_SIDE = 1 << 16
 _MAX_MOVE = 1 << 24
 
 Attributes = dict[str, str]
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +52,20 @@ class _Motion:
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A node of the scene graph: a motion and children, or models."""
+    """A node of the scene graph: motions and children, or models; both keyed by frame numbers."""
 
     hidden: bool
     children: tuple[int, ...] = ()
-    models: tuple[int, ...] = ()
-    motion: _Motion | None = None
+    models: tuple[tuple[int, int], ...] = ()
+    motions: tuple[tuple[int, _Motion], ...] = ()
     layer: int = -1
 
 
 @dataclass(slots=True)
-class _Contents:
-    """Contents of a file."""
+class VoxContents:
+    """Contents of a file: models, and the scene graph that places them in space and time."""
+
+    name: str
 
     models: list[_Model] = field(default_factory=list)
     nodes: dict[int, _Node] = field(default_factory=dict)
@@ -83,23 +89,37 @@ def read_vox(name: str, data: bytes) -> ModelVoxels:
         If it is none; the message names file and place.
 
     """
+    contents = read_contents(name, data)
+    notes: list[str] = []
+    placed = list(_placed(contents, notes))
+    if not placed:
+        raise BodyError(f"{name}: all of its {len(contents.models)} models are hidden or empty")
+    voxels, colors = _joined(contents, placed)
+    return ModelVoxels(voxels, colors, tuple(notes))
+
+
+def read_contents(name: str, data: bytes) -> VoxContents:
+    """Read all models of a MagicaVoxel file and where they are; as `read_vox`."""
     reader = ByteReader(name, data)
     if reader.bytes(4, "the file's mark") != b"VOX ":
         raise BodyError(f"{name} is not a MagicaVoxel file")
     reader.integer("the version")
-    contents = _Contents()
+    contents = VoxContents(name)
     while reader.left:
         _read_chunk(reader, contents)
     if not contents.models:
         raise BodyError(f"{name} holds no model")
+    return contents
+
+
+def _joined(
+    contents: VoxContents, placed: list[tuple[NDArray[np.int64], NDArray[np.uint8]]]
+) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the voxels, (N, 3), of placed models, and their colours, (N, 3)."""
     palette = default_palette() if contents.palette is None else contents.palette
-    notes: list[str] = []
-    placed = list(_placed(name, contents, notes))
-    if not placed:
-        raise BodyError(f"{name}: all of its {len(contents.models)} models are hidden or empty")
     voxels = np.concatenate([voxels for voxels, _ in placed])
-    colors = palette[np.concatenate([index for _, index in placed]).astype(np.intp) - 1]
-    return ModelVoxels(voxels.astype(np.int32), colors, tuple(notes))
+    index = np.concatenate([index for _, index in placed]).astype(np.intp)
+    return voxels.astype(np.int32), palette[index - 1]
 
 
 def _next_chunk(reader: ByteReader) -> tuple[bytes, ByteReader]:
@@ -116,7 +136,7 @@ def _next_chunk(reader: ByteReader) -> tuple[bytes, ByteReader]:
     return kind, chunk
 
 
-def _read_chunk(reader: ByteReader, contents: _Contents) -> None:
+def _read_chunk(reader: ByteReader, contents: VoxContents) -> None:
     kind, chunk = _next_chunk(reader)
     if kind == b"SIZE":
         size = np.array(chunk.integers(3, "the size of a model"), dtype=np.int64)
@@ -170,18 +190,24 @@ def _read_transform(chunk: ByteReader, hidden: bool) -> _Node:
     child, _, layer, frames = chunk.integers(4, "a transform")
     if frames < 1:
         raise chunk.error(f"a transform of {frames} frames")
-    first = _read_attributes(chunk)  # later frames move it in time
-    matrix = _rotation(first.get("_r", "4"), chunk)
+    motions = [_read_motion(chunk) for _ in range(frames)]
+    return _Node(hidden, (child,), (), tuple(sorted(motions, key=itemgetter(0))), layer)
+
+
+def _read_motion(chunk: ByteReader) -> tuple[int, _Motion]:
+    """Return the motion of one frame of a transform, and the frame's number."""
+    attributes = _read_attributes(chunk)
+    matrix = _rotation(attributes.get("_r", "4"), chunk)
     offset = np.zeros(3, dtype=np.int64)
-    if "_t" in first:
+    if "_t" in attributes:
         try:
-            numbers = [int(word) for word in first["_t"].split()[:4]]
+            numbers = [int(word) for word in attributes["_t"].split()[:4]]
         except ValueError:
             numbers = []
         if len(numbers) != 3 or max(map(abs, numbers)) > _MAX_MOVE:
-            raise chunk.error(f"a translation {first['_t'][:40]!r}")
+            raise chunk.error(f"a translation {attributes['_t'][:40]!r}")
         offset[:] = numbers
-    return _Node(hidden, (child,), (), _Motion(matrix, offset), layer)
+    return _frame_number(attributes), _Motion(matrix, offset)
 
 
 def _rotation(text: str, chunk: ByteReader) -> NDArray[np.int64]:
@@ -205,7 +231,7 @@ def _read_shape(chunk: ByteReader, hidden: bool) -> _Node:
     for _ in _read_list(chunk, "models"):
         number, attributes = chunk.integer("a model"), _read_attributes(chunk)
         models.append((_frame_number(attributes), number))
-    return _Node(hidden, (), tuple(number for _, number in sorted(models)))
+    return _Node(hidden, (), tuple(sorted(models)))
 
 
 def _frame_number(attributes: Attributes) -> int:
@@ -216,42 +242,53 @@ def _frame_number(attributes: Attributes) -> int:
 _NODES = {b"nTRN": _read_transform, b"nGRP": _read_group, b"nSHP": _read_shape}
 
 
+def _keyed(keys: Sequence[tuple[int, _T]], frame: int) -> _T:
+    """Return the value of the last key that is not after a frame; before the first, that of it."""
+    return keys[max(0, bisect_right(keys, frame, key=itemgetter(0)) - 1)][1]
+
+
 def _placed(
-    name: str, contents: _Contents, notes: list[str]
+    contents: VoxContents, notes: list[str], frame: int = 0
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.uint8]]]:
     """Yield the voxels of each visible model in the scene, and their colour indices."""
     if not contents.nodes:
-        model = contents.models[0]
+        model = contents.models[min(frame, len(contents.models) - 1)]
         if len(contents.models) > 1:
             notes.append(f"{len(contents.models)} models without a scene: the first frame is shown")
         yield model.voxels[:, :3].astype(np.int64), model.voxels[:, 3]
         return
     lit = hidden = 0
-    for number, motion, visible in _shapes(name, contents):
+    for number, motion, visible in _shapes(contents, frame):
         node = contents.nodes[number]
         if not visible:
             hidden += 1
             continue
         if len(node.models) > 1:
             notes.append(f"a shape has {len(node.models)} frames: the first is shown")
-        for index in node.models[:1]:
-            if not 0 <= index < len(contents.models):
-                raise BodyError(f"{name}: node {number} shows model {index} of "
-                                f"{len(contents.models)}")  # fmt: skip
-            model = contents.models[index]
-            lit += len(model.voxels)
-            if lit > MAX_LIT:
-                raise BodyError(f"{name} shows more than {MAX_LIT} voxels")
-            # Doubled, so that a voxel's centre is a whole number.
-            center = 2 * model.voxels[:, :3].astype(np.int64) + 1 - 2 * (model.size // 2)
-            moved = center @ motion.matrix.T + 2 * motion.offset
-            yield moved >> 1, model.voxels[:, 3]
+        model = _model_of(contents, number, frame)
+        lit += len(model.voxels)
+        if lit > MAX_LIT:
+            raise BodyError(f"{contents.name} shows more than {MAX_LIT} voxels")
+        # Doubled, so that a voxel's centre is a whole number.
+        center = 2 * model.voxels[:, :3].astype(np.int64) + 1 - 2 * (model.size // 2)
+        moved = center @ motion.matrix.T + 2 * motion.offset
+        yield moved >> 1, model.voxels[:, 3]
     if hidden:
         notes.append(f"{hidden} hidden part{'s' * (hidden > 1)} left out")
 
 
-def _shapes(name: str, contents: _Contents) -> Iterator[tuple[int, _Motion, bool]]:
+def _model_of(contents: VoxContents, number: int, frame: int) -> _Model:
+    """Return the model that a shape shows in a frame."""
+    index = _keyed(contents.nodes[number].models, frame)
+    if not 0 <= index < len(contents.models):
+        raise BodyError(f"{contents.name}: node {number} shows model {index} of "
+                        f"{len(contents.models)}")  # fmt: skip
+    return contents.models[index]
+
+
+def _shapes(contents: VoxContents, frame: int) -> Iterator[tuple[int, _Motion, bool]]:
     """Yield the shapes of the scene graph with their motions, and whether they are visible."""
+    name = contents.name
     children = {child for node in contents.nodes.values() for child in node.children}
     roots = [number for number in contents.nodes if number not in children]
     still = _Motion(np.eye(3, dtype=np.int64), np.zeros(3, dtype=np.int64))
@@ -268,12 +305,44 @@ def _shapes(name: str, contents: _Contents) -> Iterator[tuple[int, _Motion, bool
         if node is None:
             raise BodyError(f"{name}: the scene graph has no node {number}")
         shown = visible and not node.hidden and node.layer not in contents.hidden_layers
-        moved = motion.after(node.motion) if node.motion else motion
+        moved = motion.after(_keyed(node.motions, frame)) if node.motions else motion
         if np.abs(moved.offset).max() > _MAX_MOVE:
             raise BodyError(f"{name}: node {number} is moved out of sight")
         if node.models:
             yield number, moved, shown
         waiting += [(child, moved, shown, depth + 1) for child in reversed(node.children)]
+
+
+def frame_voxels(contents: VoxContents, frame: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the voxels, (N, 3), of a frame, and their colours, (N, 3)."""
+    placed = list(_placed(contents, [], frame))
+    if not placed:
+        return np.empty((0, 3), dtype=np.int32), np.empty((0, 3), dtype=np.uint8)
+    return _joined(contents, placed)
+
+
+def key_frames(contents: VoxContents) -> list[int]:
+    """Return the numbers of the frames, ascending, in which anything may change; the first is 0."""
+    if not contents.nodes:
+        return list(range(len(contents.models)))
+    keys = {0}
+    for node in contents.nodes.values():
+        keys.update(number for number, _ in (*node.models, *node.motions))
+    return sorted(keys)
+
+
+def frame_box(contents: VoxContents, frame: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the corners, (3,), of the box of all models that a frame shows; empty without any."""
+    low, high = np.full(3, 2 * _MAX_MOVE), np.full(3, -2 * _MAX_MOVE)
+    if not contents.nodes:
+        return 0 * low, contents.models[frame].size
+    for number, motion, visible in _shapes(contents, frame):
+        if visible:
+            size = _model_of(contents, number, frame).size
+            ends = np.array([0 * size, 2 * size]) - 2 * (size // 2)
+            corners = (ends @ motion.matrix.T + 2 * motion.offset) // 2
+            low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+    return low, high
 
 
 def default_palette() -> NDArray[np.uint8]:

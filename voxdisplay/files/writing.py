@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Ints
 
-_SIDE = 256
+VOX_SIDE = 256
 """Longest side of a model of MagicaVoxel."""
 _COLORS = 255
 
@@ -74,31 +74,32 @@ def _write_npz(file: BinaryIO, page: LitPage) -> None:
 
 def _write_vox(file: BinaryIO, page: LitPage) -> str | None:
     """Write a MagicaVoxel file; what is longer than 256 voxels becomes several models."""
-    index, palette, remark = _palette(page.colors)
+    index, palette, remark = vox_palette(page.colors)
     sides = np.array(page.pixels.shape[2::-1])
-    cells = page.voxels // _SIDE
+    cells = page.voxels // VOX_SIDE
     chunks: list[bytes] = []
     places: list[NDArray[np.integer]] = []
-    for cell in np.ndindex(*(-(-sides // _SIDE))):
+    for cell in np.ndindex(*(-(-sides // VOX_SIDE))):
         inside = (cells == cell).all(axis=1)
-        start = np.array(cell) * _SIDE
-        size = np.minimum(sides - start, _SIDE)
-        if not inside.any() and (chunks or (sides > _SIDE).any()):
+        start = np.array(cell) * VOX_SIDE
+        size = np.minimum(sides - start, VOX_SIDE)
+        if not inside.any() and (chunks or (sides > VOX_SIDE).any()):
             continue
         local = np.column_stack((page.voxels[inside] - start, index[inside])).astype(np.uint8)
         chunks += [
-            _chunk(b"SIZE", struct.pack("<3i", *size.tolist())),
-            _chunk(b"XYZI", struct.pack("<i", len(local)) + local.tobytes()),
+            vox_chunk(b"SIZE", struct.pack("<3i", *size.tolist())),
+            vox_chunk(b"XYZI", struct.pack("<i", len(local)) + local.tobytes()),
         ]
         places.append(start + size // 2)
-    if (sides > _SIDE).any():
+    if (sides > VOX_SIDE).any():
         chunks += _scene_graph(places)
-    chunks.append(_chunk(b"RGBA", palette.tobytes()))
-    file.write(b"VOX " + struct.pack("<i", 150) + _chunk(b"MAIN", b"", b"".join(chunks)))
+    chunks.append(vox_chunk(b"RGBA", palette.tobytes()))
+    file.write(b"VOX " + struct.pack("<i", 150) + vox_chunk(b"MAIN", b"", b"".join(chunks)))
     return remark
 
 
-def _chunk(kind: bytes, content: bytes, children: bytes = b"") -> bytes:
+def vox_chunk(kind: bytes, content: bytes, children: bytes = b"") -> bytes:
+    """Return a chunk of a MagicaVoxel file."""
     return kind + struct.pack("<2i", len(content), len(children)) + content + children
 
 
@@ -107,23 +108,25 @@ def _scene_graph(places: list[NDArray[np.integer]]) -> list[bytes]:
     none = struct.pack("<i", 0)
     children = struct.pack(f"<{len(places)}i", *range(2, 2 + 2 * len(places), 2))
     chunks = [
-        _chunk(b"nTRN", struct.pack("<i", 0) + none + struct.pack("<4i", 1, -1, -1, 1) + none),
-        _chunk(b"nGRP", struct.pack("<i", 1) + none + struct.pack("<i", len(places)) + children),
+        vox_chunk(b"nTRN", struct.pack("<i", 0) + none + struct.pack("<4i", 1, -1, -1, 1) + none),
+        vox_chunk(b"nGRP", struct.pack("<i", 1) + none + struct.pack("<i", len(places)) + children),
     ]
     for model, place in enumerate(places):
         node = 2 + 2 * model
         text = " ".join(map(str, place.tolist())).encode()
         move = struct.pack("<2i", 1, 2) + b"_t" + struct.pack("<i", len(text)) + text
         chunks += [
-            _chunk(b"nTRN", struct.pack("<i", node) + none
+            vox_chunk(b"nTRN", struct.pack("<i", node) + none
                    + struct.pack("<4i", node + 1, -1, 0, 1) + move),
-            _chunk(b"nSHP", struct.pack("<i", node + 1) + none
+            vox_chunk(b"nSHP", struct.pack("<i", node + 1) + none
                    + struct.pack("<2i", 1, model) + none),
         ]  # fmt: skip
     return chunks
 
 
-def _palette(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8], str | None]:
+def vox_palette(
+    colors: NDArray[np.uint8],
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], str | None]:
     """Return colour indices, 1 to 255, the palette, (256, 4), and a remark if it lacks colours."""
     found, index = np.unique(colors, axis=0, return_inverse=True)
     index = index.reshape(-1)

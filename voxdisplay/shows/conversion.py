@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from voxdisplay.errors import RecordingError
-from voxdisplay.shows.frame_arrays import FrameArrays, write_frames
-from voxdisplay.shows.recording import Recording
+from voxdisplay.shows.frame_arrays import write_frames
 from voxdisplay.shows.recording_writer import (
     RecordingFormat,
     RecordingWriter,
     drawing_features,
 )
-from voxdisplay.shows.show import EncodedFrame
+from voxdisplay.shows.show import EncodedFrame, Show
+from voxdisplay.shows.show_files import open_show
 
-_READ = (".vxs", ".npz")
-_WRITTEN = (".npz", ".vxs")
+WRITTEN_SUFFIXES = (".npz", ".vxs", ".vox")
+"""Suffixes that `write_show` writes."""
 
 
 def convert_show(source: Path, target: Path, fps: float | None = None) -> int:
@@ -40,35 +40,57 @@ def convert_show(source: Path, target: Path, fps: float | None = None) -> int:
         If a file is of another kind, or cannot be read or written.
 
     """
-    kinds = source.suffix.lower(), target.suffix.lower()
-    if kinds[0] not in _READ:
-        raise RecordingError(f"{source.name} cannot be read: take {_either(_READ)}")
-    if kinds[1] not in _WRITTEN:
-        raise RecordingError(f"{target.name} cannot be written: take {_either(_WRITTEN)}")
-    if kinds[0] == kinds[1]:
-        raise RecordingError(f"{source.name} is a file {kinds[1]} already")
+    show = open_show(source, fps)
+    write_show(show, target)
+    return show.frame_count
+
+
+def write_show(show: Show, target: Path) -> str | None:
+    """Write a show of one grid and pixel format; return what the file cannot hold, for people.
+
+    Raises
+    ------
+    RecordingError
+        If the file is of another kind, or cannot be read or written.
+
+    """
+    suffix = target.suffix.lower()
+    if suffix not in WRITTEN_SUFFIXES:
+        raise RecordingError(
+            f"{target.name} cannot be written: take {' or '.join(WRITTEN_SUFFIXES)}"
+        )
+    if not show.frame_count:
+        raise RecordingError("there is no whole frame to write")
     try:
-        if kinds[0] == ".vxs":
-            return write_frames(Recording(source), target)
-        return _record_arrays(FrameArrays(source, fps), target)
+        if suffix == ".vox":
+            from voxdisplay.shows.vox_animation import write_vox_animation  # noqa: PLC0415 - rare
+
+            return write_vox_animation(show, target)
+        if suffix == ".npz":
+            write_frames(show, target)
+        else:
+            _write_recording(show, target)
     except OSError as error:
-        raise RecordingError(f"cannot read {source}: {error.strerror}") from error
+        raise RecordingError(f"cannot write {target}: {error.strerror}") from error
+    return None
 
 
-def _either(suffixes: Collection[str]) -> str:
-    return " or ".join(suffixes)
-
-
-def _record_arrays(arrays: FrameArrays, target: Path) -> int:
-    features = drawing_features(arrays.format)
-    wanted = RecordingFormat(arrays.grid, arrays.format, round(arrays.fps * 1000), features)
+def _write_recording(show: Show, target: Path) -> None:
+    first = show.frame(0)
+    wanted = RecordingFormat(
+        first.grid,
+        first.format,
+        round(show.fps * 1000),
+        drawing_features(first.format),
+        loop=show.loop,
+    )
     with RecordingWriter(target, wanted) as writer:
-        for frame in _encoded(arrays, wanted):
+        for frame in _encoded(show, wanted):
             writer.append(frame)
-    return writer.frame_count
 
 
-def _encoded(arrays: FrameArrays, wanted: RecordingFormat) -> Iterator[EncodedFrame]:
-    for frame in arrays.frames():
+def _encoded(show: Show, wanted: RecordingFormat) -> Iterator[EncodedFrame]:
+    for number in range(show.frame_count):
+        frame = show.frame(number)
         payloads = frame.payloads(wanted.max_payload, wanted.features)
         yield EncodedFrame(tuple(payloads), frame.digest())

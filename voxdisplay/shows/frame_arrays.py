@@ -7,8 +7,6 @@ The file holds ``frames``, (n, nz, ny, nx) or (n, nz, ny, nx, 3) as of `Frame.ar
 from __future__ import annotations
 
 import zipfile
-import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,7 +17,9 @@ from voxdisplay.errors import RecordingError
 from voxdisplay.frame import Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
+from voxdisplay.shows.fixed_format_show import FixedFormatShow
 from voxdisplay.shows.show import Show
+from voxdisplay.shows.zip_archives import ARCHIVE_DAMAGE
 
 _FRAMES = "frames.npy"
 _DEFAULT_FPS = 30.0
@@ -73,8 +73,8 @@ def _write_entry(archive: zipfile.ZipFile, name: str, array: NDArray[Any]) -> No
         np.lib.format.write_array(entry, array, allow_pickle=False)
 
 
-class FrameArrays:
-    """Frames of an .npz file: a show whose frames are read in their order.
+class FrameArrays(FixedFormatShow):
+    """Frames of an .npz file: a show whose frames are best read in their order.
 
     Parameters
     ----------
@@ -91,27 +91,21 @@ class FrameArrays:
 
     """
 
-    loop = False
-
     def __init__(self, path: Path, fps: float | None = None) -> None:
         self._path = path
-        try:
-            with zipfile.ZipFile(path) as archive:
-                names = archive.namelist()
-                if _FRAMES not in names:
-                    raise RecordingError(f"{path.name} has no array frames", hint=_ENTRY_HINT)
-                with archive.open(_FRAMES) as entry:
-                    self._shape, self._dtype = _header(entry, path)
-                small = {
-                    name: self._small(archive, f"{name}.npy")
-                    for name in ("fps", "format", "palette")
-                    if f"{name}.npy" in names
-                }
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-            raise RecordingError(f"{path.name} is no .npz file: {error}") from error
-        self.format = self._format(small.get("format"))
-        wanted = self.format.shape(self._shape[1:4])
-        if self._shape[1:] != wanted or self._dtype != np.dtype(self.format.dtype):
+        self._entry: IO[bytes] | None = None  # at frame `_next`
+        self._next = 0
+        with path.open("rb") as file:
+            try:
+                with zipfile.ZipFile(file) as archive:
+                    small = self._read_head(archive)
+            except RecordingError:
+                raise
+            except ARCHIVE_DAMAGE as error:
+                raise RecordingError(f"{path.name} is no .npz file: {error}") from error
+        self.pixel_format = self._format(small.get("format"))
+        wanted = self.pixel_format.shape(self._shape[1:4])
+        if self._shape[1:] != wanted or self._dtype != np.dtype(self.pixel_format.dtype):
             raise RecordingError(
                 f"{path.name}: frames are {self._shape} {self._dtype}, no memory of a display",
                 hint="(n, nz, ny, nx) uint8 for mono1 and index8, uint16 for rgb565; "
@@ -128,19 +122,26 @@ class FrameArrays:
         )
         if not 0 < self.fps < np.inf:
             raise RecordingError(f"{path.name}: its fps are {self.fps}")
+        self.frame_count = int(self._shape[0])
 
-    @property
-    def frame_count(self) -> int:
-        """Number of frames."""
-        return int(self._shape[0])
+    def _read_head(self, archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
+        """Read shape and type of the frames; return the other arrays."""
+        names = archive.namelist()
+        if _FRAMES not in names:
+            raise RecordingError(f"{self._path.name} has no array frames", hint=_ENTRY_HINT)
+        with archive.open(_FRAMES) as entry:
+            self._shape, self._dtype = _header(entry, self._path)
+        return {
+            name: self._small(archive, f"{name}.npy")
+            for name in ("fps", "format", "palette")
+            if f"{name}.npy" in names
+        }
 
-    @property
-    def duration(self) -> float:
-        """Seconds."""
-        return self.frame_count / self.fps
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._path, self.fps)
 
-    def frames(self) -> Iterator[Frame]:
-        """Yield all frames.
+    def frame(self, number: int) -> Frame:
+        """Return a frame: see `Show.frame`. One before the last that was read takes long.
 
         Raises
         ------
@@ -148,18 +149,35 @@ class FrameArrays:
             If the file is damaged, or a pixel is none of the format.
 
         """
+        if not 0 <= number < self.frame_count:
+            raise IndexError(f"number is {number}: there are frames 0 to {self.frame_count - 1}")
         palette = None if self._palette is None else self._palette.astype(np.uint8)
         size = int(np.prod(self._shape[1:])) * self._dtype.itemsize
-        with zipfile.ZipFile(self._path) as archive, archive.open(_FRAMES) as entry:
-            _header(entry, self._path)
-            for number in range(self.frame_count):
-                try:
-                    raw = entry.read(size)
-                    frame = Frame(self.grid, self.format, palette=palette)
-                    frame.set(np.frombuffer(raw, dtype=self._dtype).reshape(self._shape[1:]))
-                except (zipfile.BadZipFile, zlib.error, EOFError, ValueError) as error:
-                    raise RecordingError(f"{self._path.name}: frame {number}: {error}") from error
-                yield frame
+        try:
+            if self._entry is None or number < self._next:
+                self._entry, self._next = self._open(), 0
+            while self._next < number:
+                self._entry.read(size)
+                self._next += 1
+            raw = self._entry.read(size)
+            self._next += 1
+            frame = Frame(self.grid, self.pixel_format, palette=palette)
+            frame.set(np.frombuffer(raw, dtype=self._dtype).reshape(self._shape[1:]))
+        except RecordingError:
+            raise
+        except ARCHIVE_DAMAGE as error:
+            self._entry = None
+            raise RecordingError(f"{self._path.name}: frame {number}: {error}") from error
+        if number == self.frame_count - 1:
+            self._entry = None
+        return frame
+
+    def _open(self) -> IO[bytes]:
+        """Return the frames' entry, behind its header."""
+        with zipfile.ZipFile(self._path) as archive:
+            entry = archive.open(_FRAMES)  # it keeps the file open
+        _header(entry, self._path)
+        return entry
 
     def _format(self, stated: NDArray[Any] | None) -> PixelFormat:
         if stated is not None:

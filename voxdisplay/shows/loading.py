@@ -1,4 +1,4 @@
-"""Loading of what can be played: scenes, recordings and playlists.
+"""Loading of what can be played: scenes, recordings, other files of frames, and playlists.
 
 Must not know displays.
 """
@@ -14,8 +14,10 @@ from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.model import Scene
 from voxdisplay.scene.reader import load_scene
 from voxdisplay.shows.binding import Playable
+from voxdisplay.shows.fixed_format_show import FixedFormatShow
 from voxdisplay.shows.playlist import Playlist, PlaylistEntry, PlaylistFile, check_playlist
 from voxdisplay.shows.recording import Recording
+from voxdisplay.shows.show_files import SHOW_SUFFIXES, open_show
 
 _MAX_PLAYLIST_BYTES = 1 << 22
 _MAX_ENTRIES = 10_000  # of a playlist with those that it includes
@@ -50,9 +52,11 @@ def load_show(path: str | os.PathLike[str]) -> Playable:
     return Playlist(tuple(entries), root.repeat, root.shuffle, tuple(notes))
 
 
-def _load_one(path: str | os.PathLike[str]) -> Recording | Scene:
-    """Read a recording or a scene; by its first byte, which is 00 of a recording alone."""
+def _load_one(path: str | os.PathLike[str]) -> Recording | FixedFormatShow | Scene:
+    """Read a file of frames or a scene; a recording by its first byte, which is 00 of one alone."""
     if str(path) != "-":
+        if str(path).lower().endswith(SHOW_SUFFIXES):
+            return open_show(Path(path))
         try:
             with Path(path).open("rb") as file:
                 is_recording = file.read(1) == b"\0"
