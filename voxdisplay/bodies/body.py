@@ -77,6 +77,21 @@ class Body(ABC):
 
         """
 
+    def values_at(self, points: Floats) -> Mapping[str, Floats]:  # noqa: ARG002 - most have none
+        """Return the body's own parameters, such as u and v, at points of it.
+
+        Parameters
+        ----------
+        points : (n, 3) float64 array
+
+        Returns
+        -------
+        mapping of str to (n,) float64 array
+            Of points near the body, those of a near point of it; empty if it has none.
+
+        """
+        return {}
+
     def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:
         """Return the body of the points ``matrix @ p + offset`` for its points p.
 
@@ -125,6 +140,11 @@ class TransformedBody(Body):
         inner = transform_bounds(bounds, inverse, -inverse @ self.offset)
         geometry = self.body.geometry(inner, certified=certified)
         return geometry.transformed(self.matrix, self.offset)
+
+    def values_at(self, points: Floats) -> Mapping[str, Floats]:
+        """Return the parameters of the body inside: `Body.values_at`."""
+        inverse: Floats = np.linalg.inv(self.matrix).astype(np.float64)
+        return self.body.values_at((points - self.offset) @ inverse.T)
 
     def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:
         """Return the body under both maps: `Body.transformed`."""

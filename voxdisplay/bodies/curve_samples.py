@@ -27,6 +27,8 @@ class Samples(NamedTuple):
     t : (n,) float64 array
         Ascending.
     points : (n, 3) float64 array
+    s : (n,) float64 array
+        Share of the length up to each point, 0 to 1, without jumps.
     first : (m,) int64 array
         Points that are joined with the next; the curve does not jump between them.
 
@@ -34,6 +36,7 @@ class Samples(NamedTuple):
 
     t: Floats
     points: Floats
+    s: Floats
     first: Ints
 
     def runs(self) -> Iterator[Floats]:
@@ -93,7 +96,9 @@ def sample_curve(curve: Curve, low: Floats, high: Floats) -> Samples:
         lower = np.minimum(points[:-1], points[1:]) > high
         near &= ~(lower | (np.maximum(points[:-1], points[1:]) < low)).any(axis=1)
     near &= ~open_  # what stays long jumps
-    return Samples(t, points, np.flatnonzero(near))
+    lengths = np.where(open_, 0.0, np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)))
+    s = np.append(0.0, np.cumsum(lengths))
+    return Samples(t, points, s / (s[-1] or 1.0), np.flatnonzero(near))
 
 
 def _points(curve: Curve, t: Floats) -> Floats:

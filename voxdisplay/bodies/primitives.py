@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, SupportsFloat
 
 import numpy as np
 
 from voxdisplay.bodies.body import Body, Fill, check_fill
+from voxdisplay.bodies.body_parameters import (
+    Basis,
+    BodyParameters,
+    Cylindrical,
+    Planar,
+    Polar,
+    Spherical,
+)
 from voxdisplay.bodies.geometry import Bounds
 from voxdisplay.bodies.quadrics import Quadric, QuadricPatch, QuadricPatches, half_space
 from voxdisplay.curves import arguments
@@ -31,13 +39,22 @@ class QuadricBody(Body):
     Parameters
     ----------
     patches : QuadricPatches
+    parameters : BodyParameters
+        Its u and v.
     fill : {"shell", "solid"}
 
     """
 
-    def __init__(self, patches: QuadricPatches, fill: Fill = "shell") -> None:
+    def __init__(
+        self, patches: QuadricPatches, parameters: BodyParameters, fill: Fill = "shell"
+    ) -> None:
         self.fill = check_fill(fill)
         self._patches = patches
+        self._parameters = parameters
+
+    def values_at(self, points: Floats) -> Mapping[str, Floats]:
+        """Return u and v: `Body.values_at`."""
+        return self._parameters(points)
 
     def bounds(self) -> Bounds:
         """Return a box that holds all patches, infinite for planes."""
@@ -52,6 +69,8 @@ class QuadricBody(Body):
 class Plane(QuadricBody):
     """A plane, as far as the display goes.
 
+    Its voxels have the values u and v, in voxels from ``point``: `body_parameters.Planar`.
+
     Parameters
     ----------
     point : (3,) array
@@ -63,15 +82,16 @@ class Plane(QuadricBody):
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
         at = arguments.vector("point", point)
-        *_, n = orthonormal_basis("normal", normal)
-        super().__init__(
-            QuadricPatches((QuadricPatch(half_space(at, n), (), _ANYWHERE),), closed=False)
-        )
+        u, v, n = orthonormal_basis("normal", normal)
+        patch = QuadricPatch(half_space(at, n), (), _ANYWHERE)
+        super().__init__(QuadricPatches((patch,), closed=False), Planar(at, (u, v, n)))
         self._arguments = {"point": at, "normal": n}
 
 
 class Disc(QuadricBody):
     """A flat disc.
+
+    Its voxels have the values u, the angle, and v, from 0 in the middle to 1 on the rim.
 
     Parameters
     ----------
@@ -89,12 +109,15 @@ class Disc(QuadricBody):
         at, r = arguments.vector("center", center), arguments.positive("radius", radius)
         u, v, n = orthonormal_basis("normal", normal)
         patch = QuadricPatch(half_space(at, n), (_ball(at, r),), _disc_bounds(at, r, n))
-        super().__init__(QuadricPatches((patch,), closed=False, wires=(_ring(at, r, u, v),)))
+        patches = QuadricPatches((patch,), closed=False, wires=(_ring(at, r, u, v),))
+        super().__init__(patches, Polar(at, (u, v, n), r))
         self._arguments = {"center": at, "radius": r, "normal": n}
 
 
 class Ellipsoid(QuadricBody):
     """An ellipsoid whose axes are those of the coordinates; `Body.transformed` turns it.
+
+    Its voxels have the values u, the longitude, and v, the latitude: `body_parameters.Spherical`.
 
     Parameters
     ----------
@@ -109,12 +132,14 @@ class Ellipsoid(QuadricBody):
         at, half = arguments.vector("center", center), arguments.vector("radii", radii)
         for axis, radius in enumerate(half.tolist()):
             arguments.positive(f"radii[{axis}]", radius)
-        super().__init__(_ellipsoid(at, half), fill)
+        super().__init__(_ellipsoid(at, half), Spherical(at, half), fill)
         self._arguments = {"center": at, "radii": half, "fill": fill}
 
 
 class Sphere(QuadricBody):
     """A sphere; with ``fill="solid"``, a ball.
+
+    Its voxels have the values u, the longitude, and v, the latitude: `body_parameters.Spherical`.
 
     Parameters
     ----------
@@ -127,12 +152,15 @@ class Sphere(QuadricBody):
 
     def __init__(self, center: ArrayLike, radius: SupportsFloat, *, fill: Fill = "shell") -> None:
         at, r = arguments.vector("center", center), arguments.positive("radius", radius)
-        super().__init__(_ellipsoid(at, np.full(3, r)), fill)
+        radii = np.full(3, r)
+        super().__init__(_ellipsoid(at, radii), Spherical(at, radii), fill)
         self._arguments = {"center": at, "radius": r, "fill": fill}
 
 
 class SphericalTriangle(QuadricBody):
     """A triangle on a sphere whose sides are arcs of great circles.
+
+    Its voxels have the values u, the longitude, and v, the latitude: `body_parameters.Spherical`.
 
     Parameters
     ----------
@@ -171,12 +199,15 @@ class SphericalTriangle(QuadricBody):
         arcs = tuple(at + r * _arc(directions[i], directions[(i + 1) % 3], r) for i in range(3))
         bounds = _triangle_bounds(at, r, directions, clips)
         patch = QuadricPatch(_ball(at, r), clips, bounds)
-        super().__init__(QuadricPatches((patch,), closed=False, wires=arcs))
+        patches = QuadricPatches((patch,), closed=False, wires=arcs)
+        super().__init__(patches, Spherical(at, np.full(3, r)))
         self._arguments = {"center": at, "radius": r, "corners": points}
 
 
 class Cylinder(QuadricBody):
     """A circular cylinder with both its end faces.
+
+    Its voxels have the values u, the angle about the axis, and v, from 0 at ``start`` to 1.
 
     Parameters
     ----------
@@ -196,7 +227,8 @@ class Cylinder(QuadricBody):
         *,
         fill: Fill = "shell",
     ) -> None:
-        begin, stop, n = _axis(start, end)
+        begin, stop, basis = _axis(start, end)
+        n = basis[2]
         r = arguments.positive("radius", radius)
         side = Quadric(np.eye(3) - np.outer(n, n), np.zeros(3), -r * r, begin)
         caps = half_space(stop, n), half_space(begin, -n)
@@ -207,12 +239,15 @@ class Cylinder(QuadricBody):
             QuadricPatch(caps[1], (side,), ends[1]),
         )
         wires = (np.stack((begin, stop)),) if r < _THIN else ()
-        super().__init__(QuadricPatches(patches, closed=True, wires=wires), fill)
+        around = Cylindrical(begin, basis, float(np.linalg.norm(stop - begin)))
+        super().__init__(QuadricPatches(patches, closed=True, wires=wires), around, fill)
         self._arguments = {"start": begin, "end": stop, "radius": r, "fill": fill}
 
 
 class Cone(QuadricBody):
     """A circular cone with its base.
+
+    Its voxels have the values u, the angle about the axis, and v, from 0 at the base to 1.
 
     Parameters
     ----------
@@ -234,8 +269,9 @@ class Cone(QuadricBody):
         *,
         fill: Fill = "shell",
     ) -> None:
-        foot, apex, n = _axis(start, end)
-        r, height = arguments.positive("radius", radius), np.linalg.norm(apex - foot)
+        foot, apex, basis = _axis(start, end)
+        n = basis[2]
+        r, height = arguments.positive("radius", radius), float(np.linalg.norm(apex - foot))
         # |d|^2 less the square of its part along the axis is (r / height)^2 times the latter.
         widening = 1.0 + (r / height) ** 2
         side = Quadric(np.eye(3) - widening * np.outer(n, n), np.zeros(3), 0.0, apex)
@@ -247,16 +283,16 @@ class Cone(QuadricBody):
         )
         # The tip of a shell is always there; a solid has the centres inside, like all others.
         wires = (np.stack((foot, apex)),) if r < _THIN or check_fill(fill) == "shell" else ()
-        super().__init__(QuadricPatches(patches, closed=True, wires=wires), fill)
+        around = Cylindrical(foot, basis, height)
+        super().__init__(QuadricPatches(patches, closed=True, wires=wires), around, fill)
         self._arguments = {"start": foot, "end": apex, "radius": r, "fill": fill}
 
 
-def _axis(start: ArrayLike, end: ArrayLike) -> tuple[Floats, Floats, Floats]:
+def _axis(start: ArrayLike, end: ArrayLike) -> tuple[Floats, Floats, Basis]:
     begin, stop = arguments.vector("start", start), arguments.vector("end", end)
     if (begin == stop).all():
         raise ArgumentError("end", "is start: the axis has no direction")
-    *_, n = orthonormal_basis("end less start", stop - begin)
-    return begin, stop, n
+    return begin, stop, orthonormal_basis("end less start", stop - begin)
 
 
 def _ball(center: Floats, radius: float) -> Quadric:

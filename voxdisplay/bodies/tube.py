@@ -1,8 +1,4 @@
-"""Tori, and tubes about curves: all points within a radius of a line, by distances.
-
-A distance changes by no more than the point moves, which bounds it over boxes. Must not know
-voxelisation.
-"""
+"""Tori, and tubes about curves: all points within a radius. Must not know voxelisation."""
 
 from __future__ import annotations
 
@@ -13,17 +9,20 @@ from typing import TYPE_CHECKING, SupportsFloat
 import numpy as np
 
 from voxdisplay.argument_checks import instance
-from voxdisplay.bodies.body import Body, Fill, check_fill
-from voxdisplay.bodies.curve_samples import sample_curve
+from voxdisplay.bodies.ball_chain import BallChain
+from voxdisplay.bodies.body import Body, Fill, check_fill, invertible
+from voxdisplay.bodies.body_parameters import Toroidal
+from voxdisplay.bodies.curve_samples import Samples, sample_curve
 from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds
 from voxdisplay.bodies.implicit import ImplicitFunction
-from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.circular import Circle
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.formula_arguments import Formula
 from voxdisplay.curves.orthonormal_basis import orthonormal_basis
+from voxdisplay.curves.transformed import Transformed
 from voxdisplay.errors import BodyError
 from voxdisplay.expressions.interval import Interval
 from voxdisplay.expressions.params import resolve_params
@@ -33,39 +32,21 @@ if TYPE_CHECKING:
 
 _THIN = 0.8661
 """Tubes of a smaller radius, in voxels, may pass between the mid-lines: their axes are covered."""
-_CELL = 8.0  # of space, whose points share candidates
-_PAIRS = 1 << 18  # of points and parts at a time
-
-
-class _Distance:
-    """Base class of functions that change by no more than the point moves."""
-
-    always_defined = True
-
-    def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
-        raise NotImplementedError
-
-    def at_single_points(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
-        """Return the values at points that are not near each other."""
-        return self(x, y, z)
-
-    def enclosure(self, x: Interval, y: Interval, z: Interval, /) -> Interval | None:
-        """Return the value in the middle, give or take half the diagonal."""
-        sides = [(each.hi - each.lo) / 2 for each in (x, y, z)]
-        middle = self.at_single_points(*((each.lo + each.hi) / 2 for each in (x, y, z)))
-        reach = np.sqrt(sides[0] ** 2 + sides[1] ** 2 + sides[2] ** 2)
-        reach = reach * (1 + 1e-12) + 1e-9 + 1e-12 * np.abs(middle)
-        return Interval(middle - reach, middle + reach)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _TorusDistance(_Distance):
-    """Distance from a torus, negative inside."""
+class _TorusDistance:
+    """Distance from a torus, negative inside; it changes by no more than the point moves."""
 
     center: Floats
     basis: tuple[Floats, Floats, Floats]
     major: float
     minor: float
+
+    @property
+    def always_defined(self) -> bool:
+        """Whether it has a value everywhere: `SpaceFunction`."""
+        return True
 
     def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
         d = x - self.center[0], y - self.center[1], z - self.center[2]
@@ -75,9 +56,19 @@ class _TorusDistance(_Distance):
         )
         return np.asarray(np.hypot(np.hypot(a, b) - self.major, h) - self.minor)
 
+    def enclosure(self, x: Interval, y: Interval, z: Interval, /) -> Interval:
+        """Return the value in the middle, give or take half the diagonal."""
+        sides = [(each.hi - each.lo) / 2 for each in (x, y, z)]
+        middle = self(*((each.lo + each.hi) / 2 for each in (x, y, z)))
+        reach = np.sqrt(sides[0] ** 2 + sides[1] ** 2 + sides[2] ** 2)
+        reach = reach * (1 + 1e-12) + 1e-9 + 1e-12 * np.abs(middle)
+        return Interval(middle - reach, middle + reach)
+
 
 class Torus(Body):
     """A torus.
+
+    Its voxels have the values u, the angle round the normal, and v, the angle round the tube.
 
     Parameters
     ----------
@@ -115,6 +106,11 @@ class Torus(Body):
             "fill": fill,
         }
 
+    def values_at(self, points: Floats) -> Mapping[str, Floats]:
+        """Return the angles u and v: `body_parameters.Toroidal`."""
+        f = self._function
+        return Toroidal(f.center, f.basis, f.major)(points)
+
     def bounds(self) -> Bounds:
         """Return the bounding box: `Body.bounds`."""
         f = self._function
@@ -133,7 +129,10 @@ class Torus(Body):
 
 
 class Tube(Body):
-    """All points within a radius of a curve; open curves have round ends.
+    """The union of all balls with centres on a curve: open curves have round ends.
+
+    Its voxels have the values t, the parameter of the nearest ball, and s, the share of the
+    curve's length there, from 0 to 1.
 
     Parameters
     ----------
@@ -162,28 +161,37 @@ class Tube(Body):
         constant = self.radius.expression.constant if self.radius.expression else None
         if constant is not None:
             arguments.positive("radius", constant)
+        self.metric = np.eye(3)  # in which the balls are round
         self._arguments = {"along": along, "radius": self.radius.source, "fill": fill}
 
     def bounds(self) -> Bounds:
-        """Return a box that holds the tube, by sampling the curve: `Body.bounds`."""
+        """Return the bounding box of the tube, by sampling the curve: `Body.bounds`."""
         samples = sample_curve(self.along, np.full(3, -np.inf), np.full(3, np.inf))
-        reach = float(self._radii(samples.t).max()) + 0.1
-        return samples.points.min(axis=0) - reach, samples.points.max(axis=0) + reach
+        return self._chain(samples).bounds()
 
-    def geometry(self, bounds: Bounds, *, certified: bool = False) -> ImplicitFunction:  # noqa: ARG002 - by samples
-        """Return the distance from it as a function: `Body.geometry`."""
-        a, b = self.along.t_range
-        widest = float(self._radii(np.linspace(a, b, 257)).max()) + 1
-        samples = sample_curve(self.along, bounds[0] - widest, bounds[1] + widest)
+    def geometry(self, bounds: Bounds, *, certified: bool = False) -> BallChain:  # noqa: ARG002 - by samples
+        """Return balls about points within a tolerance of the curve: `Body.geometry`."""
+        t = np.linspace(*self.along.t_range, 257)
+        none = np.empty((0, 3))
+        reach = BallChain(none, np.empty(0), np.empty(0, np.int64), self.metric, {}).reach
+        widest = (float(self._radii(t).max()) + 1) * reach
+        return self._chain(sample_curve(self.along, bounds[0] - widest, bounds[1] + widest))
+
+    def values_at(self, points: Floats) -> Mapping[str, Floats]:
+        """Return t and s of the nearest balls: `Body.values_at`."""
+        if not len(points):
+            return {"t": np.empty(0), "s": np.empty(0)}
+        return self.geometry((points.min(axis=0), points.max(axis=0))).values_at(points)
+
+    def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:
+        """Return the tube of the transformed points: `Body.transformed`."""
+        return _TransformedTube(self, matrix, offset)
+
+    def _chain(self, samples: Samples) -> BallChain:
         radii = self._radii(samples.t)
-        if not samples.first.size:
-            far = np.full(3, -np.inf)
-            return ImplicitFunction(_TubeDistance(samples.points, radii, samples.first), (far, far))
         wires = tuple(samples.runs()) if radii.min() < _THIN else ()
-        low = samples.points.min(axis=0) - radii.max() - 1
-        high = samples.points.max(axis=0) + radii.max() + 1
-        function = _TubeDistance(samples.points, radii, samples.first)
-        return ImplicitFunction(function, (low, high), wires)
+        values = {"t": samples.t, "s": samples.s}
+        return BallChain(samples.points, radii, samples.first, self.metric, values, wires)
 
     def _radii(self, t: Floats) -> Floats:
         with np.errstate(all="ignore"):
@@ -198,63 +206,17 @@ class Tube(Body):
         return radii
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _TubeDistance(_Distance):
-    """Least distance from the parts of a polyline, less the radius there."""
+class _TransformedTube(Tube):
+    """A tube under an affine map, about a curve that is sampled where it is then."""
 
-    points: Floats
-    radii: Floats
-    first: Ints
-
-    def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
-        x, y, z = np.broadcast_arrays(x, y, z)
-        at = np.stack((x, y, z), axis=-1).reshape(-1, 3)
-        out = np.empty(len(at))
-        if not len(at):
-            return out.reshape(x.shape)
-        cell = np.floor(at / _CELL).astype(np.int64)
-        low = cell.min(axis=0)
-        nx, ny, _ = (cell.max(axis=0) - low + 1).tolist()
-        key = (cell - low) @ np.array([1, nx, nx * ny])
-        order = np.argsort(key, kind="stable")
-        starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-        for part in np.split(order, starts[1:]):
-            out[part] = self._near(at[part])
-        return out.reshape(x.shape)
-
-    def at_single_points(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
-        """Return the values at (n,) points, each from all parts."""
-        at = np.stack((x, y, z), axis=1)
-        step = max(_PAIRS // max(self.first.size, 1), 1)
-        parts = [
-            self._to(at[begin : begin + step], self.first).min(axis=1)
-            for begin in range(0, len(at), step)
-        ]
-        return np.concatenate(parts) if parts else np.empty(0)
-
-    def _near(self, at: Floats) -> Floats:
-        """Return the values at points of one cell, (n,)."""
-        low, high = at.min(axis=0), at.max(axis=0)
-        middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-        value = self._to(middle[None], self.first)[0]
-        close = self.first[value <= value.min() + 2 * reach + 1e-9]
-        if len(at) == 1:
-            return np.array([value.min()])
-        out = np.full(len(at), np.inf)
-        for begin in range(0, close.size, 64):
-            part = self._to(at, close[begin : begin + 64])
-            np.minimum(out, part.min(axis=1), out=out)
-        return out
-
-    def _to(self, at: Floats, first: Ints) -> Floats:
-        """Return distance less radius from n points to m straight parts, (n, m)."""
-        a, along = self.points[first], self.points[first + 1] - self.points[first]
-        square = np.maximum((along * along).sum(axis=1), 1e-300)
-        share = (at @ along.T - (a * along).sum(axis=1)) / square
-        np.clip(share, 0, 1, out=share)
-        total = np.zeros(share.shape)
-        for k in range(3):
-            d = at[:, k, None] - (a[:, k] + share * along[:, k])
-            total += d * d
-        radius = self.radii[first]
-        return np.asarray(np.sqrt(total) - (radius + share * (self.radii[first + 1] - radius)))
+    def __init__(self, tube: Tube, matrix: ArrayLike, offset: ArrayLike) -> None:
+        by, to = invertible("matrix", matrix), arguments.vector("offset", offset)
+        along = tube.along
+        whole, start = by, to
+        if isinstance(along, Transformed):
+            whole, start, along = by @ along.matrix, by @ along.offset + to, along.curve
+        self.fill = tube.fill
+        self.along = Transformed(along, whole, start)
+        self.radius = tube.radius
+        self.metric = tube.metric @ np.linalg.inv(by)
+        self._arguments = {"body": tube, "matrix": by, "offset": to}

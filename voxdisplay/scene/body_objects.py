@@ -100,7 +100,9 @@ class Implicit(EnclosingObject, tag="implicit", frozen=True):
 
 
 class Plane(BodyObject, tag="plane", frozen=True):
-    """A plane, as far as the volume goes."""
+    """A plane, as far as the volume goes; u and v are voxels from its point."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     point: Annotated[Vector, Meta(title="Point", description="Any point of the plane.")]
     normal: Normal
@@ -113,7 +115,9 @@ class Plane(BodyObject, tag="plane", frozen=True):
 
 
 class Disc(BodyObject, tag="disc", frozen=True):
-    """A flat disc in the plane across normal."""
+    """A flat disc in the plane across normal; u is the angle, v runs from 0 to 1 at the rim."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     center: Center
     radius: Radius
@@ -158,7 +162,9 @@ class Polygon(BodyObject, tag="polygon", frozen=True):
 
 
 class Sphere(EnclosingObject, tag="sphere", frozen=True):
-    """A sphere; solid, a ball."""
+    """A sphere; solid, a ball; u is the longitude, v the latitude, in radians."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     center: Center
     radius: Radius
@@ -173,7 +179,9 @@ class Sphere(EnclosingObject, tag="sphere", frozen=True):
 
 
 class Ellipsoid(EnclosingObject, tag="ellipsoid", frozen=True):
-    """An ellipsoid along the axes; transform turns it."""
+    """An ellipsoid along the axes; u is the longitude, v the latitude. transform turns it."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     center: Center
     radii: Annotated[
@@ -197,7 +205,9 @@ class Ellipsoid(EnclosingObject, tag="ellipsoid", frozen=True):
 
 
 class SphericalTriangle(BodyObject, tag="spherical_triangle", frozen=True):
-    """A triangle on a sphere, whose sides are arcs of great circles."""
+    """A triangle on a sphere, whose sides are arcs of great circles; u, v as of a sphere."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     center: Center
     radius: Radius
@@ -233,7 +243,9 @@ class Box(EnclosingObject, tag="box", frozen=True):
 
 
 class Cylinder(EnclosingObject, tag="cylinder", frozen=True):
-    """A circular cylinder between the centres of its two end faces."""
+    """A circular cylinder between two end faces; u is the angle, v runs from 0 to 1 along it."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     start: From = field(name="from")
     end: To = field(name="to")
@@ -250,7 +262,9 @@ class Cylinder(EnclosingObject, tag="cylinder", frozen=True):
 
 
 class Cone(EnclosingObject, tag="cone", frozen=True):
-    """A circular cone, from the centre of its base to its apex."""
+    """A circular cone, from its base to its apex; u is the angle, v runs from 0 to 1 at the apex."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     start: From = field(name="from")
     end: To = field(name="to")

@@ -95,13 +95,20 @@ def voxel_colors(
 
 
 def _spread_over_body(colors: Colors, voxels: VoxelSet) -> Colors:
-    """Return colours from the lowest voxel to the highest; those of points for as many points."""
+    """Return colours along the line of a tube, or from the lowest voxel to the highest.
+
+    As many colours as a body has points are those of its points.
+    """
     of = voxels.parameters.get("point")
     if of is not None and len(colors) == getattr(voxels.body, "point_count", None):
         return np.asarray(colors[of.astype(np.int64)])
-    z = voxels.voxels[:, 2].astype(np.float64)
-    span = z.max() - z.min() if len(z) else 0.0
-    return colors_at(colors, (z - z.min()) / (span or 1.0) * (len(colors) - 1)) if len(z) else WHITE
+    if not len(voxels):
+        return WHITE
+    share = voxels.value("s")
+    if share is None:
+        z = voxels.voxels[:, 2].astype(np.float64)
+        share = (z - z.min()) / (np.ptp(z) or 1.0)
+    return colors_at(colors, share * (len(colors) - 1))
 
 
 def _by_value(
@@ -144,8 +151,9 @@ class _Values:
         """Return the values of a name, (N,)."""
         voxels = self.voxels
         if isinstance(voxels, voxelization.VoxelSet):
-            if name in voxels.parameters:
-                return np.asarray(voxels.parameters[name])
+            found = voxels.value(name)
+            if found is not None:
+                return found
         elif name == "t":
             return voxels.t
         elif name == "s":

@@ -3,7 +3,7 @@
 Descriptions and types of the keys are those of the JSON Schema. Values are checked by the bodies.
 """
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -21,7 +21,9 @@ _NOT_INSIDE = ("color", "during", "part", "repeat", "thickness")
 
 
 class Torus(EnclosingObject, tag="torus", frozen=True):
-    """A torus."""
+    """A torus; u is the angle round the middle circle, v round the tube, in radians."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
     center: Center
     major: Annotated[
@@ -45,7 +47,9 @@ class Torus(EnclosingObject, tag="torus", frozen=True):
 
 
 class Tube(EnclosingObject, tag="tube", frozen=True):
-    """All that is within a radius of a curve."""
+    """All that is within a radius of a curve; round at the ends."""
+
+    value_names: ClassVar[tuple[str, ...]] = ("t", "s")
 
     along: Annotated[
         AnyCurve,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from voxdisplay.bodies.ball_chain import BallChain
 from voxdisplay.bodies.body import Body, Kind
 from voxdisplay.bodies.geometry import Geometry, TriangleMesh
 from voxdisplay.bodies.height_field import HeightFunction
@@ -14,6 +15,7 @@ from voxdisplay.bodies.implicit import ImplicitFunction
 from voxdisplay.bodies.quadrics import QuadricPatch, QuadricPatches
 from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.voxelization.flood_fill import count_enclosed
+from voxdisplay.voxelization.measure_chain import chain_distances
 from voxdisplay.voxelization.measure_fields import Field, field_distances, field_tunnels
 from voxdisplay.voxelization.measure_mesh import (
     VoxelLookup,
@@ -125,7 +127,10 @@ def _inside(mesh: TriangleMesh, box: VoxelBox) -> Ints:
 def _distances(voxels: Ints, geometry: Geometry) -> Floats:
     if isinstance(geometry, TriangleMesh):
         return mesh_distances(voxels, geometry.vertices, geometry.faces)
-    return field_distances(np.add(voxels, 0.5, dtype=np.float64), _fields(geometry))
+    centers = np.add(voxels, 0.5, dtype=np.float64)
+    if isinstance(geometry, BallChain):
+        return chain_distances(centers, geometry)
+    return field_distances(centers, _fields(geometry))
 
 
 def _tunnels(voxels: Ints, box: VoxelBox, geometry: Geometry) -> int:
@@ -140,12 +145,30 @@ def _tunnels(voxels: Ints, box: VoxelBox, geometry: Geometry) -> int:
     index = index[np.append(True, index[1:] != index[:-1])]
     cells = box.voxels_at(index).astype(np.int64)
     cells = cells[lookup.rows(cells) < 0]
+    fields = _fields(geometry)
+    if len(fields) == 1 and fields[0][1] is None:
+        return _sign_changes(cells, fields[0][0])
     total = 0
     for step in _STEPS:
         after = cells + step
         dark = (lookup.rows(after) < 0) & box.inside(after)
-        crossed = field_tunnels(cells[dark] + 0.5, after[dark] + 0.5, _fields(geometry))
+        crossed = field_tunnels(cells[dark] + 0.5, after[dark] + 0.5, fields)
         total += int(crossed.sum())
+    return total
+
+
+def _sign_changes(cells: Ints, field: Field) -> int:
+    """Return the number of pairs of 6-neighbours, among cells, between which a function changes."""
+    if not len(cells):
+        return 0
+    lookup = VoxelLookup(cells)
+    with np.errstate(all="ignore"):
+        value = field(np.add(cells, 0.5, dtype=np.float64))
+    total = 0
+    for step in _STEPS:
+        after = lookup.rows(cells + step)
+        one, two = value[after >= 0], value[after[after >= 0]]
+        total += int((((one < 0) != (two < 0)) & np.isfinite(one) & np.isfinite(two)).sum())
     return total
 
 
@@ -156,6 +179,8 @@ def _fields(geometry: Geometry) -> Sequence[tuple[Field, Field | None]]:
     if isinstance(geometry, ImplicitFunction):
         function = geometry.function
         return [(lambda p: np.asarray(function(p[:, 0], p[:, 1], p[:, 2])), None)]
+    if isinstance(geometry, BallChain):
+        return [(lambda p: geometry.nearest(p).distance, None)]
     if isinstance(geometry, HeightFunction):
         value, low, high = geometry.value, geometry.low, geometry.high
         return [

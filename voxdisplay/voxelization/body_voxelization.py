@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from voxdisplay.bodies.ball_chain import BallChain
 from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
 from voxdisplay.bodies.height_field import HeightFunction
 from voxdisplay.bodies.implicit import ImplicitFunction
@@ -39,6 +40,7 @@ _VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
     LitVoxels: ("lit_voxels", "voxelize_lit"),
     QuadricPatches: ("quadrics", "voxelize_quadrics"),
     ImplicitFunction: ("implicit", "voxelize_implicit"),
+    BallChain: ("ball_chains", "voxelize_chain"),
     HeightFunction: ("height_field", "voxelize_heights"),
 }
 

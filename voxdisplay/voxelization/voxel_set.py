@@ -88,6 +88,17 @@ class VoxelSet:
         voxels.flags.writeable = False
         return voxels
 
+    def value(self, name: str) -> Floats | None:
+        """Return numbers at the voxels by name, (N,); None if there are none of that name.
+
+        Those of ``parameters``, or the body's own parameters at the centres: `Body.values_at`.
+        """
+        if name in self.parameters:
+            return np.asarray(self.parameters[name])
+        if self.body is None:
+            return None
+        return self.body.values_at(np.add(self.voxels, 0.5, dtype=np.float64)).get(name)
+
     @cached_property
     def report(self) -> BodyReport:
         """Quality figures, computed when first asked for: that takes longer than drawing."""

@@ -327,3 +327,85 @@ class TestColors:
         error = refused({"type": "sphere", "center": C, "radius": 5, "color": color})
         assert error.path == f"$.objects[0]{path}"
         assert message in str(error)
+
+
+class TestColoursByParameters:
+    """Angles and shares of primitives, and of tubes along their curves."""
+
+    SIZE = (17, 18, 19)
+
+    def colors_of(self, scene_object: dict[str, Any], by: str) -> tuple[np.ndarray, np.ndarray]:
+        coloring = {"map": "gray", "by": by, "range": [0, 1]}
+        scene = scene_of(scene_object | {"color": coloring})
+        (found,) = scene.voxelize(clip=self.SIZE)
+        frame = vd.Frame(self.SIZE)
+        frame.draw(scene)
+        x, y, z = found.voxels.T
+        return found.voxels + 0.5, frame.array()[z, y, x, 0] / 255
+
+    @pytest.mark.parametrize(
+        ("scene_object", "by", "expected"),
+        [
+            (BODIES[7], "u/tau", lambda p: np.arctan2(*(p - C)[:, 1::-1].T) / (2 * np.pi) % 1),
+            (
+                BODIES[8],
+                "v/pi + 1/2",
+                lambda p: (
+                    0.5
+                    + np.arctan2((p - C)[:, 2] / 3, np.hypot((p - C)[:, 0] / 5, (p - C)[:, 1] / 4))
+                    / np.pi
+                ),
+            ),
+            (BODIES[4], "v", lambda p: np.linalg.norm((p - C)[:, :2], axis=1) / 5),
+            (BODIES[11], "v", lambda p: (p[:, 2] - 2) / 7),
+            (BODIES[12], "1 - v", lambda p: 1 - (p[:, 2] - 2) / 7),
+            (
+                {"type": "plane", "point": C, "normal": [0, 0, 2]},
+                "u/20 + 1/2",
+                lambda p: (p[:, 0] - 8) / 20 + 0.5,
+            ),
+            (
+                {"type": "torus", "center": C, "major": 5, "minor": 2, "fill": "solid"},
+                "v/tau",
+                lambda p: (
+                    np.arctan2(p[:, 2] - 10, np.linalg.norm((p - C)[:, :2], axis=1) - 5)
+                    / (2 * np.pi)
+                    % 1
+                ),
+            ),
+            (
+                {"type": "tube", "along": LINE, "radius": 2, "fill": "solid"},
+                "t",
+                lambda p: np.clip((p[:, 0] - 4) / 5, 0, 1),
+            ),
+            (LINE | {"thickness": 4}, "s", lambda p: np.clip((p[:, 0] - 4) / 5, 0, 1)),
+        ],
+        ids=lambda each: each.get("type") if isinstance(each, dict) else None,
+    )
+    def test_values(self, scene_object: dict[str, Any], by: str, expected: Any) -> None:
+        centres, shown = self.colors_of(scene_object, by)
+        wanted = np.clip(expected(centres), 0, 1)
+        assert np.abs(shown - wanted).max() < 0.02
+        assert np.ptp(wanted) > 0.2
+
+    def test_they_turn_with_the_body(self) -> None:
+        turn = [{"rotate": [0, 1, 0], "angle": "90*deg", "about": C}]  # z becomes x
+        axis = {"type": "cylinder", "from": [8, 9, 5], "to": [8, 9, 15], "radius": 4}
+        centres, shown = self.colors_of(axis | {"transform": turn}, "v")
+        assert np.abs(shown - np.clip((centres[:, 0] - 3) / 10, 0, 1)).max() < 0.02
+
+    def test_several_colours_run_along_a_thick_curve(self) -> None:
+        scene = scene_of(LINE | {"thickness": 3, "color": ["#ff0000", "#0000ff"]})
+        frame = vd.Frame(self.SIZE)
+        frame.draw(scene)
+        row = frame.array()[4, 4]
+        assert row[3, 0] > 200
+        assert row[9, 0] < 100
+        assert row[9, 2] > 200
+
+    @pytest.mark.parametrize("number", [2, 5, 6, 10, 15, 16, 17])
+    def test_bodies_without_parameters_say_so(self, number: int) -> None:
+        error = refused(BODIES[number] | {"color": {"map": "gray", "by": "u"}})
+        assert error.path == "$.objects[0].color.by"
+        assert "unknown name 'u'" in str(error)
+        assert "x, y, z" in str(error.hint)

@@ -1,15 +1,23 @@
 """Tori and tubes: against distances, floods and the centres inside."""
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 from surface_checks import centres, crossed, leaks, mask
 
 import voxdisplay as vd
+from voxdisplay.bodies import ball_chain
+from voxdisplay.bodies.ball_chain import BallChain
 from voxdisplay.bodies.body import Body
 from voxdisplay.bodies.tube import Torus, Tube
 from voxdisplay.curves.arguments import ArgumentError
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.body_voxelization import voxelize_body
+from voxdisplay.voxelization.measure_chain import chain_distances
+from voxdisplay.voxelization.surfaces import ball_chains
+from voxdisplay.voxelization.surfaces.ball_chains import voxelize_chain
 from voxdisplay.voxelization.voxel_box import VoxelBox
 
 GRID = (23, 21, 19)
@@ -123,3 +131,103 @@ def test_parts_outside_cost_nothing_and_light_nothing() -> None:
     far = vd.Segment((1e7, 0, 0), (1e7, 9, 9))
     assert not lit(Tube(far, 2)).any()
     assert lit(Tube(vd.Segment((-1e7, 9, 9), (1e7, 9, 9)), 2)).any()
+
+
+def test_a_transformed_tube_has_the_voxels_of_the_transformed_points() -> None:
+    curve, rng = CURVES["knot"], np.random.default_rng(3)
+    matrix = np.eye(3) + rng.uniform(-0.2, 0.2, size=(3, 3))
+    offset = np.array((11, 10, 9)) - matrix @ (11, 10, 9)
+    body = Tube(curve, "1.5 + 0.4*sin(3*t)").transformed(matrix, offset)
+    inner = distance_to(curve, lambda t: 1.5 + 0.4 * np.sin(3 * t))
+    value = inner((centres(GRID) - offset) @ np.linalg.inv(matrix).T).reshape(GRID[::-1])
+    shown = lit(body)
+    assert leaks(shown, value < 0) == 0
+    assert np.abs(value[shown]).max() <= 0.5 * np.linalg.norm(np.linalg.inv(matrix), 2) + 0.02
+    again = body.transformed(np.linalg.inv(matrix), -np.linalg.inv(matrix) @ offset)
+    assert (lit(again) == lit(Tube(curve, "1.5 + 0.4*sin(3*t)"))).all()
+    scaled = Tube(curve, 0.5).transformed(3 * np.eye(3), (-22, -20, -18))
+    assert scaled.geometry((np.zeros(3), np.array(GRID, dtype=float))).wires  # thin before
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_intervals_of_random_chains(seed: int) -> None:
+    """Few balls of very different radii: frustums that are steep, flat, and none at all."""
+    rng, grid = np.random.default_rng(seed), (13, 11, 9)
+    points = rng.uniform(1, 10, size=(4, 3)).round(int(rng.integers(0, 3)))
+    radii = rng.uniform(0, 4, size=4).round(int(rng.integers(0, 3)))
+    metric = np.eye(3) + (rng.uniform(-0.3, 0.3, size=(3, 3)) if seed % 2 else 0)
+    chain = BallChain(points, radii, np.arange(3), metric, {})
+    share = np.linspace(0, 1, 601)[:, None]
+    balls = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(points)])
+    sizes = np.concatenate([a + share[:, 0] * (b - a) for a, b in itertools.pairwise(radii)])
+    places = centres(grid)
+    value = np.array(
+        [(np.linalg.norm((p - balls) @ metric.T, axis=1) - sizes).min() for p in places]
+    )
+    exact = chain.nearest(places).distance
+    assert (exact <= value + 1e-6).all()
+    assert (exact >= value - 0.01).all()
+    box, inside = VoxelBox.of_grid(grid), exact.reshape(grid[::-1]) <= 0
+    solid = mask(voxelize_chain(chain, box, Tube(CURVES["line"], 1, fill="solid")).voxels, grid)
+    assert (solid == inside)[np.abs(exact).reshape(grid[::-1]) > 1e-6].all()
+    found = voxelize_chain(chain, box, Tube(CURVES["line"], 1))
+    shell = mask(found.voxels, grid)
+    for axis in range(3):
+        crossing = np.diff(inside, axis=axis)
+        dark = ~shell.take(range(shell.shape[axis] - 1), axis) & ~shell.take(
+            range(1, shell.shape[axis]), axis
+        )
+        assert not (crossing & dark).any()
+    if seed % 2 == 0:  # others are measured less well, where parts meet
+        assert chain_distances(found.voxels + 0.5, chain).max() <= 0.5 + 1e-6
+
+
+def test_parts_inside_of_others_are_not_shown() -> None:
+    # A bend that is sharper than the tube is wide: nothing is lit in the middle of it.
+    shown = lit(Tube(vd.Polyline([(5, 9, 9), (15, 9, 9), (5, 9, 9)]), 3))
+    assert not shown[9, 9, 5:15].any()
+    shown = lit(Tube(vd.Circle((11, 10, 9), 2), 4))
+    assert not shown[9, 10, 8:14].any()
+
+
+def test_values_along_the_curve() -> None:
+    line = vd.Parametric("4 + 12*t**2", "10", "9", t=(0, 1))
+    for fill in ("shell", "solid"):
+        found = voxelize_body(Tube(line, 2, fill=fill), VoxelBox.of_grid(GRID))
+        x = np.clip((found.voxels[:, 0] + 0.5 - 4) / 12, 0, 1)
+        assert np.abs(found.value("s") - x).max() < 0.01
+        assert np.abs(found.value("t") - np.sqrt(x)).max() < 0.06
+        assert found.value("u") is None
+    turned = Tube(line, 2).transformed(np.diag((1.0, -1.0, 1.0)), (0, 20, 0))
+    found = voxelize_body(turned, VoxelBox.of_grid(GRID))
+    assert np.abs(found.value("s") - np.clip((found.voxels[:, 0] - 3.5) / 12, 0, 1)).max() < 0.01
+    nothing = voxelize_body(Tube(vd.Segment((90, 9, 9), (99, 9, 9)), 2), VoxelBox.of_grid(GRID))
+    assert nothing.value("t").shape == (0,)
+
+
+def test_reports_of_tubes() -> None:
+    for along, radius in ((CURVES["knot"], 2.5), (CURVES["corner"], 3), (CURVES["line"], "1+t")):
+        report = vd.voxelize(Tube(along, radius)).report
+        assert 0.4 < report.e_max <= 0.501
+        assert report.tunnels == 0
+    stretched = Tube(CURVES["line"], 2).transformed(np.diag((1.0, 1.5, 0.8)))
+    assert 0.4 < vd.voxelize(stretched).report.e_max <= 0.501
+    found = vd.voxelize(Tube(CURVES["knot"], 2.5))
+    geometry = found.body.geometry(found.box.corners)
+    assert chain_distances(np.array([[11.0, 10, 20]]), geometry) > 1  # the middle of nowhere
+    short = dataclasses.replace(found, index=found.index[::2].copy())
+    assert short.report.tunnels > 0
+
+
+def test_a_tube_that_would_take_minutes_is_refused() -> None:
+    rough = vd.Parametric("500 + 400*sin(900*t)", "500 + 400*cos(901*t)", "500*t", t=(0, 2))
+    with pytest.raises(BodyError, match="too long or too rough"):
+        voxelize_body(Tube(rough, 200), VoxelBox.of_grid((1024, 1024, 1024)))
+
+
+@pytest.mark.parametrize("size", ["_BLOCK", "_KEPT"])
+def test_blocks_do_not_show(size: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = lit(Tube(CURVES["knot"], 2.2))
+    monkeypatch.setattr(ball_chains, size, 50)
+    monkeypatch.setattr(ball_chain, "_PAIRS", 50)
+    assert (lit(Tube(CURVES["knot"], 2.2)) == expected).all()
