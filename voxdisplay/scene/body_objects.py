@@ -262,7 +262,7 @@ class Cylinder(EnclosingObject, tag="cylinder", frozen=True):
 
 
 class Cone(EnclosingObject, tag="cone", frozen=True):
-    """A circular cone, from its base to its apex; u is the angle, v runs from 0 to 1 at the apex."""
+    """A circular cone, from base to apex; u is the angle, v runs from 0 to 1 at the apex."""
 
     value_names: ClassVar[tuple[str, ...]] = ("u", "v")
 
