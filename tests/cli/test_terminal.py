@@ -115,6 +115,13 @@ def test_it_shows_what_the_display_shows_and_follows_it(terminal, emulator, run)
     assert view.finish()[0] == 0
 
 
+def test_a_scene_that_moves_is_played(terminal):
+    view = terminal("view", "--terminal", "examples/growing-helix.json")
+    view.read_until(lambda came: len(set(re.findall(r" (\d+) voxels", plain(came)))) >= 3)
+    view.press("q")
+    assert view.finish()[0] == 0
+
+
 def test_a_scene_from_a_pipe_leaves_the_keyboard_to_the_terminal(terminal):
     ours, theirs = os.pipe()
     view = terminal("view", "--terminal", "-", stdin=ours)

@@ -49,6 +49,41 @@ def test_a_scene_is_shown_until_it_is_interrupted(scene):
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize("kind", ["scene", "recording"])
+def test_a_scene_that_moves_is_played(run, scene, tmp_path, kind):
+    shown = scene(
+        {
+            "size": [3, 5, 7], "duration": 0.4, "fps": 10,
+            "objects": [{"type": "points", "points": [[0.5, 0.5, "0.5 + 10*time"]]}],
+        }
+    )  # fmt: skip
+    if kind == "recording":
+        path, shown = shown, tmp_path / "a.vxs"
+        assert run("record", path, "-o", shown).returncode == 0
+    command = [sys.executable, "-m", "voxdisplay", "view", str(shown), "--no-open"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        try:
+            url = process.stdout.readline().strip()
+            places = set()
+            with connect(url.replace("http", "ws") + "live") as browser:
+                while len(places) < 4:
+                    message = browser.recv(DEADLINE_S)
+                    at = int.from_bytes(message[:4], "little")
+                    head = json.loads(message[4:at])
+                    assert head["voxels"] == 1
+                    assert not head["bitmap"]
+                    places.add((head["number"], tuple(message[at : at + 3])))
+                    browser.send("shown")
+            assert places == {(number + 1, (0, 0, number)) for number in range(4)}
+        finally:
+            process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+
+
 def test_a_display_that_cannot_be_read_cannot_be_watched(run):
     done = run("view", "--no-open", "--port", "sim:?size=3x5x7&features=digest")
     assert done.returncode == 1

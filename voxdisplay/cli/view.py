@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from voxdisplay.cli.param_types import AddressType, OriginType
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.raster.pixel_format import Pixels
+    from voxdisplay.shows.show import Show
     from voxdisplay.view.live.sources import Source
     from voxdisplay.view.terminal import TerminalView
 
@@ -80,7 +82,9 @@ def view(
     terminal: bool,
     size: vd.Grid | None,
 ) -> None:
-    """Show a display live, or with SCENE, a JSON file, what a display would show of it.
+    """Show a display live, or with SCENE, a JSON file or a recording, what a display would show.
+
+    A scene with a duration is played, again and again.
 
     The display is read back: it needs the feature READ, and its port to itself. To watch the
     emulator while others draw on it, start it by voxdisplay-sim --view. Ctrl-C ends it.
@@ -131,13 +135,24 @@ def _serve(
 
 @contextlib.contextmanager
 def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
+    from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
     from voxdisplay.view.live.message import Snapshot  # noqa: PLC0415 - an extra
+    from voxdisplay.view.live.moving_source import MovingSource  # noqa: PLC0415
     from voxdisplay.view.live.sources import StaticSource  # noqa: PLC0415
 
-    frame, title = _scene_frame(scene, size), Path(scene).name
-    lit = PixelMap(*frame.lit())
-    yield StaticSource(Snapshot(lit, frame.grid, frame.format, 1, title, frame.digest()))
+    found, title = _scene_show(scene, size), Path(scene).name
+    if isinstance(found, vd.Frame):
+        lit = PixelMap(*found.lit())
+        yield StaticSource(Snapshot(lit, found.grid, found.format, 1, title, found.digest()))
+        return
+
+    def snapshot(number: int) -> Snapshot:
+        frame = found.frame(number)
+        page = color_page(frame)
+        return Snapshot(page, frame.grid, vd.PixelFormat.RGB888, number + 1, title, frame.digest())
+
+    yield MovingSource(found.frame_count, found.fps, snapshot, title)
 
 
 @contextlib.contextmanager
@@ -185,24 +200,48 @@ class _ReadbackDisplay:
         return page
 
 
-def _scene_frame(scene: str, size: vd.Grid | None) -> vd.Frame:
-    from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
+def _scene_show(scene: str, size: vd.Grid | None) -> vd.Frame | Show:
+    """Return the picture of a scene; of one that moves, and of a recording, the show."""
+    from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415
+        draw_scene,
+        load_fitted_scene,
+        note_choices,
+    )
+    from voxdisplay.cli.show_films import is_show_file, open_show_file  # noqa: PLC0415
 
+    if is_show_file(scene):
+        return open_show_file(scene, size, None, "contain")
     fitted, grid = load_fitted_scene(load_shown(scene, ModelOptions()), size)
     frame = vd.Frame(grid)
+    if fitted.duration:
+        note_choices(fitted)
+        return fitted.show_on(frame, fit="none")
     draw_scene(fitted, frame)
     return frame
 
 
 @contextlib.contextmanager
 def _scene_view(scene: str, size: vd.Grid | None) -> Iterator[TerminalView]:
+    from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
-    from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
+    from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels  # noqa: PLC0415
+    from voxdisplay.view.live.moving_source import due_ordinal  # noqa: PLC0415
     from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
-    frame = _scene_frame(scene, size)
-    lit = lit_voxels(PixelMap(*frame.lit()), frame.grid, frame.format)
-    yield TerminalView(frame.grid, Path(scene).name, lambda: lit, changes=False)
+    found, title = _scene_show(scene, size), Path(scene).name
+    if isinstance(found, vd.Frame):
+        lit = lit_voxels(PixelMap(*found.lit()), found.grid, found.format)
+        yield TerminalView(found.grid, title, lambda: lit, changes=False)
+        return
+    began_s = time.monotonic()
+
+    def read() -> LitVoxels:
+        due = due_ordinal(time.monotonic() - began_s, found.fps)
+        frame = found.frame(due % found.frame_count)
+        return lit_voxels(color_page(frame), frame.grid, vd.PixelFormat.RGB888)
+
+    grid = found.frame(0).grid
+    yield TerminalView(grid, title, read, changes=True, read_interval_s=1 / found.fps)
 
 
 @contextlib.contextmanager

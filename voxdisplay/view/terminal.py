@@ -26,8 +26,7 @@ from voxdisplay.view.lit_voxels import LitVoxels
 # Longest wait for a key: for a changed window size to be seen, and between steps of spinning.
 _IDLE_WAIT_S, _SPIN_WAIT_S = 0.25, 0.05
 _KEY_STEP, _SPIN_STEP, _KEY_ZOOM = 0.1, 0.03, 1.1
-# Pages are read once a second at most, and reading takes a fifth of the time at most.
-_MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR = 1.0, 5.0
+_READ_INTERVAL_FACTOR = 5.0  # reading takes a fifth of the time at most
 
 # Takes descriptors above 1023, unlike select, and waits on /dev/tty, unlike epoll and kqueue.
 _SELECTOR = getattr(selectors, "PollSelector", selectors.SelectSelector)
@@ -63,6 +62,8 @@ class TerminalView:
         Returns the lit voxels.
     changes : bool
         True to read again from time to time.
+    read_interval_s : float
+        How often, at most.
 
     """
 
@@ -70,6 +71,7 @@ class TerminalView:
     title: str
     read: Callable[[], LitVoxels]
     changes: bool
+    read_interval_s: float = 1.0
     camera: Camera = CAMERA
     spins: bool = False
     done: bool = False
@@ -85,13 +87,18 @@ class TerminalView:
         self._lit = self.read()
         took_s = time.monotonic() - began_s
         self._next_read_s = time.monotonic() + max(
-            _MIN_READ_INTERVAL_S, _READ_INTERVAL_FACTOR * took_s
+            self.read_interval_s, _READ_INTERVAL_FACTOR * took_s
         )
 
     @property
     def read_due(self) -> bool:
         """True if it is time to read again."""
         return self.changes and time.monotonic() >= self._next_read_s
+
+    @property
+    def read_wait_s(self) -> float:
+        """Seconds until it is time to read again."""
+        return max(0.0, self._next_read_s - time.monotonic())
 
     def handle_keys(self, keys: bytes) -> None:
         """Apply the keys in some input; other bytes do nothing."""
@@ -145,6 +152,8 @@ def _event_loop(view: TerminalView, keyboard: int) -> None:
             _write(_BEGIN_UPDATE + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END_UPDATE)
             drawn = shown
         wait_s = _SPIN_WAIT_S if view.spins else _IDLE_WAIT_S
+        if view.changes:
+            wait_s = min(wait_s, view.read_wait_s)
         if keys_ready.select(wait_s):
             keys = os.read(keyboard, 1024)
             if not keys:
