@@ -11,6 +11,7 @@ from voxdisplay import bodies
 from voxdisplay.bodies import Body
 from voxdisplay.curves import Curve
 from voxdisplay.scene.evaluation_context import EvaluationContext
+from voxdisplay.scene.point_keys import Gaps, InlinePoints, PointsFile, points_of
 from voxdisplay.scene.scene_object import Center, Normal, Radius, SceneObject
 from voxdisplay.scene.values import BodyFormula, Number, Range, Vector, Vectors
 
@@ -283,35 +284,12 @@ class Cone(EnclosingObject, tag="cone", frozen=True):
 class Scatter(BodyObject, tag="scatter", frozen=True):
     """Points without an order, inline or in a file beside the scene: nothing joins them."""
 
-    points: Annotated[
-        Vectors | None,
-        Meta(title="Points", description="The points [x, y, z], in place of a file."),
-    ] = None
-    file: Annotated[
-        str | None,
-        Meta(
-            title="File",
-            description="Path of a file of points, relative to the scene's folder and inside it.",
-        ),
-    ] = None
-    gaps: Annotated[
-        Literal["split"] | None,
-        Meta(
-            title="Gaps",
-            description="split: rows of the file that are empty or not finite are left out. When "
-            "left out, they are errors.",
-        ),
-    ] = None
+    points: InlinePoints = None
+    file: PointsFile = None
+    gaps: Gaps = None
 
     def build_body(self, context: EvaluationContext) -> Body:
         """Return the body."""
-        if (self.points is None) == (self.file is None):
-            raise context.object_error("scatter needs either the key 'points' or the key 'file'")
-        if self.points is not None:
-            if self.gaps:
-                raise context.object_error("the key 'gaps' belongs to the key 'file'")
-            return bodies.Scatter(context.points("points", self.points))
-        assert self.file is not None  # noqa: S101 - see above
-        found = context.points_from_file("file", self.file, split=self.gaps == "split")
+        found = points_of(self, "scatter", context)
         context.columns = [dict(found.columns)]
         return bodies.Scatter(found.points, found.columns)

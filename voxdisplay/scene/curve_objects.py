@@ -4,15 +4,14 @@ Descriptions and types of the keys are those of the JSON Schema. Values are chec
 it must not know files. In angles, ``deg`` is a constant: ``"90*deg"``.
 """
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
-import numpy as np
 from msgspec import Meta, field
 
 from voxdisplay import bodies, curves
 from voxdisplay.bodies import Body
-from voxdisplay.errors import CurveError
 from voxdisplay.scene.evaluation_context import EvaluationContext
+from voxdisplay.scene.point_keys import Gaps, InlinePoints, PointsFile, points_of
 from voxdisplay.scene.scene_object import Axis, Center, Normal, Radius, SceneObject
 from voxdisplay.scene.values import Formula, Number, Numbers, Range, Vector, Vectors
 
@@ -316,45 +315,17 @@ class Points(CurveObject, tag="points", frozen=True):
     shape (n, 3). With "gaps": "split", rows that are empty or not finite split it into strands.
     """
 
-    points: Annotated[
-        Vectors | None,
-        Meta(title="Points", description="The points [x, y, z], in place of a file."),
-    ] = None
-    file: Annotated[
-        str | None,
-        Meta(
-            title="File",
-            description="Path of a file of points, relative to the scene's folder and inside it.",
-        ),
-    ] = None
-    gaps: Annotated[
-        Literal["split"] | None,
-        Meta(
-            title="Gaps",
-            description="split: rows of the file that are empty or not finite separate strands. "
-            "When left out, they are errors.",
-        ),
-    ] = None
+    points: InlinePoints = None
+    file: PointsFile = None
+    gaps: Gaps = None
 
     def build_curves(self, context: EvaluationContext) -> list[curves.Curve]:
         """Return one curve for each strand."""
-        if self.points is not None and self.file is None:
-            if self.gaps:
-                raise CurveError("the key 'gaps' belongs to the key 'file'")
-            points = context.points("points", self.points)
-            return [curves.Points(points, closed=self.closed)]
-        if self.file is None or self.points is not None:
-            raise CurveError("points needs either the key 'points' or the key 'file'")
-        found = context.points_from_file("file", self.file, split=self.gaps == "split")
-        strands = np.split(found.points, found.starts[1:])
+        found = points_of(self, "points", context)
+        strands = found.separate()
         if found.columns:
-            values = {
-                name: np.split(each, found.starts[1:]) for name, each in found.columns.items()
-            }
-            context.columns = [
-                {name: each[i] for name, each in values.items()} for i in range(len(strands))
-            ]
-        return [curves.Points(strand, closed=self.closed) for strand in strands]
+            context.columns = [columns for _, columns in strands]
+        return [curves.Points(points, closed=self.closed) for points, _ in strands]
 
 
 AnyCurve = (

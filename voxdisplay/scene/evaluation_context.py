@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.expressions.program import Expression
     from voxdisplay.scene.environment import Environment
-    from voxdisplay.scene.point_table import FilePoints
     from voxdisplay.scene.scene_files import SceneFiles
+    from voxdisplay.scene.strands import Strands
 
 
 @contextmanager
@@ -185,7 +185,7 @@ class EvaluationContext:
             raise CurveError("this scene has no folder, and may name no file")
         return self.files.folder
 
-    def points_from_file(self, key: str, name: str, *, split: bool) -> FilePoints:
+    def points_from_file(self, key: str, name: str, *, split: bool) -> Strands:
         """Read a file of points beside the scene.
 
         Parameters

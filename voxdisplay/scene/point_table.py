@@ -9,14 +9,13 @@ import math
 import re
 from array import array
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from voxdisplay.expressions.parse import excerpt
 from voxdisplay.scene.column_names import value_columns
+from voxdisplay.scene.strands import Strands, split_strands
 from voxdisplay.scene.table_layout import NAMES_HINT, Layout, find_layout, listed
 from voxdisplay.scene.table_text import (
     ROWS_HINT,
@@ -28,7 +27,7 @@ from voxdisplay.scene.table_text import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Sequence
 
     from voxdisplay.compute.array_types import Floats
 
@@ -38,49 +37,7 @@ _MOST_UNNAMED = 7  # so many columns may have other values of a point
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
-class FilePoints(NamedTuple):
-    """Points of a file, in strands.
-
-    Attributes
-    ----------
-    points : (n, 3) float64 array
-        All finite.
-    starts : (k,) int64 array
-        Index of the first point of each strand; empty if there is no point.
-    note : str or None
-        What was taken for x, y and z, if there was a choice.
-    columns : mapping of str to (n,) float64 array
-        Further columns that were wanted, by name; nan where there is no number.
-
-    """
-
-    points: Floats
-    starts: NDArray[np.int64]
-    note: str | None = None
-    columns: Mapping[str, Floats] = MappingProxyType({})
-
-
-def split_strands(points: Floats, gaps: list[int]) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the finite points, and the index of the first point of each strand.
-
-    Parameters
-    ----------
-    points : (n, 3) float64 array
-        A row that is not finite separates strands.
-    gaps : list of int
-        Rows before which another strand begins, too.
-
-    """
-    if not gaps and np.isfinite(points).all():
-        return points, np.zeros(min(1, len(points)), dtype=np.int64)
-    begins = np.zeros(len(points) + 1, dtype=np.bool_)
-    begins[gaps] = True
-    kept = np.flatnonzero(np.isfinite(points).all(axis=1))
-    first = begins[kept] | (np.diff(kept, prepend=-2) > 1)
-    return points[kept], np.flatnonzero(first)
-
-
-def read_table(name: str, data: bytes, *, split: bool, wanted: Sequence[str] = ()) -> FilePoints:
+def read_table(name: str, data: bytes, *, split: bool, wanted: Sequence[str] = ()) -> Strands:
     """Read a text table of points.
 
     Parameters
@@ -104,7 +61,7 @@ def read_table(name: str, data: bytes, *, split: bool, wanted: Sequence[str] = (
     table = TableText(name, data)
     layout = find_layout(table)
     if layout is None:
-        return FilePoints(np.empty((0, 3)), np.empty(0, dtype=np.int64))
+        return Strands(np.empty((0, 3)), np.empty(0, dtype=np.int64))
     more = value_columns(layout.names, wanted)
     rows = _Rows(table, layout, list(more.values()))
     points = np.array(rows.numbers, dtype=np.float64).reshape(-1, 3)
@@ -117,7 +74,7 @@ def read_table(name: str, data: bytes, *, split: bool, wanted: Sequence[str] = (
     values = np.array(rows.values, dtype=np.float64).reshape(len(points), -1)
     values = values[np.isfinite(points).all(axis=1)]
     columns = {each: values[:, i] for i, each in enumerate(more)}
-    return FilePoints(*split_strands(points, gaps), rows.note(), columns)
+    return Strands(*split_strands(points, gaps), rows.note(), columns)
 
 
 class _Rows:

@@ -73,9 +73,9 @@ def test_npy_of_a_later_version(folder: Path) -> None:
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }", "claims"),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (3,), }", r"shape (3,)"),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3), }", "real numbers"),
-        ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "real numbers"),
+        ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "Python objects"),
         ("{'descr': '<c8', 'fortran_order': False, 'shape': (1, 3), }", "real numbers"),
-        ("{'descr': '|f1', 'fortran_order': False, 'shape': (1, 3), }", "claims"),
+        ("{'descr': '|f1', 'fortran_order': False, 'shape': (1, 3), }", "of the kind |f1"),
         ("__import__('os').abort()", "real numbers"),
         ("(" * 60000, "real numbers"),
     ],
@@ -132,7 +132,7 @@ def test_strands_without_number(folder: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_pickles_are_not_loaded(folder: Path) -> None:
     np.save(folder / "data.npy", np.array([[print, 1, 2]], dtype=object), allow_pickle=True)
-    assert "real numbers" in refused(folder, "data.npy")
+    assert "Python objects" in refused(folder, "data.npy")
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_pickles_are_not_loaded(folder: Path) -> None:
 )
 def test_never_outside_the_folder(folder: Path, name: str) -> None:
     (folder.parent / "data.csv").write_text("1,2,3\n")
-    assert "outside the scene's folder" in refused(folder, name)
+    assert "outside the folder" in refused(folder, name)
 
 
 @posix
@@ -176,7 +176,7 @@ def test_only_regular_files(folder: Path) -> None:
 
 def test_missing_and_unreadable_files(folder: Path) -> None:
     (folder / "data.csv").write_text("1,2,3\n")
-    assert "'dat.csv' beside the scene (did you mean 'data.csv'?)" in refused(folder, "dat.csv")
+    assert "dat.csv (did you mean 'data.csv'?)" in refused(folder, "dat.csv")
     for name in ("", ".csv", "a\0.csv", "x" * 5000 + ".csv", "data.txt"):
         refused(folder, name)
 
