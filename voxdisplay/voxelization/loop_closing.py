@@ -17,28 +17,16 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.voxelization.curve_batch import CurveBatch
-from voxdisplay.voxelization.thinning import (
-    COST_UNITS,
-    FAR,
-    MAX_UNCOVERED,
-    TINY,
-    VOXEL_COST,
-    WINDOW,
-)
+from voxdisplay.voxelization.loop_detours import MAX_REPLACED, Joints, cheapest_detours
+from voxdisplay.voxelization.thinning import WINDOW
 from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 Voxel = tuple[int, int, int]
 
-# How far from a joint voxels may be replaced, and by how many on each side.
-MAX_REPLACED = 7
-MAX_DETOUR = 3
 # A loop of fewer voxels is left as it is.
 MIN_LOOP = 5
 # Points of the curve on each side of a joint, to tell how far voxels are from it.
 POINTS = 57
-# Squared distance from the curve up to which voxels may be part of a detour: less than that of all
-# four voxels around a line along their edge, which would be led around it.
-MAX_SQUARE = 0.5 - 1e-6
 
 # Places along a loop, counted from a joint, between which a chord would lead over it.
 _PAIRS = np.array(
@@ -46,7 +34,6 @@ _PAIRS = np.array(
     dtype=np.int64,
 )
 _PAIRS = _PAIRS[_PAIRS[:, 1] < WINDOW]
-_CELL = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.int64).T
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,19 +60,6 @@ class Ring(NamedTuple):
     voxels: list[Voxel]
     t: list[float]
     stays: list[bool]
-
-
-class Path(NamedTuple):
-    """A chordless path from a joint's voxel to one side of the loop; sets of voxels as bits."""
-
-    cost: int  # of its voxels and of what is left of the side
-    nodes: tuple[int, ...]
-    join: int  # where it arrives on the side
-    own: int
-    ends: int  # its voxels and that of the side where it arrives
-    rest: int  # what is left of the side
-    near_own: int
-    near_ends: int
 
 
 def loops_of(events: VoxelEvents, curve: Ints, begin: Ints, end: Ints) -> Loops:
@@ -134,25 +108,44 @@ def close_loops(
     touching = touching[np.lexsort((*voxels, of[touching]))]
     points = _points_around(batch, events, loops, of, at, touching)
     opens = np.searchsorted(of, np.arange(loops.begin.size + 1))
-    changed: dict[int, tuple[NDArray[np.int32], Floats]] = {}
     rings: dict[int, Ring] = {}
-    for joint, near in zip(touching.tolist(), points, strict=True):
-        number = int(of[joint])
-        index, nth = int(loops.curve[number]), joint - int(opens[number])
-        if number not in rings:
-            some = slice(int(loops.begin[number]), int(loops.begin[number] + loops.size[number]))
-            stays = np.zeros(int(loops.size[number]), dtype=bool)
-            stays[at[opens[number] : opens[number + 1]]] = True
-            listed = list(zip(*events.voxels[:, some].tolist(), strict=True))
-            rings[number] = Ring(listed, events.t[some].tolist(), stays.tolist())
-        before = rings[number]
-        here = [k for k, stays in enumerate(before.stays) if stays][nth]
-        ring = _reroute(before, here, near, float(batch.last[index]))
-        if ring is not before:
-            rings[number] = ring
-            t = np.maximum.accumulate(ring.t)
-            changed[index] = np.array(ring.voxels, dtype=np.int32), t
-    return changed
+    rerouted: set[int] = set()
+    loop, last = of[touching], batch.last[loops.curve]
+    # Loop by loop one joint after the other, but those of many loops together.
+    nth = np.arange(touching.size) - loop.searchsorted(loop)
+    for turn in range(int(nth.max()) + 1):
+        here = (nth == turn).nonzero()[0]
+        asked = []
+        for number, joint in zip(loop[here].tolist(), touching[here].tolist(), strict=True):
+            first, end = int(opens[number]), int(opens[number + 1])
+            if number not in rings:
+                rings[number] = _ring_of(events, loops, number, at[first:end])
+            ring = rings[number]
+            at_joint = [k for k, stays in enumerate(ring.stays) if stays][joint - first]
+            asked.append((ring, at_joint))
+        ends = last[loop[here]].tolist()
+        found = _rerouted(asked, points[here], ends)
+        fresh = {
+            number: ring for number, ring in zip(loop[here].tolist(), found, strict=True) if ring
+        }
+        rings.update(fresh)
+        rerouted.update(fresh)
+    return {
+        int(loops.curve[number]): (
+            np.array(rings[number].voxels, dtype=np.int32),
+            np.maximum.accumulate(rings[number].t),
+        )
+        for number in sorted(rerouted)
+    }
+
+
+def _ring_of(events: VoxelEvents, loops: Loops, number: int, at: Ints) -> Ring:
+    """Return a loop as a ring in which the voxels at its joints stay."""
+    begin, size = int(loops.begin[number]), int(loops.size[number])
+    stays = np.zeros(size, dtype=bool)
+    stays[at] = True
+    voxels = zip(*events.voxels[:, begin : begin + size].tolist(), strict=True)
+    return Ring(list(voxels), events.t[begin : begin + size].tolist(), stays.tolist())
 
 
 def _has_chord(events: VoxelEvents, loops: Loops, of: Ints, at: Ints) -> Bools:
@@ -203,26 +196,66 @@ def _points_around(
     return np.asarray(points[np.argsort(order)])
 
 
-def _reroute(ring: Ring, at: int, points: Floats, last: float) -> Ring:
-    """Return a ring led through the voxel at a joint without chords; the same if impossible."""
+def _rerouted(
+    asked: list[tuple[Ring, int]], points: Floats, last: list[float]
+) -> list[Ring | None]:
+    """Return rings led through the voxels at joints without chords; None where that is impossible.
+
+    Parameters
+    ----------
+    asked : list of (Ring, int)
+        Rings, and the index of a joint in each.
+    points : (m, 3, 2 * POINTS) float64 array
+        The curve around each joint.
+    last : list of float
+        The last parameter of each curve.
+
+    """
+    around = [_around(ring, at) for ring, at in asked]
+    sides = np.zeros((2, len(asked), MAX_REPLACED, 3), dtype=np.int64)
+    for nth, ((ring, _), both) in enumerate(zip(asked, around, strict=True)):
+        for side, indices in zip(sides, both, strict=True):
+            if indices:
+                side[nth, : len(indices)] = [ring.voxels[k] for k in indices]
+    count = np.array([[len(both[side]) for both in around] for side in (0, 1)])
+    start = np.array([ring.voxels[at] for ring, at in asked], dtype=np.int64)
+    detours = cheapest_detours(Joints(start, sides, count, points))
+    ways = [
+        [list(map(tuple, each[:used])) for each, used in zip(voxels, counts, strict=True)]
+        for voxels, counts in zip(detours.voxels.tolist(), detours.counts.tolist(), strict=True)
+    ]
+    return [
+        _with_detour(ring, at, end, both, (out, back), (j, i)) if found else None
+        for (ring, at), end, both, found, out, back, j, i in zip(
+            asked, last, around, detours.found.tolist(), *ways, *detours.join.tolist(), strict=True
+        )
+    ]
+
+
+def _around(ring: Ring, at: int) -> tuple[list[int], list[int]]:
+    """Return the places that may be replaced after and before a joint, from there on."""
     size = len(ring.t)
-    reach = min(MAX_REPLACED, size // 2 - 1)
-    if reach < 1:
-        return ring
-    around = [[(at + way * (k + 1)) % size for k in range(reach)] for way in (1, -1)]
-    for side in around:  # detours do not lead over other joints
+    reach = max(min(MAX_REPLACED, size // 2 - 1), 0)
+    sides = []
+    for way in (1, -1):
+        side = [(at + way * (k + 1)) % size for k in range(reach)]
+        # Detours do not lead over other joints.
         stop = next((k for k, index in enumerate(side) if ring.stays[index]), reach)
-        del side[stop + 1 :]
-    after, before = around
-    found = _best_detour(
-        ring.voxels[at],
-        [ring.voxels[k] for k in after],
-        [ring.voxels[k] for k in before],
-        points,
-    )
-    if found is None:
-        return ring
-    out, j, back, i = found
+        sides.append(side[: stop + 1])
+    return sides[0], sides[1]
+
+
+def _with_detour(
+    ring: Ring,
+    at: int,
+    last: float,
+    around: tuple[list[int], list[int]],
+    ways: tuple[list[Voxel], list[Voxel]],
+    joins: tuple[int, int],
+) -> Ring:
+    """Return a ring with a detour to both sides of a joint, which join the sides at places."""
+    size = len(ring.t)
+    (after, before), (out, back), (j, i) = around, ways, joins
     t_out = ring.t[after[j]] if after[j] else last
     t_back = ring.t[before[i]]
     begin, end = ring.t[at], ring.t[at] if at else last
@@ -236,140 +269,8 @@ def _reroute(ring: Ring, at: int, points: Floats, last: float) -> Ring:
     ):
         turned = old[at:] + old[:at]
         kept = turned[1 + j : size - i]
-        fresh = [turned[0], *new_out, *kept, *new_back[::-1]]
-        parts.append(fresh)
+        parts.append([turned[0], *new_out, *kept, *new_back[::-1]])
     if at:  # turn it back
         start = 1 + len(out) + (size - at) - (1 + j)
         parts = [part[start:] + part[:start] for part in parts]
     return Ring(*parts)
-
-
-def _best_detour(
-    start: Voxel, after: list[Voxel], before: list[Voxel], points: Floats
-) -> tuple[list[Voxel], int, list[Voxel], int] | None:
-    """Return the paths from ``start`` to both sides of a ring that lie nearest to the curve.
-
-    Returns
-    -------
-    out, j, back, i
-        Over the voxels ``out`` to ``after[j]``, over ``back`` to ``before[i]``. They have the least
-        cost, that of `thinning`; of several, those that come first in the order of voxels, read
-        from either end.
-
-    """
-    voxels, square, usable = _candidates(start, {*after, *before}, points)
-    number = {voxel: k for k, voxel in enumerate(voxels)}
-    costs = np.floor((np.minimum(square, FAR) + VOXEL_COST) * COST_UNITS + 0.5)
-    centres = np.array(voxels).T
-    apart = np.abs(centres[:, :, None] - centres[:, None, :]).max(axis=0) <= 1
-    near = [int.from_bytes(row, "little") for row in np.packbits(apart, axis=1, bitorder="little")]
-    allowed = sum(1 << k for k in usable.nonzero()[0].tolist())
-    cost = [int(each) for each in costs]
-    sides = [[number[voxel] for voxel in side] for side in (after, before)]
-    outs, backs = (_chordless_paths(number[start], side, allowed, near, cost) for side in sides)
-    best: tuple[int, list[Voxel]] | None = None
-    found = None
-    for out in outs:
-        if not backs or (best and out.cost + backs[0].cost > best[0]):
-            break
-        for back in backs:
-            total = out.cost + back.cost
-            if best and total > best[0]:
-                break
-            if out.near_ends & (back.ends | back.rest) or back.near_ends & out.rest:
-                continue
-            way = [
-                *(voxels[k] for k in back.nodes[::-1]),
-                start,
-                *(voxels[k] for k in out.nodes),
-            ]
-            key = min(way, way[::-1])
-            if best and total == best[0] and key >= best[1]:
-                continue
-            if _covered(points, [*way, *after[out.join :], *before[back.join :]]):
-                best, found = (total, key), (out, back)
-    if found is None:
-        return None
-    (out, back) = found
-    ways = [[voxels[k] for k in path.nodes] for path in found]
-    return ways[0], out.join, ways[1], back.join
-
-
-def _candidates(
-    start: Voxel, known: set[Voxel], points: Floats
-) -> tuple[list[Voxel], Floats, Bools]:
-    """Return voxels near a joint, their squared distances from the curve, and which may be used.
-
-    Those are near the curve and near ``start``; ``known`` ones, and ``start``, are listed anyway.
-    """
-    cells = np.floor(points - 0.5).astype(np.int64)
-    fresh = (cells[:, 1:] != cells[:, :-1]).any(axis=0)
-    cells = cells[:, np.append(True, fresh)]
-    corners = (cells[:, :, None] + _CELL[:, None, :]).reshape(3, -1)
-    corners = corners[:, (np.abs(corners.T - start) <= MAX_DETOUR).all(axis=1)]
-    voxels = sorted({*zip(*corners.tolist(), strict=True), *known, start})
-    centres = np.array(voxels, dtype=float).T + 0.5
-    begin, along = points[:, None, :-1], np.diff(points, axis=1)[:, None]
-    offset = centres[:, :, None] - begin
-    length = np.maximum((along * along).sum(axis=0), TINY)
-    share = np.clip((offset * along).sum(axis=0) / length, 0.0, 1.0)
-    offset -= share * along
-    square = (offset * offset).sum(axis=0).min(axis=1)
-    usable = square <= MAX_SQUARE
-    usable[voxels.index(start)] = False
-    return voxels, square, usable
-
-
-def _chordless_paths(
-    start: int, side: list[int], allowed: int, near: list[int], cost: list[int]
-) -> list[Path]:
-    """Return chordless paths over at most ``MAX_DETOUR`` voxels to a side, the cheapest first."""
-    rest, rest_cost = [0] * (len(side) + 1), [0] * (len(side) + 1)
-    for k in range(len(side) - 1, -1, -1):
-        rest[k] = rest[k + 1] | 1 << side[k]
-        rest_cost[k] = rest_cost[k + 1] + cost[side[k]]
-    found = []
-
-    def extend(nodes: tuple[int, ...], own: int, passed: int, near_own: int, spent: int) -> None:
-        """Extend a path; ``passed`` is what is near ``start`` or its voxels but the last."""
-        tip = nodes[-1] if nodes else start
-        if near[tip] & rest[0]:
-            # The furthest it touches is where it must join: any other would leave a chord.
-            join = max(k for k, node in enumerate(side) if near[tip] >> node & 1)
-            if not passed & rest[join]:
-                found.append(
-                    Path(
-                        spent + rest_cost[join],
-                        nodes,
-                        join,
-                        own,
-                        own | 1 << side[join],
-                        rest[join],
-                        near_own,
-                        near_own | near[side[join]],
-                    )
-                )
-        if len(nodes) == MAX_DETOUR:
-            return
-        free = allowed & near[tip] & ~passed & ~(1 << tip)
-        while free:
-            bit = free & -free
-            free ^= bit
-            node = bit.bit_length() - 1
-            extend(
-                (*nodes, node),
-                own | bit,
-                passed | near[tip],
-                near_own | near[node],
-                spent + cost[node],
-            )
-
-    extend((), 0, 0, 0, 0)
-    return sorted(found)
-
-
-def _covered(points: Floats, voxels: list[Voxel]) -> bool:
-    """Return whether all points, (3, n), are within ``MAX_UNCOVERED`` of a voxel."""
-    centres = np.array(voxels, dtype=float).T + 0.5
-    apart = centres[:, :, None] - points[:, None, :]
-    return bool(((apart * apart).sum(axis=0).min(axis=0) <= MAX_UNCOVERED * MAX_UNCOVERED).all())
