@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 TEXT = (Path(__file__).parents[1] / "protocol.md").read_text(encoding="utf-8")
 
@@ -147,3 +149,30 @@ def off_wire(data: bytes) -> list[bytes]:
     assert [cobs_encode(raw) for raw in packets] == segments
     assert all(zlib.crc32(raw[:-4]).to_bytes(4, "little") == raw[-4:] for raw in packets)
     return [raw[:-4] for raw in packets]
+
+
+class Device(Protocol):
+    """A device with which a dialogue is held: each call returns the packets that it answers."""
+
+    def send(self, body: bytes) -> list[bytes]: ...
+    def send_raw(self, data: bytes) -> list[bytes]: ...
+    def tick(self) -> list[bytes]: ...
+
+
+def hold_dialogue(lines: Iterable[tuple[str, str]], device: Device) -> None:
+    """Send what the host sends in a dialogue; assert that the device answers as the document."""
+    answers: list[bytes] = []
+    for key, text in lines:
+        if key in {"host", "raw", "tick"}:
+            assert answers == [], "the device answered more than the document"
+        if key == "host":
+            answers = device.send(hex_bytes(text))
+        elif key == "raw":
+            answers = device.send_raw(hex_bytes(text))
+        elif key == "tick":
+            answers = device.tick()
+        elif key == "device":
+            meant = hex_bytes(text.removesuffix("*"))
+            got = answers.pop(0)
+            assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
+    assert answers == []

@@ -5,8 +5,7 @@ from __future__ import annotations
 from broken_devices.mutant import Device, Page, around, mutant
 from firmware_sim import spec
 
-
-@mutant(
+EVERY_DIGEST = (
     "7.6/colors",
     "7.6/palette-of-a-page",
     "8/dark",
@@ -16,6 +15,11 @@ from firmware_sim import spec
     "8/erased",
     "8/kept",
     "8/of-the-front",
+)
+
+
+@mutant(
+    *EVERY_DIGEST,
     "8/given-up",
     likely="adds dark voxels",
 )
@@ -47,15 +51,7 @@ def digest_forgets_to_take_out(patch):
 
 
 @mutant(
-    "7.6/colors",
-    "7.6/palette-of-a-page",
-    "8/dark",
-    "8/one-voxel",
-    "8/sum",
-    "8/overwritten",
-    "8/erased",
-    "8/kept",
-    "8/of-the-front",
+    *EVERY_DIGEST,
 )
 def digest_of_the_back_page(patch):
     patch.setattr(

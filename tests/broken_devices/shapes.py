@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 
+from broken_devices.digests import EVERY_DIGEST
 from broken_devices.mutant import Operands, Page, around, mutant, on_op
 from firmware_sim import memory, op_decoder, shapes
 
@@ -118,15 +119,7 @@ def palette_not_copied(patch):
 
 
 @mutant(
-    "7.6/colors",
-    "7.6/palette-of-a-page",
-    "8/dark",
-    "8/one-voxel",
-    "8/sum",
-    "8/overwritten",
-    "8/erased",
-    "8/kept",
-    "8/of-the-front",
+    *EVERY_DIGEST,
     "8/given-up",
     spreads=True,
 )

@@ -177,21 +177,7 @@ def test_dialogues_with_the_device(vector):
         firmware=facts["firmware"].strip('"'),
         serial=facts["serial"].strip('"'),
     )
-    said = []
-    for key, text in vector.lines:
-        if key in {"host", "raw", "tick"}:
-            assert said == [], "the device said more than the document"
-        if key == "host":
-            said = device.send(document.hex_bytes(text))
-        elif key == "raw":
-            said = device.send_raw(document.hex_bytes(text))
-        elif key == "tick":
-            said = device.tick()
-        elif key == "device":
-            meant = document.hex_bytes(text.removesuffix("*"))
-            got = said.pop(0)
-            assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
-    assert said == []
+    document.hold_dialogue(vector.lines, device)
 
 
 @each("ops")

@@ -65,23 +65,8 @@ def test_refused_ops(vector: document.Vector) -> None:
 
 @each("dialogue")
 def test_dialogues(vector: document.Vector) -> None:
-    said: list[bytes] = []
     with device_of(vector) as device:
-        for key, text in vector.lines:
-            if key in {"host", "raw", "tick"}:
-                assert said == [], "the device said more than the document"
-            if key == "host":
-                said = device.send(document.hex_bytes(text))
-            elif key == "raw":
-                said = device.send_raw(document.hex_bytes(text))
-            elif key == "tick":
-                said = device.tick()
-            elif key == "device":
-                meant = document.hex_bytes(text.removesuffix("*"))
-                got = said.pop(0)
-                shown = got[: len(meant)] if text.endswith("*") else got
-                assert shown.hex(" ") == meant.hex(" ")
-    assert said == []
+        document.hold_dialogue(vector.lines, device)
 
 
 SAMPLE = ((3, 5, 7), "index8")

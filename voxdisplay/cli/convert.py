@@ -13,11 +13,11 @@ from voxdisplay.cli.options import (
     DEFAULT_SIZE_TEXT,
     display_size_option,
     fit_option,
+    format_option,
     json_option,
     quiet_option,
 )
 from voxdisplay.cli.output import note, plural, print_json
-from voxdisplay.cli.param_types import PIXEL_FORMATS
 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
@@ -41,13 +41,7 @@ if TYPE_CHECKING:
     help="File to write: .npy (memory of a display), .npz (voxels and colors), .vox or .ply.",
 )
 @display_size_option(f"Size in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]")
-@click.option(
-    "--format",
-    "format_",
-    type=click.Choice(PIXEL_FORMATS),
-    default="rgb888",
-    help="Pixel format, which limits the colours.  [default: rgb888]",
-)
+@format_option("Pixel format, which limits the colours.  [default: rgb888]", "rgb888")
 @fit_option
 @model_options
 @quiet_option

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any, Final, TextIO, TypeVar
 import click
 
 from voxdisplay.cli.output import note, set_quiet
-from voxdisplay.cli.param_types import BaudType, ImageFileType, SizeType, seconds_type
+from voxdisplay.cli.param_types import (
+    PIXEL_FORMATS,
+    BaudType,
+    ImageFileType,
+    SizeType,
+    seconds_type,
+)
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -181,6 +187,13 @@ def display_size_option(help_text: str, *, for_two: str = "") -> Callable[[_C], 
         type=SizeType(for_two),
         metavar="NXxNYxNZ",
         help=help_text,
+    )
+
+
+def format_option(help_text: str, default: str | None = None) -> Callable[[_C], _C]:
+    """Return ``--format``, the pixel format of a display that is not there."""
+    return click.option(
+        "--format", "format_", type=click.Choice(PIXEL_FORMATS), default=default, help=help_text
     )
 
 

@@ -15,6 +15,7 @@ from voxdisplay.cli.options import (
     complete_port,
     display_size_option,
     fit_option,
+    format_option,
     json_option,
     no_reset,
     no_reset_option,
@@ -22,7 +23,7 @@ from voxdisplay.cli.options import (
     scene_argument,
 )
 from voxdisplay.cli.output import note, plural, print_json, print_stdout
-from voxdisplay.cli.param_types import PIXEL_FORMATS, FeaturesType
+from voxdisplay.cli.param_types import FeaturesType
 from voxdisplay.cli.show_films import is_show_file, open_show_file
 
 if TYPE_CHECKING:
@@ -61,12 +62,7 @@ _MAX_RATE: Final = 10_000  # frames a second, from which on the line is not what
     "Size of the display in voxels.  "
     f"[default: the port's, else the scene's, else {DEFAULT_SIZE_TEXT}]"
 )
-@click.option(
-    "--format",
-    "format_",
-    type=click.Choice(PIXEL_FORMATS),
-    help="Pixel format of the display.  [default: the port's, else rgb888]",
-)
+@format_option("Pixel format of the display.  [default: the port's, else rgb888]")
 @click.option(
     "--features",
     type=FeaturesType(),

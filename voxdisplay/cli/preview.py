@@ -13,12 +13,13 @@ from voxdisplay.cli.options import (
     DEFAULT_SIZE_TEXT,
     display_size_option,
     fit_option,
+    format_option,
     image_file_option,
     quiet_option,
     scene_argument,
 )
 from voxdisplay.cli.output import note, plural, progress_bar
-from voxdisplay.cli.param_types import PIXEL_FORMATS, AngleType, PixelSizeType, RangeType
+from voxdisplay.cli.param_types import AngleType, PixelSizeType, RangeType
 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
@@ -72,13 +73,7 @@ _FPS: Final = 20.0  # of a film that turns once
     f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]",
     for_two="; --pixels is the size of the picture",
 )
-@click.option(
-    "--format",
-    "format_",
-    type=click.Choice(PIXEL_FORMATS),
-    default="rgb888",
-    help="Pixel format of the display.  [default: rgb888]",
-)
+@format_option("Pixel format of the display.  [default: rgb888]", "rgb888")
 @fit_option
 @model_options
 @click.option(

@@ -13,12 +13,13 @@ from voxdisplay.cli.options import (
     DEFAULT_SIZE_TEXT,
     display_size_option,
     fit_option,
+    format_option,
     json_option,
     quiet_option,
     scene_argument,
 )
 from voxdisplay.cli.output import note, plural, print_json, progress_bar
-from voxdisplay.cli.param_types import PIXEL_FORMATS, CountType, FeaturesType
+from voxdisplay.cli.param_types import CountType, FeaturesType
 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
@@ -51,13 +52,7 @@ _SUFFIX: Final = ".vxs"
 @display_size_option(
     f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]"
 )
-@click.option(
-    "--format",
-    "format_",
-    type=click.Choice(PIXEL_FORMATS),
-    default="rgb888",
-    help="Pixel format of the display.  [default: rgb888]",
-)
+@format_option("Pixel format of the display.  [default: rgb888]", "rgb888")
 @click.option(
     "--features",
     type=FeaturesType(),

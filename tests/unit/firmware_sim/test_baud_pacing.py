@@ -175,10 +175,34 @@ def test_a_line_that_is_cut_forgets_what_was_on_its_way(clock):
     assert wire.transmit() == b""
 
 
+@contextlib.contextmanager
+def served_until_full(wire, theirs, ours, data):
+    """Serve a line on a socket, and write data to its other end until it takes no more."""
+    theirs.setblocking(False)
+    ours.settimeout(0.5)
+    stop, stopper = os.pipe()
+    pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
+    pump.start()
+    sent = 0
+    with contextlib.suppress(TimeoutError):
+        while sent < 50_000_000:
+            sent += ours.send(data)
+    try:
+        yield
+    finally:
+        os.write(stopper, b"\0")
+        pump.join(WAIT)
+        for descriptor in (stop, stopper):
+            os.close(descriptor)
+        ours.close()
+        theirs.close()
+    assert not pump.is_alive()
+    assert sent < 50_000_000
+
+
 def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch):
     """The answers wait before the line, then in the pump; then nothing is taken any more."""
     ours, theirs = socket.socketpair()
-    theirs.setblocking(False)
     for end in (ours, theirs):
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     wire = with_baud(DeviceOnLine(Device(Config((3, 5, 7), refresh=0))), 100_000_000)
@@ -189,48 +213,17 @@ def test_a_host_that_reads_nothing_stops_the_device_and_not_the_pump(monkeypatch
         return wait_ready(*arguments)
 
     monkeypatch.setattr(serve, "wait_ready", look)
-    stop, stopper = os.pipe()
-    pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
-    pump.start()
-    ours.settimeout(0.5)
-    sent = 0
-    with contextlib.suppress(TimeoutError):
-        while sent < 50_000_000:
-            sent += ours.send(status(1) * 100)
-    before = len(looks)
-    time.sleep(0.1)
-    assert len(looks) - before < 20, "and who waits does not look without end"
-    os.write(stopper, b"\0")
-    pump.join(WAIT)
-    assert not pump.is_alive()
-    assert sent < 50_000_000
-    for descriptor in (stop, stopper):
-        os.close(descriptor)
-    ours.close()
-    theirs.close()
+    with served_until_full(wire, theirs, ours, status(1) * 100):
+        before = len(looks)
+        time.sleep(0.1)
+        assert len(looks) - before < 20, "and who waits does not look without end"
 
 
 def test_a_line_that_is_full_takes_nothing_from_the_host():
     ours, theirs = socket.socketpair()
-    theirs.setblocking(False)
-    ours.settimeout(0.2)
     wire = with_baud(DeviceOnLine(Device(Config((3, 5, 7), refresh=0))), 50)
-    stop, stopper = os.pipe()
-    pump = threading.Thread(target=serve_wire, args=(wire, theirs.fileno(), stop))
-    pump.start()
-    sent = 0
-    with contextlib.suppress(TimeoutError):
-        while sent < 50_000_000:
-            sent += ours.send(bytes(1000))
-    assert len(wire._down._queue) <= 2 * 4096
-    os.write(stopper, b"\0")
-    pump.join(WAIT)
-    assert not pump.is_alive()
-    assert sent < 50_000_000
-    for descriptor in (stop, stopper):
-        os.close(descriptor)
-    ours.close()
-    theirs.close()
+    with served_until_full(wire, theirs, ours, bytes(1000)):
+        assert len(wire._down._queue) <= 2 * 4096
 
 
 def test_in_process_a_full_line_makes_the_writer_wait():
