@@ -59,6 +59,10 @@ class Body(ABC):
         It need not be the smallest one.
         """
 
+    def proven_bounds(self) -> Bounds:
+        """Return bounds that are proven where `bounds` are sampled, if formulas have any."""
+        return self.bounds()
+
     @abstractmethod
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> Geometry:
         """Return the body, or at least what of it is inside a box, as a geometry.
@@ -133,6 +137,10 @@ class TransformedBody(Body):
     def bounds(self) -> Bounds:
         """Return a box that holds the body: `Body.bounds`."""
         return transform_bounds(self.body.bounds(), self.matrix, self.offset)
+
+    def proven_bounds(self) -> Bounds:
+        """Return a box that holds the body: `Body.proven_bounds`."""
+        return transform_bounds(self.body.proven_bounds(), self.matrix, self.offset)
 
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> Geometry:
         """Return the transformed geometry of the body inside: `Body.geometry`."""

@@ -54,6 +54,8 @@ class TriangleMesh(Geometry):
         What was wrong with the body or left out, for people.
     is_sheet : bool
         Whether it may have a boundary, and no outside, without anything being wrong.
+    follows_body : bool
+        Whether the triangles are the body, or proven to follow it within a tolerance.
 
     """
 
@@ -67,6 +69,7 @@ class TriangleMesh(Geometry):
     face_textures: Ints | None = None
     notes: tuple[str, ...] = ()
     is_sheet: bool = False
+    follows_body: bool = True
 
     def transformed(self, matrix: Floats, offset: Floats) -> TriangleMesh:
         """Return the transformed mesh; a map that mirrors turns the triangles round."""

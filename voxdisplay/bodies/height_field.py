@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from voxdisplay.bodies.body import Body, TransformedBody, invertible
 from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds, Geometry
+from voxdisplay.bodies.parameter_cells import parameter_cells
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.formula_arguments import Bounds as Range
@@ -26,20 +27,29 @@ if TYPE_CHECKING:
     from voxdisplay.bodies.tessellation import Enclosure
 
 
+class PlaneFunction(Protocol):
+    """A real function of x and y."""
+
+    def __call__(self, x: Floats, y: Floats, /) -> Floats:
+        """Return z at arrays that broadcast; not finite where there is none."""
+
+    def enclosure(self, x: Interval, y: Interval, /) -> Interval | None:
+        """Return bounds over boxes, nan where nothing is known; None if there are none at all."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class HeightFunction(Geometry):
     """A function z = f(x, y) over a rectangle.
 
     Attributes
     ----------
-    value : callable
-        x and y, float64 arrays that broadcast, to z; not finite where there is none.
+    value : PlaneFunction
     low, high : (2,) float64 array
         Corners of the rectangle.
 
     """
 
-    value: Callable[[Floats, Floats], Floats]
+    value: PlaneFunction
     low: Floats
     high: Floats
 
@@ -54,13 +64,20 @@ class HeightFunction(Geometry):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Scaled:
-    value: Callable[[Floats, Floats], Floats]
+    value: PlaneFunction
     scale: Floats
     offset: Floats
 
     def __call__(self, x: Floats, y: Floats) -> Floats:
         inner = (x - self.offset[0]) / self.scale[0], (y - self.offset[1]) / self.scale[1]
         return np.asarray(self.scale[2] * self.value(*inner) + self.offset[2])
+
+    def enclosure(self, x: Interval, y: Interval) -> Interval | None:
+        one, two = 1 / self.scale[:2]
+        inner = self.value.enclosure(
+            (x - float(self.offset[0])) * float(one), (y - float(self.offset[1])) * float(two)
+        )
+        return None if inner is None else inner * float(self.scale[2]) + float(self.offset[2])
 
 
 class HeightField(Body):
@@ -100,6 +117,15 @@ class HeightField(Body):
             return np.append(low, 0.0), np.append(high, 0.0)
         spread = heights.max() - heights.min()
         return np.append(low, heights.min() - spread), np.append(high, heights.max() + spread)
+
+    def proven_bounds(self) -> Bounds:
+        """Return a box by bounds of the heights: `Body.proven_bounds`."""
+        low, high = self.bounds()
+        heights = self.function.enclosure(*parameter_cells(self.x_range, self.y_range))
+        if heights is not None and np.isfinite([heights.lo, heights.hi]).all():
+            low[2] = min(low[2], heights.lo.min())
+            high[2] = max(high[2], heights.hi.max())
+        return low, high
 
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> Geometry:  # noqa: ARG002 - column by column
         """Return the function: `Body.geometry`."""

@@ -10,6 +10,7 @@ import numpy as np
 from voxdisplay.bodies.body import Body, Fill, check_fill, invertible
 from voxdisplay.bodies.functions import Callback, Vectorised
 from voxdisplay.bodies.geometry import Bounds, TriangleMesh
+from voxdisplay.bodies.parameter_cells import parameter_cells
 from voxdisplay.bodies.tessellation import Enclosure, SurfaceFunction, tessellate
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import arguments
@@ -69,6 +70,17 @@ class SurfaceBody(Body):
         margin = 1 + (high - low) / 10
         return low - margin, high + margin
 
+    def proven_bounds(self) -> Bounds:
+        """Return a box by bounds of the coordinates: `Body.proven_bounds`."""
+        low, high = self.bounds()
+        with np.errstate(all="ignore"):
+            found = self._function.enclosure(*parameter_cells(self.u_range, self.v_range))
+        for axis, within in enumerate(found.position if found else ()):
+            if np.isfinite([within.lo, within.hi]).all():
+                low[axis] = min(low[axis], within.lo.min())
+                high[axis] = max(high[axis], within.hi.max())
+        return low, high
+
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> TriangleMesh:
         """Return triangles within the tolerance of the surface: `Body.geometry`."""
         if self.fill == "solid":  # what is below and above the box counts
@@ -86,6 +98,7 @@ class SurfaceBody(Body):
             {"u": u.copy(), "v": v.copy()},
             notes=found.notes,
             is_sheet=True,
+            follows_body=found.is_proven,
         )
 
     def transformed(self, matrix: ArrayLike, offset: ArrayLike = (0, 0, 0)) -> Body:

@@ -66,6 +66,8 @@ class Tessellation(NamedTuple):
     faces : (F, 3) int64 array
     notes : tuple of str
         What was left out, or could not be proven.
+    is_proven : bool
+        Whether it is proven that they follow the surface.
 
     """
 
@@ -73,6 +75,7 @@ class Tessellation(NamedTuple):
     parameters: Floats
     faces: Ints
     notes: tuple[str, ...]
+    is_proven: bool
 
 
 def tessellate(
@@ -130,6 +133,7 @@ class _Refinement:
         self.broken = np.zeros(0, dtype=bool)
         self.seen = 0  # edges before are decided
         self.unproven = 0
+        self.is_proven = False
         self.notes: list[str] = []
 
     def _halve_lines(self, lines: list[Floats]) -> Floats:
@@ -328,6 +332,7 @@ class _Refinement:
             except BodyError:
                 self.notes.append(f"not proven: it would take more than {MAX_TRIANGLES} triangles")
                 return
+        self.is_proven = not self.unproven
         if self.unproven:
             self.notes.append(f"not proven: the formulas have no bounds at {self.unproven} places")
 
@@ -388,7 +393,9 @@ class _Refinement:
         used = np.zeros(len(mesh.uv), dtype=bool)
         used[faces] = True
         number = np.cumsum(used) - 1
-        return Tessellation(mesh.position[used], mesh.uv[used], number[faces], tuple(self.notes))
+        return Tessellation(
+            mesh.position[used], mesh.uv[used], number[faces], tuple(self.notes), self.is_proven
+        )
 
     def _nowhere(self) -> BodyError:
         row = int(np.argmin(np.isfinite(self.mesh.position).sum(axis=1)))

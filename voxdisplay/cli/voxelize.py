@@ -124,6 +124,9 @@ def voxelize(
     for number, (item, sequence) in enumerate(zip(items, sequences, strict=True)):
         if isinstance(sequence, vd.Sequence) and isinstance(sequence.proof, str):
             note(f"object {number} ({item.type}) is not certified: {sequence.proof}")
+        elif certified and isinstance(sequence, vd.VoxelSet) and not sequence.certified:
+            said = "; ".join(sequence.notes)
+            note(f"object {number} ({item.type}) is not certified" + (said and f": {said}"))
     kept = [_kept(sequence, clip) for sequence in sequences]
     rows = _rows(kept)
     if output:
@@ -214,6 +217,7 @@ def _report(
         "enclosed": report.enclosed,
         "clipped": clipped,
         "seconds": round(voxels.seconds, 6),
+        "certified": voxels.certified,
         "notes": list(voxels.notes),
     }
 

@@ -64,9 +64,10 @@ def voxelize_items(
         if kept and id(item) in kept:
             found[i] = kept[id(item)][1]
         elif isinstance(item.shape, Body):
-            low, high = item.shape.bounds()
-            ends = np.isfinite(low).all() and np.isfinite(high).all()
-            found[i] = _voxelize_body(item, clip or (None if ends else endless), options)
+            grid = clip
+            if grid is None and not np.isfinite(item.shape.bounds()).all():
+                grid = endless
+            found[i] = _voxelize_body(item, grid, options)
         else:
             curves.append(i)
     if curves:

@@ -129,8 +129,9 @@ def voxelize(
 
     """
     if isinstance(curve, Body):
-        box = box_of(curve) if clip is None else VoxelBox.of_grid(_sides(clip))
-        return voxelize_body(curve, box, certified=flag("certified", certified))
+        certified = flag("certified", certified)
+        grid = None if clip is None else VoxelBox.of_grid(_sides(clip))
+        return voxelize_body(curve, grid or box_of(curve, certified=certified), certified=certified)
     if clip is not None:
         raise ValueError(
             "clip: a sequence is whole; `Sequence.clip` finds what is inside a display"

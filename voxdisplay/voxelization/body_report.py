@@ -51,6 +51,8 @@ class BodyReport:
         too large to be filled.
     seconds : float
         Time spent on the voxels.
+    certified : bool
+        Whether it was asked for, and proven, that no part of the body is missed.
 
     """
 
@@ -62,6 +64,7 @@ class BodyReport:
     cover: float | None
     enclosed: int | None
     seconds: float
+    certified: bool = False
 
 
 def report_on(

@@ -71,8 +71,8 @@ def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> Voxe
     return replace(voxels, body=body, notes=notes, seconds=time.perf_counter() - began_s)
 
 
-def box_of(body: Body) -> VoxelBox:
-    """Return a box that holds all voxels of a body.
+def box_of(body: Body, *, certified: bool = False) -> VoxelBox:
+    """Return a box that holds all voxels of a body; if certified, it is proven to.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def box_of(body: Body) -> VoxelBox:
         If the body has no end, or is larger than any display.
 
     """
-    low, high = body.bounds()
+    low, high = body.proven_bounds() if certified else body.bounds()
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise BodyError(f"{body} has no end", hint="clip it to a display: clip=(nx, ny, nz)")
     if (high - low).max() > MAX_SPAN or max(np.abs(low).max(), np.abs(high).max()) > 1 << 30:

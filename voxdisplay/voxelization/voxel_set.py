@@ -6,7 +6,7 @@ A voxel set is a value. It must not know displays or how it was made.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,9 @@ class VoxelSet:
         What the voxels show.
     seconds : float
         Time spent on them.
+    certified : bool
+        Whether it was asked for, and proven, that no part of the body is missed: each point of it
+        inside the box is within 1, in max norm, of a lit centre, but for the tolerance of formulas.
 
     """
 
@@ -53,6 +56,7 @@ class VoxelSet:
     notes: tuple[str, ...] = ()
     body: Body | None = None
     seconds: float = 0.0
+    certified: bool = False
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -105,7 +109,8 @@ class VoxelSet:
         from voxdisplay.voxelization.body_report import report_on  # noqa: PLC0415 - rarely needed
 
         voxels = self.voxels.astype(np.int64)
-        return report_on(voxels, self.box, self.kind, self.body, self.seconds)
+        found = report_on(voxels, self.box, self.kind, self.body, self.seconds)
+        return replace(found, certified=self.certified)
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture for notebooks, in its bounding box; None without Pillow."""

@@ -107,4 +107,56 @@ def test_the_command_prints_the_figures(tmp_path):
     assert (facts["kind"], facts["tunnels"]) == ("surface", 0)
     assert 0 < facts["e_av"] < facts["e_max"] <= 0.5
     assert facts["enclosed"] > 0
+    assert facts["certified"] is False
+    run = CliRunner().invoke(voxelize, [str(scene), "--json", "--certified"])
+    assert json.loads(run.stdout)["objects"][0]["certified"] is True
+    assert "certified" not in run.stderr
+    scene.write_text('{"type": "height_field", "z": "5 + 9*exp(-900*((x - 4.3)**2 + y**2))", '
+                     '"x": [0, 9], "y": [-5, 5]}')  # fmt: skip
+    run = CliRunner().invoke(voxelize, [str(scene), "--json", "--certified"])
+    (facts,) = json.loads(run.stdout)["objects"]
+    assert facts["certified"] is False
+    assert "not proven" in facts["notes"][0]
+    assert "object 0 (height_field) is not certified: not proven: " in run.stderr
     assert dataclasses.is_dataclass(vd.voxelize(BOX).report)
+
+
+WAVES = "6 + 3*sin(x/3)*cos(y/4)"
+
+
+@pytest.mark.parametrize(
+    ("body", "is_proven"),
+    [
+        (BOX, True),
+        (vd.Sphere((6, 6, 6), 4), True),
+        (vd.Cylinder((4, 4, 4), (4, 4, 8), 0.5), True),
+        (vd.Scatter([(1, 1, 1)]), True),
+        (vd.Torus((6, 6, 6), 3, 1), True),
+        (vd.Implicit("x**2 + y**2 + (z - 10)**2 - 90"), True),
+        (vd.Implicit(lambda x, y, z: x + y - z), False),
+        (vd.Surface("u", "v", "6 + sin(u)", u=(0, 9), v=(0, 9)), True),
+        (vd.Surface(lambda u, v: (u, v, u), u=(0, 9), v=(0, 9)), False),
+        (vd.HeightField(WAVES, x=(0.3, 9), y=(0, 9.8)), True),
+        (vd.HeightField(WAVES, x=(0, 9), y=(0, 9)).transformed(-np.eye(3), (9, 9, 9)), True),
+        (vd.HeightField("x + 3*floor(y/3)", x=(0, 9), y=(0, 9)), False),
+        (vd.HeightField(lambda x, y: x + y, x=(0, 9), y=(0, 9)), False),
+        (vd.HeightField("x", x=(80, 90), y=(0, 9)), True),
+    ],
+    ids=repr,
+)
+def test_certified_means_asked_for_and_proven(body, is_proven):
+    found = vd.voxelize(body, clip=CLIP, certified=True)
+    assert found.certified is found.report.certified is is_proven
+    assert is_proven or any("proven" in note for note in found.notes)
+    assert not vd.voxelize(body, clip=CLIP).certified
+
+
+def test_certified_bodies_are_in_boxes_that_hold_them():
+    needle = "5 + 9*exp(-900*((u - 4.3)**2 + (v - 0.21)**2))"
+    surface = vd.Surface("u", "v", needle, u=(0, 9), v=(-5, 5))
+    field = vd.HeightField(needle.replace("u", "x").replace("v", "y"), x=(0, 9), y=(-5, 5))
+    for body, top in ((surface, 12), (field, 13), (field.transformed(np.eye(3)), 13)):
+        assert body.bounds()[1][2] < top <= body.proven_bounds()[1][2]
+    assert vd.voxelize(surface, certified=True).voxels[:, 2].max() == 13
+    pole = vd.HeightField("1/x", x=(-1, 1), y=(0, 3))
+    assert np.equal(pole.bounds(), pole.proven_bounds()).all()

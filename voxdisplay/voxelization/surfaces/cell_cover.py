@@ -46,7 +46,7 @@ def open_cells(
 
     """
     if bricks is None:
-        return ("nothing is proven: f is a callable, which has no bounds",)
+        return ("nothing is proven: a callable has no bounds",)
     found = [
         _open(function, bricks.origin[begin : begin + _BRICKS], index, region)
         for begin in range(0, len(bricks.origin), _BRICKS)

@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from voxdisplay.errors import BodyError
+from voxdisplay.expressions.interval import Interval
 from voxdisplay.voxelization.index_ranges import expand_ranges
+from voxdisplay.voxelization.surfaces.bricks import prune
+from voxdisplay.voxelization.surfaces.cell_cover import open_cells
 from voxdisplay.voxelization.surfaces.cover import distinct
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
@@ -38,7 +41,7 @@ def voxelize_heights(
     box: VoxelBox,
     body: Body,
     *,
-    certified: bool = False,  # noqa: ARG001 - nothing is proven of jumps
+    certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels of a height field inside a box.
 
@@ -50,7 +53,7 @@ def voxelize_heights(
     """
     x, y = (_Lines(geometry, box, axis) for axis in (0, 1))
     if not (x.count and y.count):
-        return VoxelSet(box, np.empty(0, dtype=np.int64), body.kind)
+        return VoxelSet(box, np.empty(0, dtype=np.int64), body.kind, certified=certified)
     f = geometry.value
     with np.errstate(all="ignore"):
         middle = f(x.centre, y.centre[:, None])
@@ -79,7 +82,37 @@ def voxelize_heights(
     if jumps:
         notes.append("the height jumps, or has poles: nothing is drawn across")
     index = distinct([runs.index(x, y, box), *(_index_beyond(each, x, y, box) for each in jumps)])
-    return VoxelSet(box, index, body.kind, notes=tuple(notes))
+    if certified:
+        above = _Above(geometry)
+        unproven = open_cells(above, prune(above, box.expanded(1)), index, box)
+        notes += unproven
+        certified = not unproven
+    return VoxelSet(box, index, body.kind, notes=tuple(notes), certified=certified)
+
+
+class _Above:
+    """Height above the surface, with bounds that hold no zero beyond its rectangle."""
+
+    always_defined = False
+
+    def __init__(self, geometry: HeightFunction) -> None:
+        self._geometry = geometry
+
+    def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
+        return np.asarray(z - self._geometry.value(x, y))
+
+    def enclosure(self, x: Interval, y: Interval, z: Interval, /) -> Interval | None:
+        (a, b), (c, d) = (
+            (np.maximum(each.lo, low), np.minimum(each.hi, high))
+            for each, low, high in zip((x, y), self._geometry.low, self._geometry.high, strict=True)
+        )
+        beyond = (a > b) | (c > d)
+        inside = Interval(np.minimum(a, b), b), Interval(np.minimum(c, d), d)
+        heights = self._geometry.value.enclosure(*inside)
+        if heights is None:
+            return None
+        above = z - heights
+        return Interval(np.where(beyond, 1.0, above.lo), np.where(beyond, 1.0, above.hi))
 
 
 def _index_beyond(beyond: _Beyond, x: _Lines, y: _Lines, box: VoxelBox) -> Ints:

@@ -45,7 +45,7 @@ def voxelize_implicit(
     """
     region = _region(geometry, box)
     if region.size == 0:
-        return VoxelSet(box, np.empty(0, dtype=np.int64), body.kind)
+        return VoxelSet(box, np.empty(0, dtype=np.int64), body.kind, certified=certified)
     scan = _Scan(geometry.function, region, solid=body.kind == "solid")
     # A voxel's cross ends halfway to the centres beside it: those around the region count.
     centres = region.expanded(1)
@@ -66,10 +66,12 @@ def voxelize_implicit(
     if geometry.wires:
         index = cover_wires(index, region, geometry.wires, lambda p: geometry.function(*p.T) <= 0)
     if certified:
-        notes += open_cells(geometry.function, bricks, index, region)
+        unproven = open_cells(geometry.function, bricks, index, region)
+        notes += unproven
+        certified = not unproven
     if region != box:
         index = box.index_of(region.voxels_at(index))
-    return VoxelSet(box, index, body.kind, notes=notes)
+    return VoxelSet(box, index, body.kind, notes=notes, certified=certified)
 
 
 def _region(geometry: ImplicitFunction, box: VoxelBox) -> VoxelBox:

@@ -19,7 +19,7 @@ def voxelize_lit(
     box: VoxelBox,
     body: Body,
     *,
-    certified: bool,  # noqa: ARG001 - exact anyway
+    certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels inside a box: see `body_voxelization.Voxeliser`."""
     rows = np.flatnonzero(box.inside(geometry.voxels))
@@ -34,4 +34,5 @@ def voxelize_lit(
         body.kind,
         None if geometry.colors is None else geometry.colors[kept],
         {name: values[kept] for name, values in geometry.parameters.items()},
+        certified=certified,
     )

@@ -32,7 +32,7 @@ def voxelize_mesh(
     box: VoxelBox,
     body: Body,
     *,
-    certified: bool,  # noqa: ARG001 - exact anyway
+    certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels of a mesh inside a box: see `body_voxelization.Voxeliser`."""
     mesh = snap(geometry, box)
@@ -56,7 +56,15 @@ def voxelize_mesh(
     if samples is not None:
         given = samples if topology.triangles is None else samples.renumbered(topology.triangles)
         colors, parameters = interpolate(geometry, given)
-    return VoxelSet(box, index, body.kind, colors, parameters, tuple(notes))
+    return VoxelSet(
+        box,
+        index,
+        body.kind,
+        colors,
+        parameters,
+        tuple(notes),
+        certified=certified and geometry.follows_body,
+    )
 
 
 def _topology_notes(topology: Topology) -> Iterator[str]:

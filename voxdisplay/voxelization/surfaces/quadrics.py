@@ -33,12 +33,12 @@ def voxelize_quadrics(
     box: VoxelBox,
     body: Body,
     *,
-    certified: bool = False,  # noqa: ARG001 - exact anyway
+    certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels of quadric patches inside a box, as a shell or filled."""
     fill = _solid if geometry.closed and body.kind == "solid" else _shell
     if not geometry.wires:
-        return VoxelSet(box, fill(geometry, box, box), body.kind)
+        return VoxelSet(box, fill(geometry, box, box), body.kind, certified=certified)
 
     def inside(points: Floats) -> Bools:
         if not geometry.closed:
@@ -50,7 +50,8 @@ def voxelize_quadrics(
     wide = box.expanded(1)
     index = cover_wires(fill(geometry, wide, box), wide, geometry.wires, inside)
     voxels = wide.voxels_at(index)
-    return VoxelSet(box, box.index_of(voxels[box.inside(voxels)]), body.kind)
+    index = box.index_of(voxels[box.inside(voxels)])
+    return VoxelSet(box, index, body.kind, certified=certified)
 
 
 def _shell(geometry: QuadricPatches, box: VoxelBox, wall: VoxelBox) -> Ints:
