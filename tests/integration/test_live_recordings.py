@@ -19,27 +19,6 @@ from voxdisplay.view.html_export import save_html
 pytestmark = browsers.NEEDED
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    browser = browsers.Browser(tmp_path_factory.mktemp("chromium"))
-    yield browser
-    browser.close()
-
-
-@pytest.fixture
-def tab(chromium):
-    tabs = []
-
-    def open_tab(url):
-        tabs.append(chromium.tab(url))
-        return tabs[-1]
-
-    yield open_tab
-    for each in tabs:
-        assert each.errors == []
-        each.close()
-
-
 SAVED = """
 new Promise(done => {
   download = async (blob, name) => {

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -193,6 +194,92 @@ def test_a_display_that_comes_back_goes_on(plug, scene):
         play.send_signal(signal.SIGINT)
         _, text = play.communicate(timeout=DEADLINE_S)
     assert "is back" in text
+
+
+class Numbered:
+    """A show whose frames tell their numbers."""
+
+    fps, loop, frame_count = 30.0, False, 17 * 9 * 5 - 1
+
+    @property
+    def duration(self):
+        return self.frame_count / self.fps
+
+    def frame(self, number):
+        frame = vd.Frame((17, 9, 5), "index8")
+        index = number + 1
+        frame.draw([(index % 17, index // 17 % 9, index // 153)], "white")
+        return frame
+
+
+def number_shown(plug):
+    (index,) = np.flatnonzero(np.frombuffer(bytes(plug.snapshot().pixels), np.uint8))
+    return int(index) - 1
+
+
+@pytest.mark.parametrize("refresh", [0, 60_000])
+def test_a_display_that_comes_back_goes_on_at_the_right_time(plug, refresh):
+    """Bounds follow from the order of what happens: no time is assumed."""
+    plug.plug(refresh=refresh)
+    back_s, first_s, shown = [], [], []
+
+    def plug_in():
+        back_s.append(time.monotonic())
+        plug.plug()
+
+    timer = threading.Timer(0.5, plug_in)
+
+    def observe(player):
+        if not first_s:
+            first_s.append(time.monotonic())
+        elif not shown and player.shown > 5:
+            plug.unplug()
+            shown.append(player.shown)
+            timer.start()
+        elif back_s and player.shown > shown[0] + 5:
+            number = number_shown(plug)
+            latest = (time.monotonic() - before_s) * 30
+            assert (back_s[0] - first_s[0]) * 30 - 1 <= number <= latest
+            player.stop()
+
+    with vd.open(str(plug.path), reconnect_s=DEADLINE_S) as display:
+        before_s = time.monotonic()
+        report = display.play(Numbered(), observer=observe)
+    timer.join()
+    assert back_s, "it was away"
+    assert report.frames == report.shown + report.dropped
+    assert report.wrong == 0
+
+
+def test_a_player_that_seeks_with_every_turn_shows_what_is_there(emulator, tmp_path):
+    """An arrow that is held down, where another process prepares the frames; then a pause."""
+    log, frames = tmp_path / "log", 3000
+    port = emulator("--pty", "--size", "16x16x16", "--refresh", 60).port
+    show = SlowShow(frames, log=log)
+    seeks, paused = [], []
+
+    def observe(player):
+        if len(processes_of(log)) < 2:
+            return
+        if len(seeks) < 150:
+            player.seek(0.4)
+            seeks.append(player.shown)
+        elif not paused:
+            player.pause()
+            paused.append((player.position_s, player.shown))
+        elif player.paused and player.shown > paused[0][1]:
+            assert player.position_s == paused[0][0]
+            player.pause()
+        elif not player.paused and player.shown > paused[0][1] + 5:
+            assert player.position_s > paused[0][0] >= 0.4 * 150
+            player.stop()
+
+    with vd.open(port) as display:
+        report = display.play(show, observer=observe)
+        assert report.wrong == 0
+        final = display.read()
+    drawn = {int(line.split()[1]) for line in log.read_text(encoding="utf-8").splitlines() if line}
+    assert any(np.array_equal(final, show.frame(n).array()) for n in drawn if n > 0.4 * 150 * 30)
 
 
 # -- keys
