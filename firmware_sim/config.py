@@ -25,8 +25,11 @@ FEATURES: Final = {
     "palette": spec.FEATURE_PALETTE,
     "read": spec.FEATURE_READ,
     "digest": spec.FEATURE_DIGEST,
+    "fade": spec.FEATURE_FADE,
 }
 _INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the format INDEX8
+_COLORED: Final = frozenset(("fade",))  # not with MONO1
+_FIRST_OF_1_1: Final = 9  # section 15: features from this bit on are of version 1.1
 LIES: Final = ("grid", "credit", "format", "features", "payload", "boot")
 _INFO_FIXED: Final = 29  # bytes of an INFO's payload before its strings (5)
 _U32: Final = 0xFFFFFFFF
@@ -104,7 +107,8 @@ class Config:
         allowed = [
             name
             for name in FEATURES
-            if name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8
+            if (name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8)
+            and (name not in _COLORED or self.pixels.code != spec.FORMAT_MONO1)
         ]
         features = frozenset(allowed)
         if self.features is not None:
@@ -133,6 +137,11 @@ class Config:
             raise ValueError(
                 f"INFO needs {info} bytes: take shorter strings or a max_payload of {info} or more"
             )
+
+    @property
+    def minor(self) -> int:
+        """Minor version that it announces: 0 without a feature of a later one (15)."""
+        return spec.VERSION_MINOR if self.feature_bits >> _FIRST_OF_1_1 else 0
 
     @property
     def strings(self) -> bytes:

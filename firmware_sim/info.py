@@ -31,6 +31,8 @@ class Announcement:
         In bytes.
     refresh
         Ticks per 1000 seconds.
+    minor
+        Version: section 15.
     features
         A bit for each ``spec.FEATURE_*``.
     strings
@@ -43,6 +45,7 @@ class Announcement:
     max_payload: int
     credit: int
     refresh: int
+    minor: int
     features: int
     strings: bytes
 
@@ -52,7 +55,7 @@ class Announcement:
             spec.VERSION_MAJOR,
             session,
             self.boot,
-            spec.VERSION_MINOR,
+            self.minor,
             self.pixel_format,
             *self.grid,
             Memory.PAGES,
@@ -82,6 +85,7 @@ def make_announcement(config: Config, boot: int) -> Announcement:
         config.max_payload,
         config.rx_buffer,
         config.refresh,
+        config.minor,
         config.feature_bits,
         config.strings,
     )

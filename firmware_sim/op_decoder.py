@@ -9,7 +9,7 @@ from collections.abc import Callable
 from itertools import accumulate
 from typing import Final
 
-from firmware_sim import spec
+from firmware_sim import fades, spec
 from firmware_sim.grid import Grid
 from firmware_sim.memory import Page, PixelFormat
 from firmware_sim.operands import OPERAND_MASK, Operands
@@ -70,7 +70,7 @@ class OpDecoder:
 
 
 class _PacketDecoder:
-    """State of the decoder within one packet: cursor and pen.
+    """State of the decoder within one packet: cursor, pen and fade.
 
     There is a method for each op; it takes the low five bits of the op byte.
     """
@@ -81,8 +81,43 @@ class _PacketDecoder:
         self._format = device.pixel_format
         self._operands = operands
         self._page = page
+        self._fade: fades.Fade | None = None
         self._cursor = 0
         self._pen = device.pixel_format.full
+
+    # Cursor and pen, which a fade depends on (7.9)
+
+    @property
+    def _cursor(self) -> int:
+        return self._cursor_index
+
+    @_cursor.setter
+    def _cursor(self, index: int) -> None:
+        self._cursor_index = index
+        self._written = False  # True if the fade has written the voxel at the cursor
+
+    @property
+    def _pen(self) -> bytes:
+        return self._fade.pixel if self._fade else self._plain_pen
+
+    @_pen.setter
+    def _pen(self, pixel: bytes) -> None:
+        self._fade = None
+        self._plain_pen = pixel
+
+    def _plot_row(self, voxels: "array[int]", *, again: bool = False) -> None:
+        """Write voxels in their order, and set the cursor to the last one.
+
+        Those of a fade are counted, but not the first if it is written again.
+        """
+        if not self._fade:
+            self._page.plot(voxels, self._pen)
+            self._cursor = voxels[-1]
+            return
+        for voxel, pixel in self._fade.pens(voxels, again=again and self._written):
+            self._page.plot(array("Q", (voxel,)), pixel)
+        self._cursor = voxels[-1]
+        self._written = True
 
     # Bounds
 
@@ -129,6 +164,27 @@ class _PacketDecoder:
             raise self._outside_error(f"{count} colours from {first} on")
         self._page.set_colors(first, colors)
 
+    def ramp(self, _: int) -> None:
+        first = self._operands.byte()
+        count = self._operands.byte() + 1
+        colors = self._operands.take(3 * (self._operands.byte() + 1))
+        if first + count > spec.LIMIT_MAX_COLORS:
+            raise self._outside_error(f"{count} colours from {first} on")
+        self._page.set_colors(first, fades.ramp(colors, count))
+
+    def fade(self, _: int) -> None:
+        stops = self._operands.byte() + 1
+        count = self._operands.leb128() + 1
+        if count > spec.LIMIT_MAX_FADE:
+            raise self._operands.error(spec.CODE_COUNT, f"a fade of {count} voxels")
+        place = self._operands.leb128()
+        if place >= count:
+            raise self._operands.error(spec.CODE_COUNT, f"voxel {place} of {count}")
+        size = 1 if self._format.code == spec.FORMAT_INDEX8 else 3
+        colors = fades.split_colors(self._operands.take(size * stops), size)
+        self._fade = fades.Fade(self._format.code, fades.Blend(colors, count, place))
+        self._written = False
+
     # Chains
 
     def step(self, octant: int) -> None:
@@ -162,8 +218,7 @@ class _PacketDecoder:
         steps = self._device.steps[octant]
         path = b"".join([_CRUMBS[byte] for byte in raw])[:count]
         chain = array("Q", accumulate(map(steps.__getitem__, path), initial=self._cursor))
-        self._page.plot(chain, self._pen)
-        self._cursor = chain[-1]
+        self._plot_row(chain, again=True)
 
     # Runs
 
@@ -205,8 +260,7 @@ class _PacketDecoder:
         place = self._operands.coordinates()
         self._check_cursor()
         self._check_coordinates(place)
-        self._page.plot(line(self._grid, self._cursor, place), self._pen)
-        self._cursor = self._grid.index(*place)
+        self._plot_row(line(self._grid, self._cursor, place), again=True)
 
     def box(self, _: int) -> None:
         place = self._operands.coordinates()
@@ -220,7 +274,10 @@ class _PacketDecoder:
         x, y, z = self._operands.coordinate_lists(self._operands.byte() + 1)
         self._check_coordinates((max(x), max(y), max(z)))
         _, row, plane = self._grid.strides
-        voxels = [i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)]
+        voxels = array("Q", (i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)))
+        if self._fade:
+            self._plot_row(voxels)
+            return
         self._page.plot(array("Q", set(voxels)), self._pen)
         self._cursor = voxels[-1]
 
@@ -255,6 +312,8 @@ def _op_table(features: int) -> list[_Op | None]:
         (spec.FEATURE_BOX, spec.OP_BOX, 0, _PacketDecoder.box),
         (spec.FEATURE_DOTS, spec.OP_DOTS, 0, _PacketDecoder.dots),
         (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _PacketDecoder.colors),
+        (spec.FEATURE_FADE, spec.OP_FADE, 0, _PacketDecoder.fade),
+        (_ramp_feature(features), spec.OP_RAMP, 0, _PacketDecoder.ramp),
         (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _PacketDecoder.step),
         (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _PacketDecoder.from_),
         (spec.FEATURE_ARC, spec.OP_ARC, 0, _PacketDecoder.arc),
@@ -268,3 +327,8 @@ def _op_table(features: int) -> list[_Op | None]:
             for low in range(low_bits + 1):
                 ops[op | low] = draw
     return ops
+
+
+def _ramp_feature(features: int) -> int:
+    """Return the feature that decides about RAMP, which needs two: one that is missing, if any."""
+    return spec.FEATURE_FADE if features >> spec.FEATURE_PALETTE & 1 else spec.FEATURE_PALETTE

@@ -78,6 +78,13 @@ class Operands:
         """Return a count whose first part is in the op byte (7.2)."""
         if operand < OPERAND_MASK:
             return operand + 1
+        count = self.leb128() + OPERAND_MASK + 1
+        if count >= _COUNT_LIMIT:
+            raise self.error(spec.CODE_COUNT, "the count is 2^32 or more")
+        return count
+
+    def leb128(self) -> int:
+        """Return a number in the form of LEB128 (7.2)."""
         count = 0
         for k in range(_COUNT_BYTES):
             byte = self.byte()
@@ -88,9 +95,6 @@ class Operands:
             raise self.error(spec.CODE_COUNT, "the count has more than 5 bytes")
         if k and not byte:
             raise self.error(spec.CODE_COUNT, "the count is not in its shortest form")
-        count += OPERAND_MASK + 1
-        if count >= _COUNT_LIMIT:
-            raise self.error(spec.CODE_COUNT, "the count is 2^32 or more")
         return count
 
     def packed(self, count: int, bits: int) -> bytes:

@@ -25,6 +25,7 @@ class PlainDecoder:
     def draw(self, payload):
         """Apply the ops of one payload."""
         self.data, self.at, self.cursor, self.pen = payload, 0, 0, self.full
+        self.fading, self.again = None, False
         self.now = {}
         while self.at < len(payload):
             self.op()
@@ -88,11 +89,69 @@ class PlainDecoder:
         group = op & 0xE0
         names = {0x20: "STEP", 0x40: "FROM", 0x60: "OCT", 0x80: "SKIP", 0xA0: "RUN", 0xC0: "LIT",
                  0xE0: "DIFF"}  # fmt: skip
-        low = ["END", "PEN", "MOVE", "LINE", "BOX", "DOTS", "COLORS"]
+        low = ["END", "PEN", "MOVE", "LINE", "BOX", "DOTS", "COLORS", "", "FADE", "RAMP"]
         name = names[group] if group else low[op]
         self.ops.append(name)
         methods = {"PEN": self.set_pen, "FROM": self.go_from}
         methods.get(name, getattr(self, name.lower(), None))(op)
+        if name in {"PEN", "LIT", "DIFF"}:
+            self.fading = None
+        if name not in {"OCT", "COLORS", "RAMP", "PEN"}:
+            self.again = self.fading is not None and name in {"STEP", "FROM", "LINE", "DOTS"}
+
+    # -- fades: [number of voxels, colours, place]
+
+    def leb128(self):
+        number, shift = 0, 0
+        while True:
+            byte = self.byte()
+            number |= (byte & 0x7F) << shift
+            shift += 7
+            if byte < 0x80:
+                assert byte or shift == 7, "not the shortest"
+                return number
+
+    def blend(self, n, colors, j):
+        m = max(n - 1, 1)
+        s, r = divmod(j * (len(colors) - 1), m)
+        pairs = zip(colors[s], colors[min(s + 1, len(colors) - 1)], strict=True)
+        return [a + (2 * r * (b - a) + m) // (2 * m) for a, b in pairs]
+
+    def fade(self, _op):
+        k, n, i = self.byte() + 1, self.leb128() + 1, self.leb128()
+        size = 1 if self.pixel_bytes == 1 else 3
+        colors = [self.take(size) for _ in range(k)]
+        assert i < n <= 1 << 20
+        assert not self.mono
+        self.fading = [n, colors, i]
+        self.pen = self.pen_at(i)
+
+    def pen_at(self, place):
+        n, colors, _ = self.fading
+        channels = self.blend(n, colors, min(place, n - 1))
+        if self.pixel_bytes == 2:
+            r, g, b = (
+                (2 * t * c + 255) // 510 for t, c in zip((31, 63, 31), channels, strict=True)
+            )
+            return r << 11 | g << 5 | b
+        return sum(channel << 8 * at for at, channel in enumerate(channels))
+
+    def write_next(self, index, *, again=False):
+        """Write a voxel that a fade counts."""
+        if self.fading is None:
+            self.write(index, self.pen)
+            return
+        n, _, place = self.fading
+        self.write(index, self.pen_at(place - again))
+        self.fading[2] = place if again else min(place + 1, n)
+        self.pen = self.pen_at(self.fading[2])
+
+    def ramp(self, _op):
+        first, m, k = self.byte(), self.byte() + 1, self.byte() + 1
+        colors = [self.take(3) for _ in range(k)]
+        assert first + m <= 256
+        for j in range(m):
+            self.palette[first + j] = tuple(self.blend(m, colors, j))
 
     def end(self, _op):
         assert not any(self.take(len(self.data) - self.at))
@@ -110,7 +169,7 @@ class PlainDecoder:
         for k in range(length + 1):
             at = [a + (2 * k * e + length) // (2 * length) if length else a
                   for a, e in zip(p, d, strict=True)]  # fmt: skip
-            self.write(self.index(at), self.pen)
+            self.write_next(self.index(at), again=self.again and not k)
         self.cursor = self.index(q)
 
     def box(self, _op):
@@ -123,7 +182,7 @@ class PlainDecoder:
     def dots(self, _op):
         for _ in range(self.byte() + 1):
             self.cursor = self.index(self.xyz())
-            self.write(self.cursor, self.pen)
+            self.write_next(self.cursor)
 
     def colors(self, _op):
         first, count = self.byte(), self.byte() + 1
@@ -139,7 +198,7 @@ class PlainDecoder:
         at = list(self.place())
         steps = self.byte() + 1
         crumbs = self.take(-(-steps // 4))
-        self.write(self.index(at), self.pen)
+        self.write_next(self.index(at), again=self.again)
         for k in range(4 * len(crumbs)):
             crumb = crumbs[k // 4] >> 2 * (k % 4) & 3
             if k >= steps:
@@ -148,11 +207,12 @@ class PlainDecoder:
             at[main] += sign[main]
             for bit, axis in enumerate(((main + 1) % 3, (main + 2) % 3)):
                 at[axis] += sign[axis] * (crumb >> bit & 1)
-            self.write(self.index(at), self.pen)
+            self.write_next(self.index(at))
         self.cursor = self.index(at)
 
     def go_from(self, op):
         self.move(op)
+        self.again = False
         self.step(op)
 
     def oct(self, op):

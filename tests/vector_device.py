@@ -90,6 +90,7 @@ class VectorDevice:
 
 EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "READ", "DIGEST"}
 ONLY_INDEX8 = {"DIFF", "PALETTE"}
+NOT_MONO1 = {"FADE"}
 
 
 def features_of(vector, otherwise=None):
@@ -104,6 +105,7 @@ def features_of(vector, otherwise=None):
         names = otherwise
     else:
         names = EVERY_FORMAT | (ONLY_INDEX8 if vector["format"] == "INDEX8" else set())
+        names = names | (NOT_MONO1 if vector["format"] != "MONO1" else set())
     return frozenset(name.lower() for name in names)
 
 

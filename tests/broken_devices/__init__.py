@@ -7,6 +7,7 @@ them, and no others.
 from broken_devices import (  # noqa: F401 - each registers its own
     acks,
     digests,
+    fades,
     frames,
     handshake,
     noise,

@@ -79,6 +79,8 @@ def device_of(vector):
     names = allowed.split("|") if allowed else list(FEATURES)
     if pixel_format != spec.FORMAT_INDEX8:
         names = [name for name in names if name not in {"DIFF", "PALETTE"}]
+    if pixel_format == spec.FORMAT_MONO1:
+        names = [name for name in names if name != "FADE"]
     bits = sum(1 << FEATURES[name] for name in names)
     return AnnouncedDevice(pixel_format, *vector.grid, features=bits)
 

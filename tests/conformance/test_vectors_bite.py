@@ -16,7 +16,7 @@ SPEC_MUTATIONS = Path(__file__).parents[1] / "spec_mutations.py"
 RESERVED = {"FEATURE_ARC"}
 MADE_OF_OTHERS = {"LAYOUT_HEADER", "CRC_WIDTH", "CRC_REFIN", "CRC_REFOUT", "CRC_CHECK"}
 # The driver takes these for more voxels than a vector has: unit tests hold them.
-CHOSEN = {"OP_LINE", "OP_BOX", "OP_DOTS"}
+CHOSEN = {"OP_LINE", "OP_BOX", "OP_DOTS", "OP_FADE", "OP_RAMP", "FEATURE_FADE", "LIMIT_MAX_FADE"}
 OF_THE_OTHER_SIDE = {
     "driver": {"LIMIT_MAX_SILENT", "LIMIT_MAX_OCTANT", "LIMIT_MAX_SIDE"} | CHOSEN,
     "device": {"LIMIT_MAX_STATUS"},

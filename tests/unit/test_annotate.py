@@ -88,7 +88,7 @@ def test_a_bad_line_breaks_nothing(tmp_path):
         "--capture",
         file,
     ]
-    command += ["--port", "sim:?fault=flip:1e-3&seed=2&max_payload=200"]
+    command += ["--port", "sim:?fault=flip:3e-3&seed=2&max_payload=64"]
     subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
     printed = annotate(file)
     assert printed.returncode == 0, printed.stdout

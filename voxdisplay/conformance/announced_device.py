@@ -56,6 +56,8 @@ class AnnouncedDevice:
 
     def has(self, feature: str) -> bool:
         """Return whether a feature is announced, by its name in section 5."""
+        if feature == "RAMP":  # an op of two features together
+            return self.has("FADE") and self.has("PALETTE")
         return bool(self.features >> FEATURES[feature] & 1)
 
     @property

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
+from voxdisplay.conformance.fades import color_bytes
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.wire import spec
@@ -131,6 +132,29 @@ def colors(first: int, values: Sequence[tuple[int, int, int]]) -> bytes:
     return bytes((spec.OP_COLORS, first, len(values) - 1)) + b"".join(map(bytes, values))
 
 
+def fade(device: AnnouncedDevice, stops: Sequence[Sequence[int]], count: int, at: int) -> bytes:
+    """Return FADE of colours over ``count`` voxels, from voxel ``at`` on."""
+    head = bytes((spec.OP_FADE, len(stops) - 1)) + leb128(count - 1) + leb128(at)
+    return head + b"".join(bytes(stop[: color_bytes(device)]) for stop in stops)
+
+
+def ramp(first: int, count: int, stops: Sequence[Sequence[int]]) -> bytes:
+    """Return RAMP of colours over ``count`` entries."""
+    head = bytes((spec.OP_RAMP, first, count - 1, len(stops) - 1))
+    return head + b"".join(map(bytes, stops))
+
+
+def random_stops(rng: random.Random) -> list[bytes]:
+    """Return one to five random colours."""
+    return [rng.randbytes(3) for _ in range(rng.randint(1, 5))]
+
+
+def random_fade(device: AnnouncedDevice, rng: random.Random) -> bytes:
+    """Return a random FADE."""
+    count = rng.choice([1, 2, 5, 30, 200, 100_000])
+    return fade(device, random_stops(rng), count, rng.choice([0, count - 1, rng.randrange(count)]))
+
+
 def single_voxel(device: AnnouncedDevice, index: int, value: int | None = None) -> bytes:
     """Return ops that write the voxel with an index."""
     return skip(index) + (b"" if value is None else pen(device, value)) + run()
@@ -207,6 +231,10 @@ def random_op(device: AnnouncedDevice, rng: random.Random) -> bytes:
         makers.append(lambda: random_brick(device, rng, rng.randrange(5), rng.random() ** 8))
     if device.has("DIFF"):
         makers.append(lambda: differences([rng.randint(-8, 7) for _ in range(rng.randint(1, 70))]))
+    if device.has("FADE"):
+        makers.append(lambda: random_fade(device, rng))
+    if device.has("RAMP"):
+        makers.append(lambda: ramp(rng.randrange(250), rng.randint(1, 6), random_stops(rng)))
     if device.has("PALETTE"):
         makers.append(
             lambda: colors(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 
 from voxdisplay.conformance import range_coded_chains
 from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
+from voxdisplay.conformance.fades import Fade, blend, color_bytes
 from voxdisplay.conformance.reference_page import Page, rgb
 from voxdisplay.wire import spec
 
@@ -34,6 +35,7 @@ class ReferenceDecoder:
         self.page = page
         self.cursor = 0
         self.pen = device.full_pixel
+        self.fade: Fade | None = None
         self._payload = b""
         self._at = 0
         self._op_at = 0
@@ -54,7 +56,7 @@ class ReferenceDecoder:
 
     def begin_packet(self) -> None:
         """Reset the cursor to 0 and the pen to the full pixel."""
-        self.cursor, self.pen = 0, self.device.full_pixel
+        self.cursor, self.pen, self.fade = 0, self.device.full_pixel, None
 
     def coordinates(self, a: int, b: int, c: int) -> Voxel:
         """Return x, y, z of coordinates as they were sent: in the order x, y, z."""
@@ -84,7 +86,7 @@ class ReferenceDecoder:
 
     def count_of(self, low: int) -> int:
         """Return a count: n = c + 1 for c = 0..30, n = 32 + k for c = 31, k as LEB128."""
-        return low + 1 if low < 31 else 32 + self._leb128()
+        return low + 1 if low < 31 else 32 + self._leb128(32)
 
     def rounded(self, k: int, d: int, length: int) -> int:
         """Return the offset of voxel k of a LINE: floor((2 k d + L) / (2 L)), ties rounded up."""
@@ -150,13 +152,13 @@ class ReferenceDecoder:
         a, b, c = (int.from_bytes(self._take(size), "little") for _ in range(3))
         return self.coordinates(a, b, c)
 
-    def _leb128(self) -> int:
+    def _leb128(self, base: int = 0) -> int:
         k = 0
         for place in range(5):
             byte = self._byte()
             k |= (byte & 127) << 7 * place
             if byte < 128:
-                if (place and not byte) or 32 + k >= 1 << 32:
+                if (place and not byte) or base + k >= 1 << 32:
                     raise self.refusal(spec.CODE_COUNT)
                 return k
         raise self.refusal(spec.CODE_COUNT)
@@ -175,6 +177,20 @@ class ReferenceDecoder:
         return [self.pixel_of(raw[at : at + size]) for at in range(0, len(raw), size)]
 
     # -- drawing
+
+    def write_row(self, places: Iterable[Voxel], *, again: bool = False) -> None:
+        """Write the pen to voxels that a fade counts; ``again``: the cursor's comes first."""
+        if self.fade is None:
+            self.write_voxels(places)
+            return
+        for number, place in enumerate(places):
+            repeats = again and not number and self.fade.end is not None
+            self.pen = self.fade.pen(self.fade.place - repeats)
+            self.write_voxels([place])
+            self.fade.end = self.device.index(*place)
+            if not repeats:
+                self.fade.count_voxel()
+        self.pen = self.fade.pen(self.fade.place)
 
     def require_on_grid(self, place: Voxel) -> Voxel:
         """Return the voxel; raise `Refused` if it is off the grid."""
@@ -202,6 +218,8 @@ class ReferenceDecoder:
     # -- the ops
 
     def _op(self, op: int) -> None:
+        if self.fade and (op in _SET_CURSOR or op >= spec.OP_SKIP):
+            self.fade.end = None
         for first, more, feature, draw in _OPS:
             if first <= op <= first + more and (not feature or self.device.has(feature)):
                 draw(self, op - first)
@@ -228,7 +246,7 @@ class ReferenceDecoder:
         pen = self.pixel_of(self._take(self.device.pixel_bytes))
         if self.device.format == spec.FORMAT_MONO1 and pen > 1:
             raise self.refusal(spec.CODE_PIXEL)
-        self.pen = pen
+        self.pen, self.fade = pen, None
 
     def op_skip(self, low: int) -> None:
         """SKIP: advance the cursor."""
@@ -248,7 +266,7 @@ class ReferenceDecoder:
         """LIT: write n pixels in scan order."""
         values = self._pixels(self.count_of(low))
         self._write_scan_order(values)
-        self.pen = self.after_literal(self.pen, values[-1])
+        self.pen, self.fade = self.after_literal(self.pen, values[-1]), None
 
     def op_differences(self, low: int) -> None:
         """DIFF: write n pixels by their differences."""
@@ -257,7 +275,7 @@ class ReferenceDecoder:
             pen = (pen + self.difference(nibble)) % 256
             values.append(pen)
         self._write_scan_order(values)
-        self.pen = pen
+        self.pen, self.fade = pen, None
 
     def op_step(self, octant: int) -> None:
         """STEP: draw a chain from the cursor."""
@@ -279,7 +297,7 @@ class ReferenceDecoder:
                 moved[axis] += signs[axis]
             at = self.require_on_grid((moved[0], moved[1], moved[2]))
             places.append(at)
-        self.write_voxels(places)
+        self.write_row(places, again=named is None)
         self.cursor = self.device.index(*self.after_chain(begin, at))
 
     def op_line(self, _: int) -> None:
@@ -293,7 +311,7 @@ class ReferenceDecoder:
             [a + self.rounded(k, da, length) for k in range(length + 1)]
             for a, da in zip(begin, d, strict=True)
         )
-        self.write_voxels(zip(x, y, z, strict=True))
+        self.write_row(zip(x, y, z, strict=True), again=True)
         self.cursor = self.device.index(*self.after_shape(begin, end))
 
     def op_box(self, _: int) -> None:
@@ -308,7 +326,7 @@ class ReferenceDecoder:
     def op_dots(self, _: int) -> None:
         """DOTS: write single voxels."""
         places = [self._read_voxel() for _ in range(self.steps_of(self._byte()))]
-        self.write_voxels(places)
+        self.write_row([self.require_on_grid(place) for place in places])
         begin = self.device.voxel_at(min(self.cursor, self.device.voxel_count - 1))
         self.cursor = self.device.index(*self.after_shape(begin, places[-1]))
 
@@ -351,7 +369,35 @@ class ReferenceDecoder:
         for i in range(count):
             self.page.palette[first + i] = rgb(*raw[3 * i : 3 * i + 3])
 
+    def op_ramp(self, _: int) -> None:
+        """RAMP: set entries of the palette to a blend."""
+        first = self._byte()
+        count = self._byte() + 1
+        stops = self._stops(self._byte() + 1, 3)
+        if first + count > spec.LIMIT_MAX_COLORS:
+            raise self.refusal(spec.CODE_OUTSIDE)
+        for i in range(count):
+            self.page.palette[first + i] = rgb(*blend(stops, count, i))
 
+    def op_fade(self, _: int) -> None:
+        """FADE: begin a pen that changes from voxel to voxel."""
+        colors = self._byte() + 1
+        count = self._leb128() + 1
+        if count > spec.LIMIT_MAX_FADE:
+            raise self.refusal(spec.CODE_COUNT)
+        place = self._leb128()
+        if place >= count:
+            raise self.refusal(spec.CODE_COUNT)
+        stops = self._stops(colors, color_bytes(self.device))
+        self.fade = Fade(self.device, stops, count, place)
+        self.pen = self.fade.pen(place)
+
+    def _stops(self, count: int, size: int) -> list[bytes]:
+        return [self._take(size) for _ in range(count)]
+
+
+# Ops below SKIP that set the cursor and are not counted by a fade.
+_SET_CURSOR = (spec.OP_MOVE, spec.OP_BOX)
 # First op byte, how many more, the feature that they need, and what draws them.
 _OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] = (
     (spec.OP_END, 0, "", ReferenceDecoder.op_end),
@@ -361,6 +407,8 @@ _OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] 
     (spec.OP_BOX, 0, "BOX", ReferenceDecoder.op_box),
     (spec.OP_DOTS, 0, "DOTS", ReferenceDecoder.op_dots),
     (spec.OP_COLORS, 0, "PALETTE", ReferenceDecoder.op_colors),
+    (spec.OP_FADE, 0, "FADE", ReferenceDecoder.op_fade),
+    (spec.OP_RAMP, 0, "RAMP", ReferenceDecoder.op_ramp),
     (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_step),
     (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_from),
     (spec.OP_ARC, 0, "ARC", ReferenceDecoder.op_arc),

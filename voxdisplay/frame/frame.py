@@ -22,7 +22,7 @@ from voxdisplay.frame.drawing import Drawing
 from voxdisplay.frame.framebuffer import Framebuffer
 from voxdisplay.raster.array_arguments import as_voxels, is_array_like
 from voxdisplay.raster.color import Color, as_colors, colors_at
-from voxdisplay.raster.display_list import Kind
+from voxdisplay.raster.display_list import Kind, Spread
 from voxdisplay.voxelization.body_voxelization import voxelize_body
 from voxdisplay.voxelization.corner_rows import corner_rows
 from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -125,14 +125,17 @@ class Frame(Framebuffer):
         return self._add(as_voxels("drawable", drawable), colors, Kind.ARRAY)
 
     def draw_voxels(
-        self, voxels: voxelization.Sequence | voxelization.VoxelSet, colors: NDArray[np.uint8]
+        self,
+        voxels: voxelization.Sequence | voxelization.VoxelSet,
+        colors: NDArray[np.uint8] | Spread,
     ) -> Drawing:
         """Draw N voxels with one colour, a colour for each, or several spread along them.
 
         Parameters
         ----------
         voxels : Sequence or VoxelSet
-        colors : (1, 3), (N, 3) or (k, 3) uint8 array
+        colors : (1, 3), (N, 3) or (k, 3) uint8 array, or Spread
+            A spread is along a curve of which the voxels are a stretch.
 
         """
         if isinstance(voxels, voxelization.VoxelSet):
@@ -155,7 +158,7 @@ class Frame(Framebuffer):
             for sequence, (_, color) in zip(sequences, pairs, strict=True)
         ]
 
-    def _add_set(self, voxels: NDArray[np.integer], colors: NDArray[np.uint8]) -> Drawing:
+    def _add_set(self, voxels: NDArray[np.integer], colors: NDArray[np.uint8] | Spread) -> Drawing:
         """Draw voxels that have no order, such as those of a body.
 
         Parameters
@@ -171,7 +174,7 @@ class Frame(Framebuffer):
     def _add(
         self,
         voxels: NDArray[np.integer],
-        colors: NDArray[np.uint8],
+        colors: NDArray[np.uint8] | Spread,
         kind: Kind,
         corners: NDArray[np.int64] | None = None,
     ) -> Drawing:

@@ -125,10 +125,29 @@ def interpolate_colors(colors: NDArray[np.uint8], count: int) -> NDArray[np.uint
     """
     if len(colors) == 1:
         return np.broadcast_to(colors, (count, 3))
+    return blend(colors, count, np.arange(count))
+
+
+def blend(stops: NDArray[np.uint8], count: int, places: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """Return the blend of stops at some of ``count`` places in a row: protocol.md, section 7.9.
+
+    Parameters
+    ----------
+    stops : (k, c) uint8 array
+        What the first place, the last, and places at even distances between them have.
+    count : int
+    places : (n,) integer array
+        Each 0 to ``count`` - 1.
+
+    Returns
+    -------
+    (n, c) uint8 array
+
+    """
     steps = max(count - 1, 1)
-    stop, rest = np.divmod(np.arange(count, dtype=np.int64) * (len(colors) - 1), steps)
-    first = colors.astype(np.int64)[stop]
-    change = colors.astype(np.int64)[np.minimum(stop + 1, len(colors) - 1)] - first
+    stop, rest = np.divmod(places.astype(np.int64) * (len(stops) - 1), steps)
+    first = stops.astype(np.int64)[stop]
+    change = stops.astype(np.int64)[np.minimum(stop + 1, len(stops) - 1)] - first
     blended: NDArray[np.uint8] = (
         first + (2 * rest[:, None] * change + steps) // (2 * steps)
     ).astype(np.uint8)

@@ -10,11 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.raster.color import interpolate_colors
-from voxdisplay.raster.display_list import DrawnVoxels, Kind
+from voxdisplay.raster.color import blend
+from voxdisplay.raster.display_list import DrawnVoxels, Kind, Spread
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Palette
 from voxdisplay.raster.pixel_format import PixelFormat
+
+# Formats whose pixels do not blend as their colours do.
+_UNBLENDED = (PixelFormat.MONO1, PixelFormat.INDEX8)
 
 
 class ColoredItem(NamedTuple):
@@ -49,7 +52,7 @@ class Coloring(NamedTuple):
     def item(
         self,
         voxels: NDArray[np.integer],
-        colors: NDArray[np.uint8],
+        colors: NDArray[np.uint8] | Spread,
         kind: Kind,
         corners: NDArray[np.int64] | None = None,
     ) -> ColoredItem:
@@ -59,16 +62,26 @@ class Coloring(NamedTuple):
         ----------
         voxels : (N, 3) integer array
             Columns x, y, z, inside the grid or not.
-        colors : (1, 3), (N, 3) or (k, 3) uint8 array
-            One colour, one for each voxel, or several spread along the rows.
+        colors : (1, 3), (N, 3) or (k, 3) uint8 array, or Spread
+            One colour, one for each voxel, or several spread along the rows; or what is spread
+            along a curve of which these are a stretch.
         kind : Kind
         corners : (c,) int64 array, optional
             Rows at which a straight line may end and another begin.
 
         """
         # A single colour is looked up once.
-        each = len(colors) in {1, len(voxels)}
-        rgb = colors if each else interpolate_colors(colors, len(voxels))
+        spread = None
+        if isinstance(colors, Spread):
+            spread = colors
+        elif len(colors) in {1, len(voxels)}:
+            rgb = colors
+        else:
+            spread = Spread(colors, len(voxels))
+        if spread:
+            rgb = blend(spread.stops, spread.count, spread.first + np.arange(len(voxels)))
+        if self.format in _UNBLENDED:
+            spread = None
         found = self.palette.nearest(rgb) if self.palette else self.format.nearest(rgb)
         exact = np.array_equal(self.colors_of(found), rgb)
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
@@ -77,6 +90,6 @@ class Coloring(NamedTuple):
         if corners is not None:
             at_corner[corners] = True
         # Voxels outside have meaningless indices; they are removed here.
-        drawn = DrawnVoxels.of_item(self.grid.index_of(voxels), values, at_corner, kind)
+        drawn = DrawnVoxels.of_item(self.grid.index_of(voxels), values, at_corner, kind, spread)
         clipped = len(inside) - int(np.count_nonzero(inside))
         return ColoredItem(drawn.select(inside), clipped, exact)

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,30 @@ class Kind(enum.IntEnum):
     SET = 2
 
 
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Colours spread along a curve: each of its voxels has their blend at its place.
+
+    Attributes
+    ----------
+    stops : (k, 3) uint8 array
+        The colours; for INDEX8 (k, 1), pixel values.
+    count : int
+        Number of places: voxels of the whole curve.
+    first : int
+        Place of the first voxel of the stretch that is drawn.
+
+    """
+
+    stops: NDArray[np.uint8]
+    count: int
+    first: int = 0
+
+    def from_place(self, first: int) -> Spread:
+        """Return the same spread for a stretch that begins at another place."""
+        return replace(self, first=first)
+
+
 @dataclass(frozen=True)
 class DrawnVoxels:
     """Voxels on the grid in drawing order, of one item or of several, one after another.
@@ -53,6 +79,10 @@ class DrawnVoxels:
         True where a straight line may end and another begin.
     kinds : (items,) int8 array
         `Kind` of each item.
+    places : (n,) int32 array or None
+        Place of each voxel in the spread of its item; None if no item has one.
+    spreads : tuple of Spread or None
+        Spread of each item, None for those without; empty if no item has one.
 
     """
 
@@ -61,6 +91,8 @@ class DrawnVoxels:
     item: NDArray[np.int32]
     corners: NDArray[np.bool_]
     kinds: NDArray[np.int8]
+    places: NDArray[np.int32] | None = None
+    spreads: tuple[Spread | None, ...] = ()
 
     @classmethod
     def of_item(
@@ -69,37 +101,53 @@ class DrawnVoxels:
         values: NDArray[np.uint32],
         corners: NDArray[np.bool_],
         kind: Kind,
+        spread: Spread | None = None,
     ) -> DrawnVoxels:
-        """Return the voxels of one item."""
+        """Return the voxels of one item; with a spread, all of its places."""
         item = np.zeros(len(index), dtype=np.int32)
-        return cls(index, values, item, corners, np.array([kind], dtype=np.int8))
+        drawn = cls(index, values, item, corners, np.array([kind], dtype=np.int8))
+        if spread is None:
+            return drawn
+        places = np.arange(spread.first, spread.first + len(index), dtype=np.int32)
+        return replace(drawn, places=places, spreads=(spread,))
 
     def __len__(self) -> int:
         return len(self.values)
 
     def part(self, begin: int, end: int) -> DrawnVoxels:
         """Return the voxels of some consecutive rows; items keep their numbers."""
-        rows = slice(begin, end)
-        return DrawnVoxels(
-            self.index[rows], self.values[rows], self.item[rows], self.corners[rows], self.kinds
-        )
+        return self._taken(slice(begin, end))
 
     def select(self, kept: NDArray[np.bool_]) -> DrawnVoxels:
         """Return the voxels where a mask, (n,), is set; items keep their numbers."""
         if kept.all():
             return self
-        return DrawnVoxels(
-            self.index[kept], self.values[kept], self.item[kept], self.corners[kept], self.kinds
+        return self._taken(kept)
+
+    def _taken(self, rows: slice | NDArray[np.bool_]) -> DrawnVoxels:
+        return replace(
+            self,
+            index=self.index[rows],
+            values=self.values[rows],
+            item=self.item[rows],
+            corners=self.corners[rows],
+            places=None if self.places is None else self.places[rows],
         )
+
+    def recolored(self, values: NDArray[np.uint32]) -> DrawnVoxels:
+        """Return the voxels with other pixel values, (n,), which no spread has."""
+        return replace(self, values=values, places=None, spreads=())
 
 
 def concatenate_drawn(parts: Sequence[DrawnVoxels]) -> DrawnVoxels:
     """Return the voxels of all parts, at least one, with their items renumbered."""
     if len(parts) == 1:
         return parts[0]
-    together = DrawnVoxels(
-        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in _FIELDS)
-    )
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
+    }
+    places, spreads = _concatenated_spreads(parts)
+    together = DrawnVoxels(**arrays, places=places, spreads=spreads)
     items = [len(part.kinds) for part in parts]
     first = np.cumsum(items, dtype=np.int32) - np.array(items, dtype=np.int32)
     return replace(together, item=together.item + np.repeat(first, [len(part) for part in parts]))
@@ -167,4 +215,18 @@ class DisplayList:
         self._resolved = True
 
 
-_FIELDS = fields(DrawnVoxels)
+def _concatenated_spreads(
+    parts: Sequence[DrawnVoxels],
+) -> tuple[NDArray[np.int32] | None, tuple[Spread | None, ...]]:
+    """Return places and spreads of all parts, one after another."""
+    if all(part.places is None for part in parts):
+        return None, ()
+    places = [
+        np.zeros(len(part), dtype=np.int32) if part.places is None else part.places
+        for part in parts
+    ]
+    spreads = [part.spreads or (None,) * len(part.kinds) for part in parts]
+    return np.concatenate(places), tuple(chain.from_iterable(spreads))
+
+
+_ARRAYS = ("index", "values", "item", "corners", "kinds")

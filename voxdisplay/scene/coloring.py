@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from voxdisplay import voxelization
 from voxdisplay.errors import CurveError
-from voxdisplay.raster.color import colors_at, interpolate_colors
+from voxdisplay.raster.color import colors_at
+from voxdisplay.raster.display_list import Spread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -57,7 +58,7 @@ def voxel_colors(
     voxels: Sequence | VoxelSet,
     columns: Mapping[str, Floats],
     fit: Placement | None,
-) -> Colors:
+) -> Colors | Spread:
     """Return the colours of voxels.
 
     Parameters
@@ -72,7 +73,7 @@ def voxel_colors(
 
     Returns
     -------
-    (N, 3) or (1, 3) uint8 array
+    (N, 3) or (1, 3) uint8 array, or Spread
 
     Raises
     ------
@@ -91,7 +92,7 @@ def voxel_colors(
         return _spread_over_body(coloring, voxels)
     if len(coloring) == voxels.curve.point_count:
         return colors_at(coloring, voxelization.point_indices(voxels))
-    return interpolate_colors(coloring, len(voxels))
+    return Spread(coloring, len(voxels))
 
 
 def _spread_over_body(colors: Colors, voxels: VoxelSet) -> Colors:

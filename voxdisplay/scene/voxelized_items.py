@@ -15,6 +15,7 @@ from voxdisplay import voxelization
 from voxdisplay.bodies import Body
 from voxdisplay.errors import BodyError, CurveError
 from voxdisplay.frame import Drawing, Frame
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.scene.coloring import Colors, voxel_colors
 from voxdisplay.scene.parts import shown_stretches, stretch_of
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from voxdisplay.scene.item import PartSpan, SceneItem
     from voxdisplay.voxelization import Sequence, VoxelSet
 
-Kept = dict[int, tuple["SceneItem", "Sequence | VoxelSet", Colors | None]]
+Kept = dict[int, tuple["SceneItem", "Sequence | VoxelSet", Colors | Spread]]
 """Voxels and colours of items, by the identity of the item, which is held so that it stays its."""
 
 
@@ -139,13 +140,15 @@ def draw_items(
         old = kept.get(id(item)) if kept else None
         colors = old[2] if old else _colors_of(item, voxels)
         keep[id(item)] = item, voxels, colors
-        if colors is not None and len(colors) > 1:
+        if isinstance(colors, Spread):
+            colors = colors.from_place(begin)
+        elif len(colors) > 1:
             colors = colors[begin:end]
         drawings.append(frame.draw_voxels(stretch_of(voxels, begin, end), colors))
     return drawings, keep
 
 
-def _colors_of(item: SceneItem, voxels: Sequence | VoxelSet) -> Colors:
+def _colors_of(item: SceneItem, voxels: Sequence | VoxelSet) -> Colors | Spread:
     try:
         return voxel_colors(item.color, voxels, item.columns or {}, item.fit)
     except (CurveError, BodyError) as error:

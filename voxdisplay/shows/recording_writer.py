@@ -40,6 +40,8 @@ _MAX_TIME = 0xFFFF_FFFF
 _MAX_META_BYTES = spec.LIMIT_MAX_PAYLOAD
 
 
+# Recordings use what version 1.0 has, which is all that small boards play.
+_MINOR = 0
 _DRAWING = ("line", "box", "dots", "oct", "diff", "arc", "palette")
 # ARC saves bytes on slow lines, but small boards lack it and it takes long.
 _USUAL = ("line", "box", "dots", "oct", "diff", "palette")
@@ -121,7 +123,7 @@ class RecordingFormat:
             major=spec.VERSION_MAJOR,
             session=SESSION,
             boot=0,
-            minor=spec.VERSION_MINOR,
+            minor=_MINOR,
             format=self.format.wire,
             nx=nx,
             ny=ny,
@@ -133,7 +135,7 @@ class RecordingFormat:
             refresh=self.millihertz,
             features=feature_bits(self.features),
         )
-        hello = packet.Hello(session=SESSION)
+        hello = packet.Hello(session=SESSION, minor=_MINOR)
         segment = encode_segment(recording_spec.RECORDING_TYPE_META, 0, 0, 0, text)
         return b"\0" + packet.encode(hello) + packet.encode(info) + segment
 

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.wire import spec
+from voxdisplay.wire.fades import FADED, FadedRows, runs_of_pens
 from voxdisplay.wire.op_encoding import (
     Bools,
     Bytes,
@@ -82,6 +84,7 @@ def build_chains(
     config: EncoderConfig,
     corners: Bools | None = None,
     index: Ints | None = None,
+    fades: FadedRows | None = None,
 ) -> Chains:
     """Return the chains of voxels: runs of 26-neighbours with the same pen, cut into segments.
 
@@ -93,19 +96,25 @@ def build_chains(
         True where a straight line may end and another begin.
     index : (n,) int64 array, optional
         Scan-order indices of the voxels, if known.
+    fades : FadedRows, optional
+        Which voxels are drawn under a fade.
 
     """
     n = len(voxels)
     spots = np.ascontiguousarray(voxels.T, dtype=np.int32)  # axis first: long rows are faster
     steps = spots[:, 1:] - spots[:, :-1]
     jump = np.abs(steps).max(axis=0, initial=0) != 1
-    jump |= pens[1:] != pens[:-1]
+    runs = pens if fades is None else runs_of_pens(fades.pens)
+    jump |= runs[1:] != runs[:-1]
     ends, mains, falls = _longest_octant_runs(steps, jump)
     if corners is not None and config.has(spec.FEATURE_LINE) and corners.any():
         ends = _break_at_corners(ends, np.flatnonzero(corners))
     begin, count = _segments(ends, jump, n)
     lines = _find_lines(spots, begin, count, config)
-    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * (config.max_block_bytes - 2))
+    room = config.max_block_bytes - 2
+    if fades is not None:
+        room -= max(0, fades.op_bytes - config.pen_bytes)
+    longest = min(spec.LIMIT_MAX_STEPS, _STEPS_PER_BYTE * room)
     begin, count, lines = _split_long(begin, count, lines, longest)
 
     at = np.minimum(begin, max(0, n - 2))  # a lone last voxel has no step and no octant
@@ -115,9 +124,15 @@ def build_chains(
     body, size = _encode_ops(spots, steps, begin, count, octant, lines, config)
     index = config.grid.index_of(voxels) if index is None else index
     lone = count == 0
-    pen = pens[begin].astype(np.int64)
+    pen = after = pens[begin].astype(np.int64)
+    spreads: tuple[Spread, ...] = ()
+    if fades is not None:
+        spreads = fades.spreads
+        faded = ~lone & (fades.pens[begin] >= FADED)
+        pen = np.where(faded, fades.pens[begin], pen)
+        after = np.where(faded, fades.pens[begin + count] + 1, after)
     blocks = OpBlocks(
-        body, size, pen, index[begin], pen, index[begin + count] + lone, ~lone & ~lines
+        body, size, pen, index[begin], after, index[begin + count] + lone, ~lone & ~lines, spreads
     )
     return Chains(blocks, begin, count)
 

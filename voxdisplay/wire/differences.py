@@ -6,7 +6,6 @@ had been drawn. Must not know frames.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -47,7 +46,7 @@ def encode_difference(
     best = _encode(PageUpdate(parts, rest, pixels_at), config, first)
     vanished = _items_with(rest, old.ordered)
     if vanished is not None:
-        gone = _changed_parts(replace(vanished, values=pixels_at(vanished.index)), rest, config)
+        gone = _changed_parts(vanished.recolored(pixels_at(vanished.index)), rest, config)
         chained = gone if parts is None else concatenate_drawn([parts, gone])
         left = rest[without(rest, gone.index)]
         best = min(best, _encode(PageUpdate(chained, left, pixels_at), config, first), key=_size)

@@ -20,6 +20,7 @@ from voxdisplay.raster.pixel_map import contains
 from voxdisplay.wire import range_coded_chains, spans, spec, voxel_sets
 from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
+from voxdisplay.wire.fades import FADED, FadedRows
 from voxdisplay.wire.incremental_work import Incremental, run_to_end
 from voxdisplay.wire.op_encoding import Bools, EncoderConfig, Ints, concat_ranges
 from voxdisplay.wire.page_update import PageUpdate, is_incompressible, partition
@@ -91,8 +92,7 @@ def _offer_encodings(best: _BestLayout, update: PageUpdate) -> Incremental[None]
             yield from _offer_set_encodings(best, no_blocks(), update.unordered, pixels_at)
         return
     ordered = _without_repeats(ordered)
-    voxels = config.grid.voxels_at(ordered.index)
-    chains = build_chains(voxels, ordered.values, config, ordered.corners, ordered.index)
+    chains = _shortest_chains(ordered, config)
     yield
     if not len(update.unordered):
         best.offer(chains.blocks)
@@ -200,6 +200,21 @@ class _BestLayout:
             self._layout, self._others = first, payloads
 
 
+def _shortest_chains(ordered: DrawnVoxels, config: EncoderConfig) -> Chains:
+    """Return the chains of voxels, under fades if that takes fewer bytes."""
+    voxels, index = config.grid.voxels_at(ordered.index), ordered.index
+    chains = build_chains(voxels, ordered.values, config, ordered.corners, index)
+    fades = FadedRows.of(ordered, config)
+    if fades is None:
+        return chains
+    faded = build_chains(voxels, ordered.values, config, ordered.corners, index, fades)
+    return min(chains, faded, key=lambda each: _layout_bytes(each, config))
+
+
+def _layout_bytes(chains: Chains, config: EncoderConfig) -> int:
+    return PayloadLayout(chains.blocks, config).total_bytes
+
+
 def _sorted_by_pen(blocks: OpBlocks) -> OpBlocks:
     """Return blocks sorted by pen, stably, so that each pen is set once."""
     if len(blocks) == 0 or (blocks.pen == blocks.pen[0]).all():
@@ -242,7 +257,7 @@ def _cheaper_as_set(
     as_chain = np.bincount(item, weights=cost, minlength=items)
     least = voxel_sets.min_bytes(ordered.index, ordered.item, items, config)
     factor = _TYPICAL_FACTOR if config.bytes_per_s >= _CHAINS_FROM else 1
-    maybe = (tried & (factor * least < as_chain))[item]
+    maybe = (tried & (factor * least < as_chain))[item] & (blocks.pen < FADED)
     if not maybe.any():
         return as_set, None
     voxels = _union(ordered.index[_voxel_rows(chains, maybe)], ordered.index[:0])

@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.errors import RemoteProtocolError
+from voxdisplay.raster.color import blend
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat, Values
 from voxdisplay.wire import op_expansion, spec
+from voxdisplay.wire.fades import FadedPens
 from voxdisplay.wire.op_encoding import Ints
 from voxdisplay.wire.range_coded_chain_decoder import decode_range_coded
 
@@ -104,11 +107,13 @@ class _Parser:
         self._at = self._op_at = 0
         self._cursor = 0
         self._pen = 0
+        self._fade = FadedPens(format_)
 
     def read(self, payload: bytes) -> None:
         """Read the ops of one packet."""
         self._data, self._at = payload, 0
         self._cursor, self._pen = 0, self._format.full
+        self._fade.end()
         while self._at < len(payload):
             self._op_at = self._at
             op = payload[self._at]
@@ -119,7 +124,7 @@ class _Parser:
             elif op >= spec.OP_SKIP:
                 _COUNTED[op & ~_OPERAND](self, self._count(op & _OPERAND))
             elif spec.OP_STEP <= op <= spec.OP_STEP + spec.LIMIT_MAX_OCTANT:
-                self._chain(op - spec.OP_STEP, self._cursor)
+                self._chain(op - spec.OP_STEP, self._cursor, again=True)
             elif spec.OP_FROM <= op <= spec.OP_FROM + spec.LIMIT_MAX_OCTANT:
                 self._chain(op - spec.OP_FROM, self._voxel())
             elif spec.OP_OCT <= op <= _LAST_BRICK:
@@ -141,6 +146,7 @@ class _Parser:
             except ValueError as error:
                 raise RemoteProtocolError(f"ops: {error}", section="7.8") from error
         op, index, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        values = self._fade.values_of(op, values)
         # By index, and for equal indices by op: the last of them counts.
         order = np.lexsort((op, index))
         index, values = index[order], values[order]
@@ -177,16 +183,18 @@ class _Parser:
 
     def _count(self, low: int) -> int:
         """Return a count: section 7.2."""
-        if low < _OPERAND:
-            return low + 1
+        return low + 1 if low < _OPERAND else 32 + self._leb128(32)
+
+    def _leb128(self, base: int = 0) -> int:
+        """Return a LEB128 to which ``base`` is added."""
         k = 0
         for place in range(5):
             byte = self._take(1)[0]
             k |= (byte & 127) << 7 * place
             if byte < 128:
-                if (place and not byte) or k + 32 >= 1 << 32:
+                if (place and not byte) or k + base >= 1 << 32:
                     break
-                return 32 + k
+                return k
         raise self._error("a count is not in its shortest form")
 
     def _reserve(self, voxels: int) -> None:
@@ -213,6 +221,16 @@ class _Parser:
         self._spans.count.append(len(values))
         self._spans.values.append(values)
         self._cursor = end
+        self._fade.leave()
+
+    def _row_pen(self, count: int, *, again: bool) -> int:
+        """Return the pixel value of voxels in a row, or its code if there is a fade."""
+        self._reserve(count)
+        if not self._fade.active:
+            return self._pen
+        code = self._fade.row(count, again=again)
+        self._pen = self._fade.pen
+        return code
 
     # Ops
 
@@ -226,16 +244,36 @@ class _Parser:
         self._pen = int.from_bytes(self._take(self._format.bytes), "little")
         if self._format is PixelFormat.MONO1 and self._pen > 1:
             raise self._error("a mono1 pixel is 0 or 1")
+        self._fade.end()
+
+    def read_fade(self) -> None:
+        """Read FADE."""
+        stops = self._take(1)[0] + 1
+        count = self._leb128() + 1
+        if count > spec.LIMIT_MAX_FADE or self._format is PixelFormat.MONO1:
+            raise self._error(f"a fade of {count} voxels, or of mono1")
+        place = self._leb128()
+        if place >= count:
+            raise self._error(f"a fade begins at voxel {place} of {count}")
+        self._fade.begin(Spread(self._stops(stops), count), place)
+        self._pen = self._fade.pen
+
+    def _stops(self, count: int, size: int | None = None) -> NDArray[np.uint8]:
+        """Return colours of FADE, or of ``size`` bytes each: (count, size)."""
+        size = size or (1 if self._format is PixelFormat.INDEX8 else 3)
+        return np.frombuffer(self._take(size * count), dtype=np.uint8).reshape(count, size)
 
     def read_move(self) -> None:
         """Read MOVE."""
         self._cursor = self._voxel()
+        self._fade.leave()
 
     def read_line(self) -> None:
         """Read LINE."""
         begin, self._cursor = self._cursor_voxel(), self._voxel()
-        self._reserve(max(self._grid))
-        self._shapes.add_line(self._ops, self._pen, begin, self._cursor)
+        ends = self._grid.voxels_at(np.array([begin, self._cursor])).astype(np.int64)
+        pen = self._row_pen(int(np.abs(ends[1] - ends[0]).max()) + 1, again=True)
+        self._shapes.add_line(self._ops, pen, begin, self._cursor)
 
     def read_box(self) -> None:
         """Read BOX."""
@@ -243,6 +281,7 @@ class _Parser:
         corners = self._grid.voxels_at(np.array([begin, self._cursor])).astype(np.int64)
         self._reserve(int((np.abs(corners[1] - corners[0]) + 1).prod()))
         self._shapes.add_box(self._ops, self._pen, begin, self._cursor)
+        self._fade.leave()
 
     def read_dots(self) -> None:
         """Read DOTS."""
@@ -252,8 +291,7 @@ class _Parser:
         if not self._grid.inside(voxels).all():
             raise self._error("a voxel is not on the grid")
         index = self._grid.index_of(voxels)
-        self._reserve(count)
-        self._shapes.add_dots(self._ops, self._pen, index)
+        self._shapes.add_dots(self._ops, self._row_pen(count, again=False), index)
         self._cursor = int(index[-1])
 
     def read_colors(self) -> None:
@@ -264,6 +302,17 @@ class _Parser:
         raw = self._take(3 * (more + 1))
         for at in range(more + 1):
             red, green, blue = raw[3 * at : 3 * at + 3]
+            self._colors[first + at] = (red, green, blue)
+
+    def read_ramp(self) -> None:
+        """Read RAMP."""
+        first, more, stops = self._take(3)
+        colors = self._stops(stops + 1, 3)
+        if first + more >= spec.LIMIT_MAX_COLORS:
+            raise self._error("entries behind the end of the palette")
+        for at, (red, green, blue) in enumerate(
+            blend(colors, more + 1, np.arange(more + 1)).tolist()
+        ):
             self._colors[first + at] = (red, green, blue)
 
     def read_arc(self) -> None:
@@ -277,7 +326,7 @@ class _Parser:
             self._reserve(len(voxels))
             self._shapes.add_dots(self._ops, pen, np.array(voxels, dtype=np.int64))
 
-    def _chain(self, octant: int, begin: int) -> None:
+    def _chain(self, octant: int, begin: int, *, again: bool = False) -> None:
         steps = self._take(1)[0] + 1
         crumbs = self._take(-(-steps // 4))
         if steps % 4 and crumbs[-1] >> 2 * (steps % 4):
@@ -290,8 +339,8 @@ class _Parser:
             axis = (octant // 8 + number) % 3
             # On each axis a chain moves in one direction: its end is the farthest.
             self._cursor += self._moved(begin, axis, -count if octant >> axis & 1 else count)
-        self._reserve(steps + 1)
-        self._chains.add(self._ops, self._pen, begin, octant, steps, crumbs)
+        pen = self._row_pen(steps + 1, again=again)
+        self._chains.add(self._ops, pen, begin, octant, steps, crumbs)
 
     def _moved(self, index: int, axis: int, count: int) -> int:
         """Return the change of an index by a move; raise if it leaves the grid."""
@@ -318,6 +367,7 @@ class _Parser:
     def read_skip(self, count: int) -> None:
         """Read SKIP."""
         self._cursor = self._span_end(count)
+        self._fade.leave()
 
     def read_run(self, count: int) -> None:
         """Read RUN."""
@@ -340,6 +390,7 @@ class _Parser:
             padded[:, :size] = np.frombuffer(raw, dtype=np.uint8).reshape(count, size)
             values = padded.view("<u4")[:, 0]
         self._pen = int(values[-1])
+        self._fade.end()
         self._add_span(values)
 
     def read_differences(self, count: int) -> None:
@@ -355,6 +406,7 @@ class _Parser:
         steps[steps > 7] -= 16
         values: NDArray[np.uint32] = ((self._pen + np.cumsum(steps)) % 256).astype(np.uint32)
         self._pen = int(values[-1])
+        self._fade.end()
         self._add_span(values)
 
 
@@ -366,6 +418,8 @@ _SIMPLE: Final = {
     spec.OP_BOX: _Parser.read_box,
     spec.OP_DOTS: _Parser.read_dots,
     spec.OP_COLORS: _Parser.read_colors,
+    spec.OP_FADE: _Parser.read_fade,
+    spec.OP_RAMP: _Parser.read_ramp,
     spec.OP_ARC: _Parser.read_arc,
 }
 _COUNTED: Final = {

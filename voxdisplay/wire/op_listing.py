@@ -91,6 +91,16 @@ def _differences(payload: bytes, at: int, _config: EncoderConfig) -> int:
     return size + (count + 1) // 2
 
 
+def _fade(payload: bytes, at: int, config: EncoderConfig) -> int:
+    end = at + 2
+    for _ in range(2):  # two LEB128
+        while payload[end] & 0x80:
+            end += 1
+        end += 1
+    color = 1 if config.format is PixelFormat.INDEX8 else 3
+    return end - at + color * (payload[at + 1] + 1)
+
+
 def _counted(payload: bytes, at: int, _config: EncoderConfig) -> int:
     return _count(payload, at)[1]
 
@@ -115,6 +125,8 @@ _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]
         lambda payload, at, config: 2 + (payload[at + 1] + 1) * config.position_bytes,
     ),
     "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _config: 3 + 3 * (payload[at + 2] + 1)),
+    "FADE": (spec.OP_FADE, 0xFF, _fade),
+    "RAMP": (spec.OP_RAMP, 0xFF, lambda payload, at, _config: 4 + 3 * (payload[at + 3] + 1)),
     "STEP": (spec.OP_STEP, 0xE0, _chain),
     "ARC": (spec.OP_ARC, 0xFF, _rest),
     "FROM": (spec.OP_FROM, 0xE0, _chain),

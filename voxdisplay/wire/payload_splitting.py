@@ -15,7 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.wire import spec
+from voxdisplay.wire.fades import FADED, fade_op_bytes, faded_op
 from voxdisplay.wire.op_encoding import (
     Bools,
     Bytes,
@@ -48,6 +50,10 @@ class OpBlocks:
         Pen and cursor afterwards; or `ANY`.
     starts_with_step : (n,) bool array
         True if its first op is a STEP.
+    spreads : tuple of Spread
+        What pens from `FADED` on refer to: (number of the spread + 1) << 32 | place. Such a block
+        begins with a STEP or LINE, whose first voxel has that place, and a pen afterwards has the
+        place after it.
 
     """
 
@@ -58,6 +64,7 @@ class OpBlocks:
     pen_after: Ints
     cursor_after: Ints
     starts_with_step: Bools
+    spreads: tuple[Spread, ...] = ()
 
     def __len__(self) -> int:
         return len(self.size)
@@ -66,8 +73,11 @@ class OpBlocks:
         """Return blocks by their numbers, in that order."""
         start = np.cumsum(self.size) - self.size
         body = self.body[concat_ranges(start[order], self.size[order])]
-        rest = (getattr(self, field.name)[order] for field in fields(self)[1:])
-        return OpBlocks(body, *rest)
+        rest = {name: getattr(self, name)[order] for name in _ARRAYS[1:]}
+        return OpBlocks(body=body, spreads=self.spreads, **rest)
+
+
+_ARRAYS = tuple(field.name for field in fields(OpBlocks) if field.name != "spreads")
 
 
 def no_blocks() -> OpBlocks:
@@ -79,11 +89,12 @@ def no_blocks() -> OpBlocks:
 
 
 def concatenate_blocks(parts: Sequence[OpBlocks]) -> OpBlocks:
-    """Return the blocks of all parts, one part after another."""
+    """Return the blocks of all parts, one part after another; one of them may have spreads."""
     if len(parts) == 1:
         return parts[0]
-    names = [field.name for field in fields(OpBlocks)]
-    return OpBlocks(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    spreads = next((part.spreads for part in parts if part.spreads), ())
+    return OpBlocks(**arrays, spreads=spreads)
 
 
 class PayloadLayout:
@@ -119,7 +130,25 @@ class PayloadLayout:
         self.total_bytes = int(size.sum())
 
     def _sets_pen(self) -> Bools:
-        return np.asarray((self._blocks.pen != ANY) & (self._blocks.pen != self._pen_before))
+        blocks = self._blocks
+        sets = np.asarray((blocks.pen != ANY) & (blocks.pen != self._pen_before))
+        if blocks.spreads:
+            # The first voxel of a STEP that goes on is written again, and not counted.
+            goes_on = blocks.cursor == self._cursor_before
+            fits = np.where(goes_on, self._pen_before - 1, self._pen_before) == blocks.pen
+            sets = np.where(blocks.pen >= FADED, ~fits, sets)
+        return sets
+
+    def _pen_sizes(self) -> Ints | int:
+        """Return the bytes of the op that sets the pen of each block."""
+        blocks = self._blocks
+        if not blocks.spreads:
+            return self._config.pen_bytes
+        return np.where(
+            blocks.pen >= FADED,
+            fade_op_bytes(blocks.pen, blocks.spreads),
+            self._config.pen_bytes,
+        )
 
     def _cursor_ops(self) -> tuple[Bools, Bools, Bools]:
         """Return which blocks need a SKIP, a MOVE, and a FROM."""
@@ -136,7 +165,7 @@ class PayloadLayout:
 
     def _sizes(self) -> Ints:
         skips, moves, froms = self._cursor_ops()
-        size: Ints = self._blocks.size + self._sets_pen() * self._config.pen_bytes
+        size: Ints = self._blocks.size + self._sets_pen() * self._pen_sizes()
         size += (moves | froms) * self._config.position_bytes + moves
         size[skips] += counted_op_bytes(self._blocks.cursor[skips] - self._cursor_before[skips])
         return size
@@ -149,7 +178,12 @@ class PayloadLayout:
         out = np.zeros(self.total_bytes, dtype=np.uint8)
         here = offset.copy()
 
-        pens = np.flatnonzero(self._sets_pen())
+        sets_pen = self._sets_pen()
+        for block in np.flatnonzero(sets_pen & (blocks.pen >= FADED)).tolist():
+            op = faded_op(int(blocks.pen[block]), blocks.spreads)
+            out[here[block] : here[block] + len(op)] = np.frombuffer(op, dtype=np.uint8)
+            here[block] += len(op)
+        pens = np.flatnonzero(sets_pen & (blocks.pen < FADED))
         out[here[pens]] = spec.OP_PEN
         pixel = little_endian(blocks.pen[pens], config.format.bytes)
         out[here[pens, None] + 1 + np.arange(config.format.bytes)] = pixel
@@ -167,7 +201,7 @@ class PayloadLayout:
         out[(here[goes] + behind)[:, None] + np.arange(config.position_bytes)] = place
         here[goes] += config.position_bytes
 
-        if len(goes) + len(pens) + len(ops):
+        if len(goes) + len(ops) or sets_pen.any():
             out[concat_ranges(here, blocks.size)] = blocks.body
         else:
             out[:] = blocks.body

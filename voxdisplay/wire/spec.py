@@ -68,6 +68,7 @@ FEATURE_ARC: Final = 5
 FEATURE_PALETTE: Final = 6
 FEATURE_READ: Final = 7
 FEATURE_DIGEST: Final = 8
+FEATURE_FADE: Final = 10
 
 # Section 6: DATA
 DATA_FLAG_CLEAR: Final = 1
@@ -81,6 +82,8 @@ OP_LINE: Final = 0x03
 OP_BOX: Final = 0x04
 OP_DOTS: Final = 0x05
 OP_COLORS: Final = 0x06
+OP_FADE: Final = 0x08
+OP_RAMP: Final = 0x09
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
 OP_ARC: Final = 0x58
@@ -165,12 +168,13 @@ LIMIT_MAX_OCTANT: Final = 23
 LIMIT_MAX_DOTS: Final = 256
 LIMIT_MAX_LEVEL: Final = 4
 LIMIT_MAX_COLORS: Final = 256
+LIMIT_MAX_FADE: Final = 0x100000
 LIMIT_MAX_STATUS: Final = 4
 LIMIT_MAX_SILENT: Final = 8
 
 # Section 15: versions
 VERSION_MAJOR: Final = 1
-VERSION_MINOR: Final = 0
+VERSION_MINOR: Final = 1
 
 # Section 16.1: USB
 USB_CLASS: Final = 0xFF

@@ -9,6 +9,7 @@ from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is t
     drawing,
     shapes,
     voxel_sets,
+    fades,
     range_coded_chains,
     digests,
     acks,

@@ -103,6 +103,8 @@ def reserved_ops(probe: Probe) -> None:
         spec.OP_BOX: "BOX",
         spec.OP_DOTS: "DOTS",
         spec.OP_COLORS: "PALETTE",
+        spec.OP_FADE: "FADE",
+        spec.OP_RAMP: "RAMP",
         spec.OP_ARC: "ARC",
     }
     for op in range(256):
