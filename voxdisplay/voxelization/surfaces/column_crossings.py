@@ -17,9 +17,9 @@ from voxdisplay.voxelization.surfaces.midline_crossings import (
     NEAR_FACE,
     Crossings,
     midline_crossings,
-    triangle_blocks,
 )
 from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT
+from voxdisplay.voxelization.surfaces.triangle_blocks import triangle_blocks
 
 
 @dataclass(frozen=True, slots=True, eq=False)

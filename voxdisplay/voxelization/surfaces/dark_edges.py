@@ -13,9 +13,9 @@ from voxdisplay.compute.array_types import Bools, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.midline_crossings import TriangleBlock, triangle_blocks
 from voxdisplay.voxelization.surfaces.repeats import Repeats
-from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, UNIT
+from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, TRIANGLES_PER_BLOCK, UNIT
+from voxdisplay.voxelization.surfaces.triangle_blocks import TriangleBlock, triangle_blocks
 
 _AFTER = [1, 2, 0]
 
@@ -46,7 +46,7 @@ def dark_edges(mask: LitMask, topology: Topology) -> list[EdgeCrossings]:
     """
     none = np.empty(0, dtype=np.int64)
     found = [[EdgeCrossings(none, none, none)] for _ in range(3)]
-    for block in triangle_blocks(topology.mesh):
+    for block in triangle_blocks(topology.mesh, TRIANGLES_PER_BLOCK):
         for axis in range(3):
             found[axis].append(_dark_in_block(mask, topology, block, axis))
     return [_joined(parts) for parts in found]

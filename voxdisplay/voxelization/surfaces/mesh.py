@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from voxdisplay.bodies.geometry import TriangleMesh
     from voxdisplay.compute.array_types import Floats, Ints
 
+_MARGIN = 2
+
 
 def voxelize_mesh(
     geometry: TriangleMesh,
@@ -94,17 +96,18 @@ def shell(
     within = topology.mesh.is_within()
     walls = sides
     if not within:
-        # Beyond the box too, so that clipping commutes with the search for thin parts.
-        topology = replace(topology, mesh=topology.mesh.expanded(1))
-        walls = (sides[0] + 1, sides[1] + 1, sides[2] + 1)
+        # Beyond the box too, so that clipping commutes with the search for thin parts: voxels near
+        # cells that hold a part, and voxels near those.
+        topology = replace(topology, mesh=topology.mesh.expanded(_MARGIN))
+        walls = (sides[0] + _MARGIN, sides[1] + _MARGIN, sides[2] + _MARGIN)
     mask = lit_mask(topology.mesh.sides)
-    mark_shell(mask, topology, walls)
-    thin = mark_thin_parts(mask, topology)
+    whole = mark_shell(mask, topology, walls)
+    thin = mark_thin_parts(mask, topology, complete=whole or not within)
     index = mask.index()
     samples = sample_surface(mask, topology, walls, index, thin) if sampled else None
     if within:
         return index, samples
     box = VoxelBox.of_grid(sides)
-    voxels = box.expanded(1).voxels_at(index)
+    voxels = box.expanded(_MARGIN).voxels_at(index)
     kept = box.inside(voxels)
     return box.index_of(voxels[kept]), samples.select(kept) if samples else None

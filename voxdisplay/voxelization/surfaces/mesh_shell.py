@@ -17,15 +17,15 @@ from voxdisplay.voxelization.surfaces.midline_crossings import (
     NEAR_FACE,
     Crossings,
     midline_crossings,
-    triangle_blocks,
 )
 from voxdisplay.voxelization.surfaces.snapped_mesh import SHIFT
+from voxdisplay.voxelization.surfaces.triangle_blocks import triangle_blocks
 from voxdisplay.voxelization.voxel_box import Triple
 
 
 @with_kernel
-def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
-    """Light the voxels of a mesh's triangles.
+def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> bool:
+    """Light the voxels of a mesh's triangles; return whether all of them are in the box.
 
     Parameters
     ----------
@@ -36,6 +36,7 @@ def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
         Upper walls of the grid. A surface on one lights the voxel below instead of the upper one.
 
     """
+    whole = True
     for block in triangle_blocks(topology.mesh):
         for axis in range(3):
             for crossings in midline_crossings(block, axis):
@@ -44,9 +45,11 @@ def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
                 if inside.all():
                     mask.mark(mask.locate(axis, crossings.i, crossings.j, level))
                 else:
+                    whole = False
                     mask.mark(
                         mask.locate(axis, crossings.i[inside], crossings.j[inside], level[inside])
                     )
+    return whole
 
 
 def lit_levels(crossings: Crossings, topology: Topology, wall: int) -> Ints:

@@ -44,10 +44,10 @@ class SnappedMesh:
     faces: Ints
     sides: Triple
 
-    def blocks(self) -> Iterator[tuple[int, Ints]]:
+    def blocks(self, size: int = TRIANGLES_PER_BLOCK) -> Iterator[tuple[int, Ints]]:
         """Yield the number of the first triangle, and the corners, (3, n), of all in blocks."""
-        for begin in range(0, len(self.faces), TRIANGLES_PER_BLOCK):
-            yield begin, self.faces[begin : begin + TRIANGLES_PER_BLOCK].T.copy()
+        for begin in range(0, len(self.faces), size):
+            yield begin, self.faces[begin : begin + size].T.copy()
 
     def is_within(self) -> bool:
         """Return whether all vertices are inside the box or on its walls."""
@@ -60,6 +60,10 @@ class SnappedMesh:
         """Return the mesh relative to a box with so many more voxels on all sides."""
         nx, ny, nz = (side + 2 * margin for side in self.sides)
         return SnappedMesh(self.points + np.int32(margin << SHIFT), self.faces, (nx, ny, nz))
+
+    def only(self, rows: Ints) -> SnappedMesh:
+        """Return the mesh of some of the triangles, by their numbers."""
+        return SnappedMesh(self.points, self.faces[rows], self.sides)
 
     def without(self, dropped: Bools) -> SnappedMesh:
         """Return the mesh without some triangles, by a mask (F,)."""

@@ -10,8 +10,9 @@ from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_shell import lit_levels
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.midline_crossings import midline_crossings, triangle_blocks
+from voxdisplay.voxelization.surfaces.midline_crossings import midline_crossings
 from voxdisplay.voxelization.surfaces.thin_parts import LitBy
+from voxdisplay.voxelization.surfaces.triangle_blocks import triangle_blocks
 from voxdisplay.voxelization.voxel_box import Triple
 
 # Distances that differ by less are the same: then the triangle with the lowest number counts.
@@ -117,10 +118,8 @@ def _crossing_points(
                 place = mask.locate(axis, crossings.i[inside], crossings.j[inside], level)
                 row = np.searchsorted(index, mask.scan_index(place))
                 distance = np.abs(crossings.depth()[inside] - (level + 0.5))
-                weights = np.stack(crossings.weights) / crossings.area
-                turned = np.flatnonzero(crossings.turned)
-                weights[1:, turned] = weights[:0:-1, turned]
-                found.append((row, distance, crossings.triangle[inside], weights[:, inside]))
+                weights = (np.stack(crossings.weights) / crossings.area)[:, inside]
+                found.append((row, distance, crossings.triangle[inside], weights))
     for lit in thin:
         row = np.searchsorted(index, mask.scan_index(lit.place))
         found.append((row, np.full(len(row), 1.0), lit.triangle, lit.weights))

@@ -12,7 +12,7 @@ not matter how flat parts are cut into triangles.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.voxelization.surfaces.dark_edges import EdgeCrossings, dark_edges, is_lit
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.midline_crossings import TriangleBlock, triangle_blocks
 from voxdisplay.voxelization.surfaces.shape_edges import is_shape_edge
-from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, UNIT
+from voxdisplay.voxelization.surfaces.silhouettes import silhouette_triangles
+from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, TRIANGLES_PER_BLOCK, UNIT
+from voxdisplay.voxelization.surfaces.triangle_blocks import TriangleBlock, triangle_blocks
 
 # Distances that differ by less are the same.
 SAME = 1e-9
@@ -49,7 +50,7 @@ class LitBy:
     weights: Floats
 
 
-def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
+def mark_thin_parts(mask: LitMask, topology: Topology, *, complete: bool) -> list[LitBy]:
     """Light voxels for the parts of a mesh that its triangles' crossings miss; return them.
 
     Parameters
@@ -57,17 +58,18 @@ def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
     mask : LitMask
         With the voxels of the triangles: see `mesh_shell.mark_shell`.
     topology : Topology
+    complete : bool
+        Whether the mask has all voxels near to those that matter.
 
     """
-    lit = [
-        each
-        for axis, dark in enumerate(dark_edges(mask, topology))
-        if len(dark.plane)
-        for each in _faces_to_light(mask, topology, axis, dark)
-    ]
+    lit: list[LitBy] = []
+    if not (complete and topology.has_inside) or _has_dark_faces(mask, topology):
+        for axis, dark in enumerate(dark_edges(mask, topology)):
+            if len(dark.plane):
+                lit += _faces_to_light(mask, topology, axis, dark)
     for each in lit:
         mask.mark(each.place)
-    parts = [_grains(mask, block) for block in triangle_blocks(topology.mesh)]
+    parts = [_grains(mask, block) for block in triangle_blocks(topology.mesh, TRIANGLES_PER_BLOCK)]
     grains = [part for part in parts if part is not None]
     if grains:
         lit.append(_cells_to_light(mask, topology, np.concatenate(grains, axis=1)))
@@ -75,32 +77,80 @@ def mark_thin_parts(mask: LitMask, topology: Topology) -> list[LitBy]:
     return lit
 
 
-def _faces_to_light(
-    mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
-) -> Iterator[LitBy]:
-    """Yield the corners to light in dual faces without a lit corner."""
+def _has_dark_faces(mask: LitMask, topology: Topology) -> bool:
+    """Return whether edges of a closed mesh meet dual faces without a lit corner."""
     mesh = topology.mesh
-    along_u, along_v = (axis + 1) % 3, (axis + 2) % 3
+    part = replace(topology, mesh=mesh.only(silhouette_triangles(mesh)))
+    return any(
+        len(_dark_faces(mask, part, axis, dark).rows)
+        for axis, dark in enumerate(dark_edges(mask, part))
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DarkFaces:
+    """Crossings of edges with dual faces that have no lit corner.
+
+    Attributes
+    ----------
+    rows : (n,) int64 array
+        Which crossings of those given.
+    a, b : (N,) int64 array
+        Vertices at the ends of the edges of all of them.
+    share : (N,) float64 array
+        How far from a to b.
+    i, j : (N,) int64 array
+        Columns of the dual faces.
+    corners : list of (i, j, distance, exists)
+        See `_corners`.
+    on_border : (2, N) bool array
+        Whether they are on a border along u or v.
+
+    """
+
+    rows: Ints
+    a: Ints
+    b: Ints
+    share: Floats
+    i: Ints
+    j: Ints
+    corners: list[tuple[Ints, Ints, Floats, Bools]]
+    on_border: Bools
+
+
+def _dark_faces(
+    mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
+) -> DarkFaces:
+    """Return which crossings are in dual faces without a lit corner, exactly."""
+    mesh = topology.mesh
     a = mesh.faces[crossings.triangle, crossings.corner]
     b = mesh.faces[crossings.triangle, (crossings.corner + 1) % 3]
     rise = mesh.points[axis].take(b).astype(np.int64) - mesh.points[axis].take(a)
     run = (crossings.plane << SHIFT) + HALF - mesh.points[axis].take(a)
     run, rise = np.where(rise < 0, -run, run), np.abs(rise)
-    i, s = _cell_and_fraction(mesh.points[along_u], a, b, run, rise)
-    j, t = _cell_and_fraction(mesh.points[along_v], a, b, run, rise)
+    i, s = _cell_and_fraction(mesh.points[(axis + 1) % 3], a, b, run, rise)
+    j, t = _cell_and_fraction(mesh.points[(axis + 2) % 3], a, b, run, rise)
     corners = list(_corners(i, j, s, t))
     lit = np.zeros(len(i), dtype=bool)
     for p, q, _, exists in corners:
         lit |= exists & is_lit(mask, axis, p, q, crossings.plane)
-    rows = np.flatnonzero(~lit)
+    on_border = np.stack((s == 0, t == 0))
+    return DarkFaces(np.flatnonzero(~lit), a, b, run / rise, i, j, corners, on_border)
+
+
+def _faces_to_light(
+    mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
+) -> Iterator[LitBy]:
+    """Yield the corners to light in dual faces without a lit corner."""
+    faces = _dark_faces(mask, topology, axis, crossings)
+    rows, corners = faces.rows, faces.corners
     if not len(rows):
         return
-    rows = rows[is_shape_edge(mesh, a[rows], b[rows])]
+    rows = rows[is_shape_edge(topology.mesh, faces.a[rows], faces.b[rows])]
     if not len(rows):
         return
     # A dual face has a number; edges and corners of it count as others.
-    key = np.stack((crossings.plane, i, j, s == 0, t == 0))[:, rows]
-    group = _groups(key)
+    group = _groups(np.stack((crossings.plane, faces.i, faces.j, *faces.on_border))[:, rows])
     distance = np.stack([np.where(exists, d, np.inf)[rows] for _, _, d, exists in corners])
     for place, near in _nearest_corners(
         mask,
@@ -114,7 +164,7 @@ def _faces_to_light(
     ):
         chosen = rows[near]
         weights = np.zeros((3, len(chosen)))
-        share = run[chosen] / rise[chosen]
+        share = faces.share[chosen]
         corner, columns = crossings.corner[chosen], np.arange(len(chosen))
         weights[corner, columns] = 1 - share
         weights[(corner + 1) % 3, columns] = share

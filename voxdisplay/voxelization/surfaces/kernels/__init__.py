@@ -7,6 +7,14 @@ One loop over triangles takes the place of many array operations.
 from voxdisplay.voxelization.surfaces.kernels.columns import column_crossings
 from voxdisplay.voxelization.surfaces.kernels.edges import dark_edges
 from voxdisplay.voxelization.surfaces.kernels.shell import mark_shell
+from voxdisplay.voxelization.surfaces.kernels.silhouettes import silhouette_triangles
 from voxdisplay.voxelization.surfaces.kernels.topology import chain_and_doubles, vertex_hashes
 
-__all__ = ["chain_and_doubles", "column_crossings", "dark_edges", "mark_shell", "vertex_hashes"]
+__all__ = [
+    "chain_and_doubles",
+    "column_crossings",
+    "dark_edges",
+    "mark_shell",
+    "silhouette_triangles",
+    "vertex_hashes",
+]

@@ -9,7 +9,8 @@ from voxdisplay.compute.array_types import Ints
 from voxdisplay.compute.kernel_backend import jit
 from voxdisplay.voxelization.surfaces.column_crossings import ColumnCrossings
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.midline_crossings import NEAR_FACE, SLACK
+from voxdisplay.voxelization.surfaces.midline_crossings import NEAR_FACE
+from voxdisplay.voxelization.surfaces.projected_triangles import SLACK
 from voxdisplay.voxelization.surfaces.snapped_mesh import SHIFT
 
 

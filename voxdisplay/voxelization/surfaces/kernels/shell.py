@@ -9,7 +9,8 @@ from voxdisplay.compute.array_types import Ints
 from voxdisplay.compute.kernel_backend import jit
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.midline_crossings import NEAR_FACE, SLACK
+from voxdisplay.voxelization.surfaces.midline_crossings import NEAR_FACE
+from voxdisplay.voxelization.surfaces.projected_triangles import SLACK
 from voxdisplay.voxelization.surfaces.snapped_mesh import SHIFT
 from voxdisplay.voxelization.voxel_box import Triple
 
@@ -17,9 +18,10 @@ _UNKNOWN = 2  # which side is outside, while no crossing has asked
 _TRIANGLES_PER_BLOCK = 1 << 16
 
 
-def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
+def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> bool:
     """See `mesh_shell.mark_shell`."""
     mesh = topology.mesh
+    whole = True
     constants = np.array((SLACK, NEAR_FACE))
     outward = _UNKNOWN
     for begin in range(0, len(mesh.faces), _TRIANGLES_PER_BLOCK):
@@ -27,7 +29,7 @@ def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
         size = 4 * len(faces) + 1024
         while True:
             voxels = np.empty((3, size), dtype=np.int64)
-            count, asked = _lit_voxels(
+            count, asked, inside = _lit_voxels(
                 mesh.points, faces, np.array(mesh.sides), np.array(walls), outward, SHIFT,
                 constants, voxels,
             )  # fmt: skip
@@ -39,6 +41,8 @@ def mark_shell(mask: LitMask, topology: Topology, walls: Triple) -> None:
                 break
         x, y, z = voxels[:, :count]
         mask.mark(mask.locate(0, y, z, x))
+        whole &= inside
+    return whole
 
 
 @jit
@@ -51,15 +55,15 @@ def _lit_voxels(
     shift: int,
     constants: NDArray[np.float64],
     voxels: Ints,
-) -> tuple[int, bool]:
+) -> tuple[int, bool, bool]:
     """Write the voxels that triangles light, as many as there is room for.
 
-    Returns their number, and whether `outward` would have to be known.
+    Returns their number, whether `outward` would have to be known, and whether all are in the box.
     """
     slack, near_face = constants
     unit, half = 1 << shift, 1 << (shift - 1)
     per_voxel = 1 / unit
-    count = 0
+    count, whole = 0, True
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for t in range(len(faces)):
         p, q, r = faces[t, 0], faces[t, 1], faces[t, 2]
@@ -129,7 +133,7 @@ def _lit_voxels(
                         face = level << shift
                         side = a * (w0 - face) + b * (w1 - face) + c * (w2 - face)
                         if side == 0 and outward == 2:
-                            return 0, True
+                            return 0, True, True
                         if side == 0 and outward:
                             side = np.int64(-1 if turned == (outward < 0) else 1)
                         elif side == 0:
@@ -141,4 +145,6 @@ def _lit_voxels(
                         if count < voxels.shape[1]:
                             voxels[axis, count], voxels[u, count], voxels[v, count] = level, i, j
                         count += 1
-    return count, False
+                    else:
+                        whole = False
+    return count, False, whole

@@ -13,15 +13,14 @@ Hashes = NDArray[np.uint64]
 
 def chain_and_doubles(faces: Ints, one: Hashes, two: Hashes) -> tuple[bool, bool]:
     """See `mesh_topology.chain_and_doubles`."""
-    size = 1 << (2 * len(faces) + 1).bit_length()
-    table = np.zeros(size, dtype=np.uint64)
+    table = np.zeros(1 << (2 * len(faces) + 1).bit_length(), dtype=np.uint32)
     total, doubled = _chain_and_doubles(np.ascontiguousarray(faces), one, two, table)
     return bool(total == 0), bool(doubled)
 
 
 @jit
 def _chain_and_doubles(
-    faces: Ints, one: Hashes, two: Hashes, table: Hashes
+    faces: Ints, one: Hashes, two: Hashes, table: NDArray[np.uint32]
 ) -> tuple[np.uint64, bool]:
     total = np.uint64(0)
     doubled = False
@@ -30,9 +29,11 @@ def _chain_and_doubles(
         a, b, c = faces[k, 0], faces[k, 1], faces[k, 2]
         x, p, q = one[a], one[b], one[c]
         total += (p - x) * (two[c] - two[a]) - (q - x) * (two[b] - two[a])
-        if not doubled:  # a table with linear probing, in which 0 is no number
-            key = max(x + p + q, np.uint64(1))
-            at = key & last
+        # A table with linear probing, in which 0 is no number. Halves of hashes save memory; the
+        # few that agree by chance are found not to be doubles later.
+        if not doubled:
+            whole = x + p + q
+            key, at = max(np.uint32(whole >> np.uint64(32)), np.uint32(1)), whole & last
             while table[at] != 0 and table[at] != key:
                 at = (at + np.uint64(1)) & last
             doubled = table[at] == key
