@@ -5,6 +5,7 @@ All have exact derivatives and enclosures. Points are (n, 3) arrays, in voxels.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,8 +52,12 @@ class Bezier(Curve):
         self._points = arguments.points("points", points, least=2)
         _check_degree("points", len(self._points) - 1)
         self.family = len(self._points)
-        self._slopes = (len(self._points) - 1) * np.diff(self._points, axis=0)
         self._arguments = {"points": self._points, "closed": closed}
+
+    @cached_property
+    def _slopes(self) -> Floats:
+        """Control points, (n - 1, 3), of the derivative: its degree is one less."""
+        return self.degree * np.diff(self._points, axis=0)
 
     @property
     def degree(self) -> int:
