@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawing import page_after, values_of
 
-from voxdisplay import Circle, Scene, Segment, read_scene, voxelize
+from voxdisplay import Circle, CurveError, Parametric, Points, Scene, Segment, read_scene, voxelize
 from voxdisplay.frame import Frame
 from voxdisplay.raster.pixel_format import PixelFormat
 
@@ -327,3 +327,30 @@ def test_masked_arrays_are_refused():
         with pytest.raises(ValueError, match=r"^\w+: some of it is masked: .*filled"):
             call()
     assert frame.array().all()
+
+
+@pytest.mark.parametrize("pixels", ["mono1", "index8", "rgb565", "rgb888", "own palette"])
+def test_many_curves_drawn_together_are_as_one_by_one(pixels: str) -> None:
+    rng = np.random.default_rng(4)
+    colors = ["red", "#123456", ["red", "lime", "blue"], (1, 2, 3), "black", ["gold"] * 5]
+    curves = [Circle(rng.uniform(-2, 9, 3), rng.uniform(0.2, 4)) for _ in range(30)]
+    curves += [Points(rng.uniform(-2, 9, (5, 3))) for _ in range(6)]
+    order = rng.permutation(len(curves))
+    items = [(curves[k], colors[n % len(colors)]) for n, k in enumerate(order)]
+    own = pixels == "own palette"
+    blank = Frame((3, 5, 7), "index8" if own else pixels, own_palette=own)
+    together, single = blank.copy(), blank.copy()
+    drawings = together.draw_all(items)
+    assert drawings == [single.draw(curve, color) for curve, color in items]
+    assert any(each.clipped for each in drawings)
+    assert together == single
+    features = ["palette"]
+    assert together.payloads(1024, features) == single.payloads(1024, features)
+
+
+def test_nothing_is_drawn_of_curves_one_of_which_fails() -> None:
+    frame = Frame((3, 5, 7))
+    good, bad = Circle((1, 2, 3), 2), Parametric("1", "2", "1/(t-1)", t=(0, 2))
+    with pytest.raises(CurveError, match="curve 40"):
+        frame.draw_all([*[(good, "red")] * 40, (bad, "red")])
+    assert not len(frame.lit()[0])

@@ -19,7 +19,7 @@ from voxdisplay.scene.item import PartSpan, SceneItem
 from voxdisplay.scene.placement import Placement, placed
 from voxdisplay.scene.scene_files import DEFAULT_SIZE
 from voxdisplay.scene.show import SceneShow
-from voxdisplay.scene.voxelized_items import draw_items, shown_voxels, voxelize_items
+from voxdisplay.scene.voxelized_items import draw_items, draw_still, shown_voxels, voxelize_items
 
 if TYPE_CHECKING:
     from voxdisplay.voxelization import Sequence, VoxelSet
@@ -109,6 +109,8 @@ class Scene:
 
     def draw_each(self, frame: Frame) -> list[Drawing]:
         """Draw all items on a frame as they are; return what became of each."""
+        if not self.spans:
+            return draw_still(frame, self.items)
         whole = voxelize_items(self.items, frame.grid)
         drawings, _ = draw_items(frame, self.items, whole, self.spans)
         return drawings

@@ -20,12 +20,14 @@ from voxdisplay.scene.coloring import Colors, voxel_colors
 from voxdisplay.scene.parts import shown_stretches, stretch_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
     from collections.abc import Sequence as Items
 
     from voxdisplay.raster.grid import Grid
     from voxdisplay.scene.item import PartSpan, SceneItem
     from voxdisplay.voxelization import Sequence, VoxelSet
+
+_BATCH = 4096  # items that are drawn together
 
 Kept = dict[int, tuple["SceneItem", "Sequence | VoxelSet", Colors | Spread]]
 """Voxels and colours of items, by the identity of the item, which is held so that it stays its."""
@@ -77,6 +79,40 @@ def voxelize_items(
     return [found[i] for i in range(len(items))]
 
 
+def voxelized_batches(
+    items: Items[SceneItem], clip: Grid
+) -> Iterator[list[tuple[SceneItem, Sequence | VoxelSet]]]:
+    """Yield items with their voxels, as of `voxelize_items`, some items at a time.
+
+    Voxels of curves that are not held on to need no memory when the next ones come.
+    """
+    bodies = {
+        i: _voxelize_body(item, clip, {})
+        for i, item in enumerate(items)
+        if isinstance(item.shape, Body)
+    }
+    sequences = _sequences([item for item in items if not isinstance(item.shape, Body)])
+    together: list[tuple[SceneItem, Sequence | VoxelSet]] = []
+    for i, item in enumerate(items):
+        together.append((item, bodies.pop(i) if i in bodies else next(sequences)))
+        if len(together) == _BATCH:
+            yield together
+            together = []
+    yield together
+
+
+def _sequences(items: Items[SceneItem]) -> Iterator[Sequence]:
+    """Yield the voxels of items that are curves."""
+    done = 0
+    try:
+        for batch in voxelization.voxelize_batches(item.curve for item in items):
+            yield from batch
+            done += len(batch)
+    except CurveError:
+        _name_failing(items[done:], {})
+        raise
+
+
 def _voxelize_body(item: SceneItem, clip: Grid | None, options: Mapping[str, Any]) -> VoxelSet:
     assert isinstance(item.shape, Body)  # noqa: S101 - see the caller
     certified = options.get("certified", False)
@@ -90,13 +126,20 @@ def _voxelize_curves(items: Items[SceneItem], options: Mapping[str, Any]) -> lis
     try:
         return voxelization.voxelize_many((item.curve for item in items), **options)
     except CurveError:
-        # Voxelised together, they fail together: one by one, to name the object.
-        for item in items:
-            try:
-                voxelization.voxelize(item.curve, **options)
-            except CurveError as error:
-                raise item.scene_error(error) from error
+        _name_failing(items, options)
         raise
+
+
+def _name_failing(items: Items[SceneItem], options: Mapping[str, Any]) -> None:
+    """Raise the error of the first curve that cannot be voxelised, which names the object.
+
+    Voxelised together, they fail together.
+    """
+    for item in items:
+        try:
+            voxelization.voxelize(item.curve, **options)
+        except CurveError as error:
+            raise item.scene_error(error) from error
 
 
 def shown_voxels(
@@ -134,7 +177,7 @@ def draw_items(
 
     """
     stretches = shown_stretches([len(each) for each in whole], spans)
-    drawings: list[Drawing] = []
+    drawn: list[tuple[Sequence | VoxelSet, Colors | Spread]] = []
     keep: Kept = {}
     for item, voxels, (begin, end) in zip(items, whole, stretches, strict=True):
         old = kept.get(id(item)) if kept else None
@@ -144,8 +187,16 @@ def draw_items(
             colors = colors.from_place(begin)
         elif len(colors) > 1:
             colors = colors[begin:end]
-        drawings.append(frame.draw_voxels(stretch_of(voxels, begin, end), colors))
-    return drawings, keep
+        drawn.append((stretch_of(voxels, begin, end), colors))
+    return frame.draw_batches([drawn]), keep
+
+
+def draw_still(frame: Frame, items: Items[SceneItem]) -> list[Drawing]:
+    """Draw items, whole, on a frame, with no more memory than some of them need at a time."""
+    return frame.draw_batches(
+        [(voxels, _colors_of(item, voxels)) for item, voxels in batch]
+        for batch in voxelized_batches(items, frame.grid)
+    )
 
 
 def _colors_of(item: SceneItem, voxels: Sequence | VoxelSet) -> Colors | Spread:

@@ -9,7 +9,8 @@ the extra `fast`, much work is done compiled, with the same voxels
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Any, overload
 
 from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
@@ -33,6 +34,7 @@ __all__ = [
     "measure",
     "point_indices",
     "voxelize",
+    "voxelize_batches",
     "voxelize_body",
     "voxelize_many",
 ]
@@ -164,7 +166,7 @@ def voxelize_many(
     if method == "grid-plane":
         if pitch is not None or reach is not None:
             raise ValueError("pitch and reach are the march's: they go with method='march'")
-        return digitise(curves, certified=certified)
+        return list(chain.from_iterable(digitise(curves, certified=certified)))
     if certified:
         raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
     many = len(curves) > 1
@@ -179,6 +181,14 @@ def voxelize_many(
         )
         for index, curve in enumerate(curves)
     ]
+
+
+def voxelize_batches(curves: Iterable[Curve]) -> Iterator[list[Sequence]]:
+    """Yield the voxels along many curves, as of `voxelize_many`, some curves at a time.
+
+    What is not held on to needs no memory when the next ones come.
+    """
+    return digitise(_as_curves(curves))
 
 
 def _sides(clip: Any) -> tuple[int, int, int]:

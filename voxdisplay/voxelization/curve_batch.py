@@ -178,6 +178,12 @@ class CurveBatch:
         """`Curve.min_length` of each curve."""
         return [curve.min_length for curve in self.curves]
 
+    @cached_property
+    def declared_closed(self) -> NDArray[np.int8]:
+        """What each curve says: 1 if it is closed, 0 if not, -1 if it does not say."""
+        said = [curve.closed for curve in self.curves]
+        return np.array([-1 if each is None else bool(each) for each in said], dtype=np.int8)
+
     @property
     def degrees(self) -> list[int | None]:
         """`Curve.degree` of each curve."""
@@ -260,7 +266,7 @@ class CurveBatch:
         gap = samples.points.take(first, axis=1) - samples.points.take(last, axis=1)
         is_open = np.abs(gap).max(axis=0) > CLOSURE_TOLERANCE
         is_open |= (high - low).max(axis=0) <= CLOSURE_TOLERANCE  # a point, and no loop
-        is_open |= np.array([curve.closed is False for curve in self.curves])
+        is_open |= self.declared_closed == 0
         ends = np.concatenate((first[is_open], last[is_open]))
         fixed = np.concatenate((ends, self.corners(samples), first[~is_open]))
         points = samples.points.take(fixed, axis=1)

@@ -51,12 +51,14 @@ ONE_PIECE.flags.writeable = False
 NO_CORNERS = np.empty(0, dtype=np.int64)
 
 
-@np.errstate(all="ignore")
-def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequence]:
-    """Return the sequences of curves, in order, by grid-plane intersection digitisation."""
-    curves = list(curves)
-    sequences: list[Sequence] = []
+def digitise(curves: Iterable[Curve], *, certified: bool = False) -> Iterator[list[Sequence]]:
+    """Yield the sequences of curves, in order, by grid-plane intersection digitisation.
 
+    They come in batches, so that what is done with one needs no memory when the next one comes.
+    """
+    curves = list(curves)
+
+    @np.errstate(all="ignore")
     def one_batch(low: int, size: int) -> list[Sequence]:
         batch = CurveBatch(curves[low : low + size], low if len(curves) > 1 else None)
         ahead = (len(curves) - low) / len(batch.curves)
@@ -67,21 +69,22 @@ def digitise(curves: Iterable[Curve], *, certified: bool = False) -> list[Sequen
                 if not batch.complete_undefined():
                     raise
 
-    size, batches, total = 16, 1, 0
-    while (begin := len(sequences)) < len(curves):
+    size, batches, total, begin = 16, 1, 0, 0
+    while begin < len(curves):
         end = min(begin + size * batches, len(curves))
         # Many short array operations in numpy would only wait for each other.
         apart = kernel_backend.enabled() and all(map(attrgetter("thread_safe"), curves[begin:end]))
         do = parallel.ordered_map if apart else map
+        voxels = 0
         for fresh in do(partial(one_batch, size=size), range(begin, end, size)):
-            sequences += fresh
-        voxels = sum([len(sequence.voxels) for sequence in sequences[begin:]])
+            voxels += sum([len(sequence.voxels) for sequence in fresh])
+            yield fresh
         total += voxels
         check_total(total)
         at_once = parallel.cpu_count()
         batches = at_once * (BATCHES_PER_PROCESSOR if apart else 1)
         size = min(MAX_BATCH_CURVES, MAX_BATCH_VOXELS // at_once * (end - begin) // voxels + 1)
-    return sequences
+        begin = end
 
 
 def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list[Sequence]:
@@ -220,18 +223,14 @@ def _closed(batch: CurveBatch, samples: Samples) -> Bools:
         extent = np.maximum.reduceat(samples.points, first, axis=1)
         extent -= np.minimum.reduceat(samples.points, first, axis=1)
         closed &= extent.max(axis=0) > CLOSURE_TOLERANCE
-    declared = [
-        (at, curve.closed) for at, curve in enumerate(batch.curves) if curve.closed is not None
-    ]
-    for index, is_closed in declared:
-        closed[index] = is_closed
-        if (
-            is_closed
-            and (np.abs(np.floor(ends[0][:, index]) - np.floor(ends[1][:, index])) > 1).any()
-        ):
-            raise CurveError(
-                f"{batch.message_prefix(index)}the curve is said to be closed, but its ends are "
-                f"{apart[index]:.6g} voxels apart",
-                hint="leave out `closed`, or complete the curve",
-            )
+    declared = batch.declared_closed
+    closed = np.where(declared < 0, closed, declared > 0)
+    far = (np.abs(np.floor(ends[0]) - np.floor(ends[1])) > 1).any(axis=0) & (declared > 0)
+    if far.any():
+        index = int(far.argmax())
+        raise CurveError(
+            f"{batch.message_prefix(index)}the curve is said to be closed, but its ends are "
+            f"{apart[index]:.6g} voxels apart",
+            hint="leave out `closed`, or complete the curve",
+        )
     return closed

@@ -180,7 +180,7 @@ class Sequence:
     @property
     def jumps(self) -> tuple[float, ...]:
         """Parameters at which the curve jumps: those of the voxels that begin further pieces."""
-        return tuple(self.t[self.starts[1:]].tolist())
+        return tuple(self.t[self.starts[1:]].tolist()) if len(self.starts) > 1 else ()
 
     @cached_property
     def contact_pairs(self) -> NDArray[np.int64]:
