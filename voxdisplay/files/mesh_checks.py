@@ -94,7 +94,7 @@ def _check_ply(name: str, data: bytes) -> Claims:
             raise BodyError(f"{name}: its header claims {' '.join(line[1:])[:60]!r}")
         elif line[:1] == ["property"] and elements:
             label, count, size, listed = elements[-1]
-            kind = line[2] if line[1:2] == ["list"] and len(line) > 2 else line[1:2][0]
+            kind = line[2] if line[1:2] == ["list"] and len(line) > 2 else "".join(line[1:2])
             if kind not in _SIZES:
                 raise BodyError(f"{name}: its header has a property of the type {kind[:40]!r}")
             elements[-1] = label, count, size + _SIZES[kind], listed or line[1] == "list"

@@ -93,7 +93,8 @@ def report_on(
         tunnels = 0
         if len(voxels):
             outer = _outer_layer(voxels, box) if kind == "solid" else voxels
-            distances = _distances(outer, geometry)
+            # A voxel of a solid that has a dark neighbour has the surface before its centre.
+            distances = _distances(outer, geometry, 1.0 if kind == "solid" else 0.5)
             tunnels = _tunnels(voxels, box, geometry)
             if isinstance(geometry, TriangleMesh) and kind == "surface":
                 inside = _inside(geometry, box)
@@ -127,12 +128,12 @@ def _inside(mesh: TriangleMesh, box: VoxelBox) -> Ints:
     return mesh.faces[inside[mesh.faces].all(axis=1)]
 
 
-def _distances(voxels: Ints, geometry: Geometry) -> Floats:
+def _distances(voxels: Ints, geometry: Geometry, expected: float) -> Floats:
     if isinstance(geometry, TriangleMesh):
         return mesh_distances(voxels, geometry.vertices, geometry.faces)
     centers = np.add(voxels, 0.5, dtype=np.float64)
     if isinstance(geometry, BallChain):
-        return chain_distances(centers, geometry)
+        return chain_distances(centers, geometry, expected)
     return field_distances(centers, _fields(geometry))
 
 

@@ -17,12 +17,18 @@ from voxdisplay.voxelization.measure_fields import field_distances
 _COVERED = 1e-6  # depth at which a point of a ball's surface is inside of another
 _REACH = 1.5  # of the search along the axes, in voxels
 _COARSE, _FINE = 48, 1536  # steps of it, and where the surface may be in a narrow gap
-_BOUND = 0.501  # voxels that a surface has lit are no further from it
 _ROUND = 1e-9
 
 
-def chain_distances(centers: Floats, chain: BallChain) -> Floats:
-    """Return the distances of points, (n, 3), from the surface of a chain of balls.
+def chain_distances(centers: Floats, chain: BallChain, expected: float = 0.5) -> Floats:
+    """Return the distances of points from the surface of a chain of balls.
+
+    Parameters
+    ----------
+    centers : (n, 3) float64 array
+    chain : BallChain
+    expected : float
+        Where more than this is found inside, the surface is searched in narrower gaps.
 
     Returns
     -------
@@ -47,7 +53,7 @@ def chain_distances(centers: Floats, chain: BallChain) -> Floats:
     covered = (chain.nearest(feet).distance < -_COVERED) | (size == 0)
     rows = inside[covered]
     found[rows] = _along_axes(centers[rows], chain, _COARSE)
-    rows = rows[found[rows] > _BOUND]
+    rows = rows[found[rows] > expected + 1e-6]
     found[rows] = _along_axes(centers[rows], chain, _FINE)
     return np.asarray(found)
 

@@ -11,13 +11,16 @@ curves.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from voxdisplay.errors import BodyError
+from voxdisplay.bodies.implicit import ImplicitFunction
+from voxdisplay.expressions.interval import Interval
 from voxdisplay.voxelization.index_ranges import expand_ranges
 from voxdisplay.voxelization.surfaces.cover import cover_wires, distinct
+from voxdisplay.voxelization.surfaces.implicit import voxelize_implicit
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:
@@ -28,8 +31,8 @@ if TYPE_CHECKING:
 
 TIE = 1e-9
 """Hits so near to a face between voxels, in voxels, are taken to be on it."""
-MAX_PAIRS = 1 << 28
-"""Most pairs of a ball and a mid-line that may meet."""
+MAX_PAIRS = 1 << 22
+"""Most pairs of balls and mid-lines along one axis; beyond, signs at the centres take less time."""
 _BLOCK = 1 << 17  # pairs at a time, so that they stay in a core's cache
 _KEPT = 1 << 21  # intervals that are kept before they are joined
 _FINE = 1 << 14  # of a voxel: gaps that are narrower are none
@@ -58,19 +61,20 @@ def voxelize_chain(
     box: VoxelBox,
     body: Body,
     *,
-    certified: bool = False,  # noqa: ARG001 - exact anyway
+    certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels of a chain of balls inside a box, as a shell or filled.
 
-    Raises
-    ------
-    BodyError
-        If it has too many and too large balls.
-
+    Of many large balls most of what they cover is inside of others: then the signs of the distance
+    at the centres tell the voxels, as of implicit surfaces (`implicit`).
     """
+    notes = ("nothing is proven: balls are about points of the curve",) if certified else ()
+    if max(_count_pairs(geometry, axis, box) for axis in range(3)) > MAX_PAIRS:
+        by_distance = ImplicitFunction(_Distance(geometry), geometry.bounds(), geometry.wires)
+        return replace(voxelize_implicit(by_distance, box, body), notes=notes)
     fill = _solid if body.kind == "solid" else _shell
     if not geometry.wires:
-        return VoxelSet(box, fill(geometry, box), body.kind)
+        return VoxelSet(box, fill(geometry, box), body.kind, notes=notes)
 
     def inside(points: Floats) -> Bools:
         return np.asarray(geometry.nearest(points).distance <= 0)
@@ -79,7 +83,28 @@ def voxelize_chain(
     wide = box.expanded(1)
     index = cover_wires(fill(geometry, wide), wide, geometry.wires, inside)
     voxels = wide.voxels_at(index)
-    return VoxelSet(box, box.index_of(voxels[box.inside(voxels)]), body.kind)
+    return VoxelSet(box, box.index_of(voxels[box.inside(voxels)]), body.kind, notes=notes)
+
+
+class _Distance:
+    """Distance from a chain's surface, negative inside, by the chain's metric."""
+
+    always_defined = True
+
+    def __init__(self, chain: BallChain) -> None:
+        self._chain = chain
+
+    def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:
+        at = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+        return self._chain.nearest(at.reshape(-1, 3)).distance.reshape(at.shape[:-1])
+
+    def enclosure(self, x: Interval, y: Interval, z: Interval, /) -> Interval:
+        """Return the value in the middle, give or take the distance of the corners from it."""
+        half = np.stack([(each.hi - each.lo) / 2 for each in (x, y, z)], axis=-1)
+        middle = self(*((each.lo + each.hi) / 2 for each in (x, y, z)))
+        reach = np.sqrt(((half @ np.abs(self._chain.metric).T) ** 2).sum(axis=-1))
+        reach = reach * (1 + 1e-12) + 1e-6 + 1e-12 * np.abs(middle)
+        return Interval(middle - reach, middle + reach)
 
 
 def _shell(chain: BallChain, box: VoxelBox) -> Ints:
@@ -157,8 +182,13 @@ def _joined(parts: list[_Intervals], bits: int) -> _Intervals:
     )
 
 
-def _pieces(chain: BallChain, axis: int, box: VoxelBox) -> Iterator[_Intervals]:
-    """Yield the intervals of balls and frustums, block by block."""
+def _count_pairs(chain: BallChain, axis: int, box: VoxelBox) -> int:
+    _, *pairs = _pairs(chain, axis, box)
+    return sum(each.size for each in pairs)
+
+
+def _pairs(chain: BallChain, axis: int, box: VoxelBox) -> tuple[Ints, _Pairs, _Pairs]:
+    """Return the corners that have balls, and the mid-lines near balls and near frustums."""
     ball = np.zeros(len(chain.points), dtype=bool)
     ball[chain.first] = ball[chain.first + 1] = True
     half = chain.radii[:, None] * chain.reach
@@ -166,13 +196,12 @@ def _pieces(chain: BallChain, axis: int, box: VoxelBox) -> Iterator[_Intervals]:
     which = np.flatnonzero(ball)
     a, b = chain.first, chain.first + 1
     spans = np.minimum(low[a], low[b]), np.maximum(high[a], high[b])
-    pairs = [_Pairs(low[which], high[which], axis, box), _Pairs(*spans, axis, box)]
-    if sum(each.size for each in pairs) > MAX_PAIRS:
-        raise BodyError(
-            f"a tube with {len(which)} balls of radii up to {chain.radii.max():g} voxels is too "
-            "long or too rough for its width",
-            hint="narrow the range of the curve, its radius, or scale it down",
-        )
+    return which, _Pairs(low[which], high[which], axis, box), _Pairs(*spans, axis, box)
+
+
+def _pieces(chain: BallChain, axis: int, box: VoxelBox) -> Iterator[_Intervals]:
+    """Yield the intervals of balls and frustums, block by block."""
+    which, *pairs = _pairs(chain, axis, box)
     shapes_of: list[_Balls | _Frustums] = [_Balls(chain, which, axis), _Frustums(chain, axis)]
     for shapes, each in zip(shapes_of, pairs, strict=True):
         for row, u, v in each.blocks():

@@ -219,10 +219,27 @@ def test_reports_of_tubes() -> None:
     assert short.report.tunnels > 0
 
 
-def test_a_tube_that_would_take_minutes_is_refused() -> None:
-    rough = vd.Parametric("500 + 400*sin(900*t)", "500 + 400*cos(901*t)", "500*t", t=(0, 2))
-    with pytest.raises(BodyError, match="too long or too rough"):
-        voxelize_body(Tube(rough, 200), VoxelBox.of_grid((1024, 1024, 1024)))
+@pytest.mark.parametrize("radius", [1.4, 2.2, "1 + t/9"])
+def test_many_large_balls_are_voxelised_by_distances(
+    radius: float | str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tube, full = Tube(CURVES["knot"], radius), Tube(CURVES["knot"], radius, fill="solid")
+    expected, inside = lit(tube), lit(full)
+    monkeypatch.setattr(ball_chains, "MAX_PAIRS", 100)
+    assert (lit(full) == inside).all()
+    shown = lit(tube)
+    assert not (shown & ~expected).any()
+    assert shown.sum() >= 0.9 * expected.sum()  # two hits between two centres are not seen
+    assert leaks(shown, inside & ~shown) == 0
+
+
+@pytest.mark.parametrize("pairs", [0, 1 << 30])
+def test_nothing_is_proven_of_tubes(pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ball_chains, "MAX_PAIRS", pairs)
+    found = voxelize_body(Tube(CURVES["line"], 2), VoxelBox.of_grid(GRID), certified=True)
+    assert not found.certified
+    assert "nothing is proven" in found.notes[0]
+    assert not voxelize_body(Tube(CURVES["line"], 2), VoxelBox.of_grid(GRID)).notes
 
 
 @pytest.mark.parametrize("size", ["_BLOCK", "_KEPT"])
