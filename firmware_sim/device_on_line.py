@@ -7,12 +7,14 @@ of the carrier.
 import math
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from firmware_sim.card_player import CardPlayer
 from firmware_sim.device import Device
 from firmware_sim.fault_types import Event
 from firmware_sim.faults import FaultSpec, FaultyLine
+
+if TYPE_CHECKING:
+    from firmware_sim.card_player import CardPlayer
 
 _MAX_BACKLOG_BYTES: Final = 65_536  # on the line; with more, a direction takes no bytes
 _MAX_WAIT_S: Final = 3600.0  # longest wait to ask callers for
@@ -51,7 +53,7 @@ class DeviceOnLine:
         faults: tuple[FaultSpec, ...] = (),
         seed: int = 0,
         clock: Callable[[], float] = time.monotonic,
-        player: CardPlayer | None = None,
+        player: "CardPlayer | None" = None,
     ) -> None:
         self.device = device
         self._player = player

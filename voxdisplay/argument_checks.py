@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import math
 import reprlib
+import sys
 from collections.abc import Callable
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+if TYPE_CHECKING:
+    import numpy as np
 
 _SHORT = reprlib.Repr()
 _SHORT.maxother = _SHORT.maxstring = 60
@@ -23,6 +27,15 @@ def described(value: object) -> str:
 def wrong_kind(name: str, wanted: str, value: object) -> TypeError:
     """Return the error of an argument that is of another kind than wanted."""
     return TypeError(f"{name}: expected {wanted}, found {described(value)}")
+
+
+def is_masked_array(value: object) -> TypeGuard[np.ma.MaskedArray[Any, Any]]:
+    """Return whether a value is a masked array.
+
+    numpy imports the class on first use, which takes as long as all of a small scene. Whoever has
+    a masked array has imported it.
+    """
+    return isinstance(value, getattr(sys.modules.get("numpy.ma"), "MaskedArray", ()))
 
 
 def number(name: str, value: Any) -> float:

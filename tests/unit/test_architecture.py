@@ -127,8 +127,33 @@ def test_the_emulator_itself_loads_nothing_else():
     assert not loaded & {"usb", "numpy", "serial", "voxdisplay"}
 
 
-def test_push_imports_nothing_heavy():
-    script = "import sys, voxdisplay.cli.main; print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    loaded = {name.split(".")[0] for name in run.stdout.split()}
-    assert not loaded & {"PIL", "scipy", "numba", "jsonschema", "usb", "websockets", "firmware_sim"}
+PUSH = """
+import sys, numpy
+from voxdisplay.__main__ import main
+before = set(sys.modules)
+sys.argv = ["voxdisplay", "push", *sys.argv[1:], "--port", "sim:"]
+code = main()
+print(code, *set(sys.modules) - before)
+"""
+
+
+def test_push_imports_nothing_heavy(tmp_path):
+    scene = tmp_path / "scene.json"
+    scene.write_text(
+        '{"type": "torus_knot", "p": 2, "q": 3, "center": [64, 64, 64], "major": 40, "minor": 9}'
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", PUSH, scene], capture_output=True, text=True, check=True
+    )
+    code, *loaded = run.stdout.splitlines()[-1].split()
+    assert code == "0", run.stderr
+    assert "firmware_sim.device" in loaded
+    heavy = {"PIL", "scipy", "numba", "jsonschema", "usb", "websockets", "trimesh", "nibabel"}
+    heavy |= {"nrrd", "pydicom", "uharfbuzz", "cmap", "dask", "asyncio", "multiprocessing"}
+    assert not heavy & {name.split(".")[0] for name in loaded}
+    assert "numpy.ma" not in loaded, "it takes as long to import as a small scene to draw"
+    needless = re.compile(
+        r"voxdisplay\.(view|files|conformance|annotation|shows|bodies|voxelization\.surfaces)\."
+    )
+    allowed = {"voxdisplay.bodies.body", "voxdisplay.files.suffixes", "voxdisplay.shows.show"}
+    assert not {name for name in loaded if needless.match(name)} - allowed

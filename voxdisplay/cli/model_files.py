@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
 
 import click
 
@@ -22,8 +22,7 @@ _C = TypeVar("_C", bound=Callable[..., Any])
 _MARGIN: Final = 1.0  # voxels that stay free at each wall, as with `into` of scenes
 
 
-@dataclass(frozen=True, slots=True)
-class ModelOptions:
+class ModelOptions(NamedTuple):
     """Options for a file that is the only object; None where one was not given."""
 
     fill: Literal["shell", "solid"] | None = None
@@ -37,8 +36,7 @@ class ModelOptions:
 
     def given(self) -> dict[str, Any]:
         """Return the options that were given."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in self._asdict().items() if value is not None}
 
 
 _OPTIONS = (
@@ -68,8 +66,8 @@ def model_options(function: _C) -> _C:
 
     @wraps(function)
     def with_model(**arguments: Any) -> Any:
-        names = [field.name for field in fields(ModelOptions)]
-        return function(model=ModelOptions(*map(arguments.pop, names)), **arguments)
+        given = map(arguments.pop, ModelOptions._fields)
+        return function(model=ModelOptions(*given), **arguments)
 
     for option in reversed(_OPTIONS):
         with_model = option(with_model)

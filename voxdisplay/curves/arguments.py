@@ -104,7 +104,7 @@ def unmasked(value: ArrayLike) -> Floats:
     """Return a copy of an array as float64, nan where it is masked."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
-    if isinstance(value, np.ma.MaskedArray):
+    if argument_checks.is_masked_array(value):
         value = np.ma.filled(value.astype(np.float64), np.nan)
     return np.array(value, dtype=np.float64)
 
@@ -156,4 +156,4 @@ def real_numbers(what: str, result: object) -> Floats:
         raise CurveError(
             f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
         )
-    return unmasked(result if isinstance(result, np.ma.MaskedArray) else numbers)
+    return unmasked(result if argument_checks.is_masked_array(result) else numbers)

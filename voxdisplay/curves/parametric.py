@@ -11,6 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from voxdisplay import argument_checks
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
@@ -277,6 +278,9 @@ def _point(what: str, function: Function, t: float) -> Floats:
 def _rows(what: str, result: Any, n: int) -> Floats:
     """Return a checked copy of what a callable returned: (3, n), or rows that broadcast to that."""
     if isinstance(result, tuple | list) and len(result) == 3:
-        rows = [arguments.unmasked(row) if np.ma.isMaskedArray(row) else row for row in result]
+        rows = [
+            arguments.unmasked(row) if argument_checks.is_masked_array(row) else row
+            for row in result
+        ]
         result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[:3])
     return arguments.curve_points(what, result, n)

@@ -6,6 +6,8 @@ import reprlib
 
 import numpy as np
 
+from voxdisplay.argument_checks import is_masked_array
+
 MAX_ROWS = 3
 """Longer arrays are abbreviated to their first rows and a count."""
 MAX_CHARACTERS = 60
@@ -24,7 +26,7 @@ def short_repr(value: object) -> str:
             return f"{float(value):.6g}"
         except OverflowError:
             return _TEXTS.repr(value)
-    if value is np.ma.masked:
+    if is_masked_array(value) and value is np.ma.masked:
         return "masked"
     if isinstance(value, np.ndarray) and value.ndim == 0:
         return short_repr(value[()])

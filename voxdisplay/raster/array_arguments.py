@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.argument_checks import is_masked_array
+
 
 def is_array_like(value: object) -> bool:
     """Return whether a value is an array, or a list or tuple of which numpy makes one."""
@@ -19,7 +21,7 @@ def is_array_like(value: object) -> bool:
 
 def as_array(name: str, value: object) -> NDArray[Any]:
     """Return a value as an array; raise `ValueError` for uneven rows, or if any is masked."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+    if is_masked_array(value) and np.ma.is_masked(value):
         raise ValueError(
             f"{name}: some of it is masked: fill it first, as with array.filled(0), or leave it out"
         )

@@ -15,11 +15,11 @@ import numpy as np
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.parse import constant, excerpt, parse
-from voxdisplay.expressions.partial_evaluation import PartialExpression, split
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from voxdisplay.expressions.partial_evaluation import PartialExpression
     from voxdisplay.expressions.program import Expression
 
 
@@ -207,6 +207,9 @@ class MovingEnvironment(Environment):
 
     def formula(self, source: str | float, variables: tuple[str, ...]) -> Expression:
         """Return an expression: `Environment.formula`."""
+        # Most scenes are still, and are read sooner without this.
+        from voxdisplay.expressions.partial_evaluation import split  # noqa: PLC0415
+
         found = self._formulas.get((source, variables))
         if found is None:
             early = tuple(name for name in self.table.variables if name not in variables)

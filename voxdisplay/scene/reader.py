@@ -154,7 +154,7 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
     if is_group or ("objects" not in raw and ("type" in raw or _has_key_like("type", raw))):
         if not isinstance(raw.pop("$schema", ""), str):
             raise SceneError("expected text in double quotes", path="$.$schema")
-        scene_object: SceneObject = _convert(raw, Object, source)
+        scene_object: SceneObject = _convert(raw, _object_type(raw), source)
         environment = StillEnvironment({})
         files = SceneFiles(folder, None)
         built = SceneBuilder([scene_object], ["$"], environment, files, source).build()
@@ -233,6 +233,12 @@ def _size(sides: tuple[str | float, ...], names: dict[str, float]) -> Grid:
     if grid.voxels > MAX_VOXELS:
         raise SceneError(f"{grid} is more than {MAX_VOXELS} voxels", path="$.size")
     return grid
+
+
+def _object_type(raw: dict[str, Any]) -> Any:
+    """Return the type of an object, which is known sooner than the annotations of all types are."""
+    tag = raw.get("type")
+    return TYPES.get(tag, Object) if isinstance(tag, str) else Object
 
 
 def _convert(raw: Any, kind: Any, source: JsonText) -> Any:

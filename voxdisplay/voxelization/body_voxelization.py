@@ -9,16 +9,12 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from voxdisplay.bodies.ball_chain import BallChain
-from voxdisplay.bodies.geometry import Geometry, LitVoxels, TriangleMesh
-from voxdisplay.bodies.height_field import HeightFunction
-from voxdisplay.bodies.implicit import ImplicitFunction
-from voxdisplay.bodies.quadrics import QuadricPatches
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.voxel_box import VoxelBox
 
 if TYPE_CHECKING:
     from voxdisplay.bodies.body import Body
+    from voxdisplay.bodies.geometry import Geometry
     from voxdisplay.voxelization.voxel_set import VoxelSet
 
 MAX_SPAN = 1 << 14
@@ -34,14 +30,15 @@ class Voxeliser(Protocol):
         """Return the voxels inside a box; ``body.kind`` says whether the inside is wanted."""
 
 
-# Module and function of the voxeliser of each geometry, imported on first use.
-_VOXELISERS: dict[type[Geometry], tuple[str, str]] = {
-    TriangleMesh: ("mesh", "voxelize_mesh"),
-    LitVoxels: ("lit_voxels", "voxelize_lit"),
-    QuadricPatches: ("quadrics", "voxelize_quadrics"),
-    ImplicitFunction: ("implicit", "voxelize_implicit"),
-    BallChain: ("ball_chains", "voxelize_chain"),
-    HeightFunction: ("height_field", "voxelize_heights"),
+# Module and function of the voxeliser of each geometry, which are imported on first use, as the
+# geometries are: what draws curves alone needs none of them.
+_VOXELISERS: dict[str, tuple[str, str]] = {
+    "TriangleMesh": ("mesh", "voxelize_mesh"),
+    "LitVoxels": ("lit_voxels", "voxelize_lit"),
+    "QuadricPatches": ("quadrics", "voxelize_quadrics"),
+    "ImplicitFunction": ("implicit", "voxelize_implicit"),
+    "BallChain": ("ball_chains", "voxelize_chain"),
+    "HeightFunction": ("height_field", "voxelize_heights"),
 }
 
 
@@ -63,11 +60,11 @@ def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> Voxe
     """
     began_s = time.perf_counter()
     geometry = body.geometry(box.corners, certified=certified)
-    module, name = _VOXELISERS[type(geometry)]
+    module, name = _VOXELISERS[type(geometry).__name__]
     package = __name__.rpartition(".")[0]
     voxelize: Voxeliser = getattr(import_module(f"{package}.surfaces.{module}"), name)
     voxels = voxelize(geometry, box, body, certified=certified)
-    notes = (*geometry.notes, *voxels.notes) if isinstance(geometry, TriangleMesh) else voxels.notes
+    notes = (*getattr(geometry, "notes", ()), *voxels.notes)
     return replace(voxels, body=body, notes=notes, seconds=time.perf_counter() - began_s)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.voxelization.index_ranges import distinct
+
 if TYPE_CHECKING:
     from voxdisplay.voxelization.sequence import Sequence
 
@@ -18,4 +20,4 @@ def corner_rows(sequence: Sequence) -> NDArray[np.int64]:
         return np.empty(0, dtype=np.int64)
     behind = np.searchsorted(sequence.t, breaks).clip(1, len(sequence) - 1)
     before = np.abs(sequence.t[behind - 1] - breaks) <= np.abs(sequence.t[behind] - breaks)
-    return np.unique(behind - before)
+    return distinct(behind - before)

@@ -24,7 +24,7 @@ from voxdisplay.compute.array_types import Floats, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.adaptive_sampling import limit_chords
 from voxdisplay.voxelization.curve_batch import CurveBatch, Samples
-from voxdisplay.voxelization.index_ranges import insert_columns
+from voxdisplay.voxelization.index_ranges import distinct, insert_columns
 from voxdisplay.voxelization.plane_crossings import TIE_TOLERANCE, Crossings
 from voxdisplay.voxelization.root_finding import find_roots
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents, Voxels, adjacent
@@ -113,10 +113,10 @@ def choose_corners(crossings: Crossings, samples: Samples) -> VoxelEvents:
         # Of two that fall apart, the one that gains less goes back: at least one has moved.
         one, other = gain[torn], gain[torn + 1]
         back = np.concatenate((torn[one <= other + SAME_GAIN], torn[other <= one + SAME_GAIN] + 1))
-        back = np.unique(back)
+        back = distinct(back)
         gain[back] = np.inf
         voxels[:, back] = nearest[:, back]
-        recheck = np.unique(np.concatenate((back - 1, back)))
+        recheck = distinct(np.concatenate((back - 1, back)))
         recheck = recheck[(recheck >= 0) & (recheck < events.t.size - 1)]
         recheck = recheck[events.piece[recheck] == events.piece[recheck + 1]]
         torn = recheck[~adjacent(voxels[:, recheck], voxels[:, recheck + 1])]

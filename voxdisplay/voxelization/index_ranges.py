@@ -21,6 +21,17 @@ def expand_ranges(low: Ints, count: Ints) -> Ints:
     return np.asarray((low - (end - count)).repeat(count) + np.arange(total))
 
 
+def distinct(numbers: Ints) -> Ints:
+    """Return the distinct ones of whole numbers, ascending.
+
+    Since numpy 2.3, np.unique hashes them, which takes many times longer, and imports numpy.ma.
+    """
+    ordered = np.sort(numbers)
+    is_new = np.ones(ordered.size, dtype=np.bool_)
+    is_new[1:] = ordered[1:] != ordered[:-1]
+    return np.asarray(ordered[is_new])
+
+
 def split_blocks(starts: Ints, stop: int, size: int) -> Iterator[tuple[int, int]]:
     """Yield blocks [begin, end) of about ``size`` that make up [0, stop).
 

@@ -93,4 +93,10 @@ def is_incompressible(index: Ints, values: NDArray[np.integer]) -> bool:
     if 2 * int(np.count_nonzero(alike)) >= len(index):
         return False
     sample = values[:: -(-len(values) // _SAMPLE)]
-    return len(np.unique(sample)) > _MANY_COLORS or len(np.unique(values)) > _MANY_COLORS
+    return _has_many(sample) or _has_many(values)
+
+
+def _has_many(values: NDArray[np.integer]) -> bool:
+    """Return whether there are many colours; np.unique would import numpy.ma, which takes long."""
+    ordered = np.sort(values)
+    return int(np.count_nonzero(ordered[1:] != ordered[:-1])) >= _MANY_COLORS

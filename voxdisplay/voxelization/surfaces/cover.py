@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from voxdisplay.voxelization import index_ranges
+
 if TYPE_CHECKING:
     from voxdisplay.compute.array_types import Bools, Floats, Ints
     from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -22,12 +24,7 @@ def distinct(parts: Sequence[Ints]) -> Ints:
     """Return the distinct numbers of some arrays, ascending."""
     if not parts:
         return np.empty(0, dtype=np.int64)
-    numbers = np.concatenate(parts)
-    numbers.sort()
-    if not numbers.size:
-        return numbers
-    # np.unique hashes whole numbers since numpy 2.3, which takes many times longer.
-    return np.asarray(numbers[np.append(True, numbers[1:] != numbers[:-1])])
+    return index_ranges.distinct(np.concatenate(parts))
 
 
 def cover_wires(
