@@ -3,6 +3,14 @@
 Every crossing of the mesh with a mid-line lights the voxel that holds it, so that no 6-connected
 path through dark voxels crosses the mesh. On a voxel's face, closed and oriented meshes light the
 inner voxel, others the upper one.
+
+Where a mid-line touches a closed mesh at a silhouette alone, and that on a voxel's face, the
+triangles on either side have opposite normals, and so both voxels at that face are lit: one of them
+may be just outside of the mesh's bounding box, as below the edge where a slanted side meets a flat
+base. This cannot be mended triangle by triangle. Any point of a triangle is on an edge once the
+triangle is split, so that a rule that splitting does not change may depend on the triangle's plane
+alone; and of those, only inner, outer or both are the same in a mirror. Both voxels are within 1/2
+of the mesh, and clipping to the bounding box leaves the inner one.
 """
 
 from __future__ import annotations
