@@ -105,9 +105,7 @@ def _bumpy_ball(chance: np.random.Generator) -> tuple[Floats, Ints]:
     n, m = 5, 8
     u = np.pi * (np.arange(n) + 1)[:, None] / (n + 1)
     v = 2 * np.pi * np.arange(m) / m
-    ring = np.stack(
-        (np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u) * np.ones(m)), axis=-1
-    )
+    ring = np.stack((np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u) * np.ones(m)), axis=-1)
     points = np.concatenate((ring.reshape(-1, 3), [(0, 0, 1), (0, 0, -1)]))
     points *= chance.uniform(0.6, 1.0, (len(points), 1))
     faces = []

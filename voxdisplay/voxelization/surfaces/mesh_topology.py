@@ -77,7 +77,7 @@ def analyse(mesh: SnappedMesh) -> Topology:
         return Topology(mesh, None, 0, True, True, 0)
     triangles, doubled, ambiguous = None, 0, False
     if is_doubled:
-        dropped, ambiguous = _doubled_triangles(mesh.faces, one)
+        dropped, ambiguous = _doubled_triangles(mesh, one)
         triangles = np.flatnonzero(~dropped)
         mesh = mesh.without(dropped)
         closed, _ = chain_and_doubles(mesh.faces, one, two)
@@ -128,13 +128,18 @@ def chain_and_doubles(faces: Ints, one: Hashes, two: Hashes) -> tuple[bool, bool
     return bool(total == 0), bool((sums[1:] == sums[:-1]).any())
 
 
-def _doubled_triangles(faces: Ints, one: Hashes) -> tuple[Bools, bool]:
+def _doubled_triangles(mesh: SnappedMesh, one: Hashes) -> tuple[Bools, bool]:
     """Return which triangles to drop, and whether an orientation is left open.
 
     Of triangles with the same corners one is kept, of the orientation of most of them. If as many
-    have either, that is no orientation.
+    have either, that is no orientation. Those without an area are kept: they light nothing, and may
+    fill a gap between edges.
     """
-    a, b, c = (one.take(faces[:, k]) for k in range(3))
+    rows = np.flatnonzero(~zero_area(mesh))
+    dropped = np.zeros(len(mesh.faces), dtype=bool)
+    if not len(rows):
+        return dropped, False
+    a, b, c = (one.take(mesh.faces[rows, k]) for k in range(3))
     sums = a + b + c
     order = np.argsort(sums, kind="stable")
     first = np.append(True, sums[order][1:] != sums[order][:-1])
@@ -147,8 +152,8 @@ def _doubled_triangles(faces: Ints, one: Hashes) -> tuple[Bools, bool]:
     # Stable: the first of those wanted has the lowest number.
     candidates = np.flatnonzero(wanted)
     leads = np.append(True, group[candidates][1:] != group[candidates][:-1])
-    dropped = np.ones(len(faces), dtype=bool)
-    dropped[order[candidates[leads]]] = False
+    dropped[rows] = True
+    dropped[rows[order[candidates[leads]]]] = False
     return dropped, ambiguous
 
 

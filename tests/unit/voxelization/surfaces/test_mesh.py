@@ -189,6 +189,15 @@ def test_the_shell_of_a_box_on_voxels_is_the_outer_layer_of_its_solid():
     assert np.array_equal(shell, outer)
 
 
+def test_a_silhouette_on_a_voxels_face_lights_both_sides_of_it():
+    # A wedge upon the plane z = 3, whose slanted side begins at the mid-line x = 1.5.
+    points = [(x, y, z) for y in (1, 4) for x, z in ((1.5, 3), (4.5, 3), (4.5, 4.5))]
+    faces = [(0, 1, 2), (3, 5, 4), (0, 3, 4), (0, 4, 1), (1, 4, 5), (1, 5, 2), (0, 2, 5), (0, 5, 3)]
+    found = voxels(points, faces)
+    assert {voxel for voxel in found if voxel[2] < 3} == {(1, y, 2) for y in (1, 2, 3)}
+    assert {(1, y, 3) for y in (1, 2, 3)} <= found
+
+
 def test_a_box_that_fills_the_grid_loses_nothing():
     shell = vd.voxelize(vd.Box((0, 0, 0), SIDES), clip=SIDES).voxels
     assert len(shell) == 7 * 6 * 5 - 5 * 4 * 3
