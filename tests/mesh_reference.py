@@ -196,7 +196,7 @@ def thin_parts(triangles, lit, sides, oriented):  # noqa: C901 - one rule after 
     more = set()
     for (_, corners), points in meetings.items():
         if not lit & set(corners):
-            more |= nearest(corners, points, oriented) & grid
+            more |= nearest(corners, points, sides, oriented) & grid
     done = lit | more
     grains = {}
     for triangle in triangles:
@@ -215,11 +215,11 @@ def thin_parts(triangles, lit, sides, oriented):  # noqa: C901 - one rule after 
             middle = tuple(
                 (min(p[k] for p in points) + max(p[k] for p in points)) / 2 for k in range(3)
             )
-            more |= nearest(corners, {middle}, oriented) & grid
+            more |= nearest(corners, {middle}, sides, oriented) & grid
     return more
 
 
-def nearest(corners, points, oriented):
+def nearest(corners, points, sides, oriented):
     distance = {
         corner: min(
             sum((k + HALF - c) ** 2 for k, c in zip(corner, point, strict=True)) for point in points
@@ -227,7 +227,10 @@ def nearest(corners, points, oriented):
         for corner in corners
     }
     best = {corner for corner in corners if distance[corner] == min(distance.values())}
-    return best if oriented else {max(best)}
+    if oriented:
+        return best
+    # The upper one, but none beyond the upper wall.
+    return {max(best, key=lambda v: (all(k < n for k, n in zip(v, sides, strict=True)), v))}
 
 
 def winding(vertices, faces, voxel):

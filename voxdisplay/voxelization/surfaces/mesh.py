@@ -102,7 +102,7 @@ def shell(
         walls = (sides[0] + _MARGIN, sides[1] + _MARGIN, sides[2] + _MARGIN)
     mask = lit_mask(topology.mesh.sides)
     whole = mark_shell(mask, topology, walls)
-    thin = mark_thin_parts(mask, topology, complete=whole or not within)
+    thin = mark_thin_parts(mask, topology, walls, complete=whole or not within)
     index = mask.index()
     samples = sample_surface(mask, topology, walls, index, thin) if sampled else None
     if within:

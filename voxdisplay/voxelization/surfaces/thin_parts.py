@@ -11,6 +11,7 @@ not matter how flat parts are cut into triangles.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from voxdisplay.voxelization.surfaces.shape_edges import is_shape_edge
 from voxdisplay.voxelization.surfaces.silhouettes import silhouette_triangles
 from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, TRIANGLES_PER_BLOCK, UNIT
 from voxdisplay.voxelization.surfaces.triangle_blocks import TriangleBlock, triangle_blocks
+from voxdisplay.voxelization.voxel_box import Triple
 
 # Distances that differ by less are the same.
 SAME = 1e-9
@@ -50,7 +52,9 @@ class LitBy:
     weights: Floats
 
 
-def mark_thin_parts(mask: LitMask, topology: Topology, *, complete: bool) -> list[LitBy]:
+def mark_thin_parts(
+    mask: LitMask, topology: Topology, walls: Triple, *, complete: bool
+) -> list[LitBy]:
     """Light voxels for the parts of a mesh that its triangles' crossings miss; return them.
 
     Parameters
@@ -58,6 +62,8 @@ def mark_thin_parts(mask: LitMask, topology: Topology, *, complete: bool) -> lis
     mask : LitMask
         With the voxels of the triangles: see `mesh_shell.mark_shell`.
     topology : Topology
+    walls : (int, int, int)
+        As of `mesh_shell.mark_shell`.
     complete : bool
         Whether the mask has all voxels near to those that matter.
 
@@ -66,13 +72,13 @@ def mark_thin_parts(mask: LitMask, topology: Topology, *, complete: bool) -> lis
     if not (complete and topology.has_inside) or _has_dark_faces(mask, topology):
         for axis, dark in enumerate(dark_edges(mask, topology)):
             if len(dark.plane):
-                lit += _faces_to_light(mask, topology, axis, dark)
+                lit += _faces_to_light(mask, topology, walls, axis, dark)
     for each in lit:
         mask.mark(each.place)
     parts = [_grains(mask, block) for block in triangle_blocks(topology.mesh, TRIANGLES_PER_BLOCK)]
     grains = [part for part in parts if part is not None]
     if grains:
-        lit.append(_cells_to_light(mask, topology, np.concatenate(grains, axis=1)))
+        lit.append(_cells_to_light(mask, topology, walls, np.concatenate(grains, axis=1)))
         mask.mark(lit[-1].place)
     return lit
 
@@ -139,7 +145,7 @@ def _dark_faces(
 
 
 def _faces_to_light(
-    mask: LitMask, topology: Topology, axis: int, crossings: EdgeCrossings
+    mask: LitMask, topology: Topology, walls: Triple, axis: int, crossings: EdgeCrossings
 ) -> Iterator[LitBy]:
     """Yield the corners to light in dual faces without a lit corner."""
     faces = _dark_faces(mask, topology, axis, crossings)
@@ -154,7 +160,7 @@ def _faces_to_light(
     distance = np.stack([np.where(exists, d, np.inf)[rows] for _, _, d, exists in corners])
     for place, near in _nearest_corners(
         mask,
-        topology,
+        None if topology.has_inside else walls,
         axis,
         group,
         distance,
@@ -207,7 +213,7 @@ def _groups(key: Ints) -> Ints:
 
 def _nearest_corners(
     mask: LitMask,
-    topology: Topology,
+    walls: Triple | None,
     axis: int,
     group: Ints,
     distance: Floats,
@@ -218,21 +224,25 @@ def _nearest_corners(
     """Yield places of the corners that are nearest in their group, and the rows they belong to.
 
     Of several that are as near, closed and oriented meshes light all, so that mirrored meshes have
-    mirrored voxels; others the upper one, as on the faces of voxels.
+    mirrored voxels; others, which have ``walls``, the upper one, but none beyond an upper wall, as
+    on the faces of voxels.
     """
     least = np.full(int(group.max()) + 1, np.inf)
     for each in distance:
         np.minimum.at(least, group, each)
     done = np.zeros(len(least), dtype=bool)
-    for k in reversed(range(len(distance))):
+    sides = mask.sides[(axis + 1) % 3], mask.sides[(axis + 2) % 3]
+    for beyond, k in itertools.product((False, True), reversed(range(len(distance)))):
         near = distance[k] <= least[group] + SAME
-        if not topology.has_inside:
-            near &= ~done[group]
+        if walls:
+            high = (i[k] >= walls[(axis + 1) % 3]) | (j[k] >= walls[(axis + 2) % 3])
+            near &= ~done[group] & (high == beyond)
+        elif beyond:
+            return
         rows = np.flatnonzero(near)
         done[group[rows]] = True
-        nu, nv = mask.sides[(axis + 1) % 3], mask.sides[(axis + 2) % 3]
         p, q = i[k][rows], j[k][rows]
-        inside = (p >= 0) & (p < nu) & (q >= 0) & (q < nv)
+        inside = (p >= 0) & (p < sides[0]) & (q >= 0) & (q < sides[1])
         inside &= (level[rows] >= 0) & (level[rows] < mask.sides[axis])
         place = mask.locate(axis, p[inside], q[inside], level[rows][inside])
         yield place, rows[inside]
@@ -281,7 +291,7 @@ def _dual_cells(point: Ints) -> tuple[Ints, Bools]:
     return (point - HALF) >> SHIFT, (point - HALF) & (UNIT - 1) == 0
 
 
-def _cells_to_light(mask: LitMask, topology: Topology, grains: Ints) -> LitBy:
+def _cells_to_light(mask: LitMask, topology: Topology, walls: Triple, grains: Ints) -> LitBy:
     """Return the corners nearest to the middle of what is in each dual cell."""
     low, high = grains[:3], grains[3:6]
     cell, on_wall = _dual_cells(low)
@@ -294,6 +304,8 @@ def _cells_to_light(mask: LitMask, topology: Topology, grains: Ints) -> LitBy:
     middle = bounds[0] - bounds[1]  # twice that
     # On a voxel's face both sides are as near.
     level, tied = middle >> (SHIFT + 1), middle & (2 * UNIT - 1) == 0
+    if not topology.has_inside:
+        level -= tied & (level == np.array(walls)[:, None])
     first = np.full(size, np.iinfo(np.int64).max)
     np.minimum.at(first, group, grains[6])
     places, triangles = [], []
