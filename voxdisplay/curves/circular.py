@@ -6,6 +6,7 @@ All have exact derivatives and enclosures.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +14,12 @@ import numpy as np
 from voxdisplay.compute.array_types import Evaluate, Floats, Ints
 from voxdisplay.curves import arguments
 from voxdisplay.curves.curve import Curve
-from voxdisplay.curves.orthonormal_basis import orthonormal_basis
+from voxdisplay.curves.orthonormal_basis import orthonormal_bases, orthonormal_basis
 from voxdisplay.expressions.interval import Interval
 from voxdisplay.expressions.trigonometric_intervals import cos, sin
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -33,6 +34,9 @@ class _Helical(Curve):
     family = "helical"
     always_defined = True
     thread_safe = True
+    t_range = (0.0, math.tau)
+    closed: bool | None = True
+    _numbers: Floats  # (4, 3): center, a, b, rise; one array, as there may be many curves
 
     def __init__(
         self,
@@ -46,9 +50,24 @@ class _Helical(Curve):
     ) -> None:
         self.t_range = t_range
         self.closed = closed
-        self._center = arguments.vector("center", center)[:, None]
-        self._a, self._b = a[:, None], b[:, None]
-        self._rise = np.zeros((3, 1)) if rise is None else rise[:, None]
+        still = np.zeros(3) if rise is None else rise
+        self._numbers = np.array((arguments.vector("center", center), a, b, still))
+
+    @property
+    def _center(self) -> Floats:
+        return self._numbers[0, :, None]
+
+    @property
+    def _a(self) -> Floats:
+        return self._numbers[1, :, None]
+
+    @property
+    def _b(self) -> Floats:
+        return self._numbers[2, :, None]
+
+    @property
+    def _rise(self) -> Floats:
+        return self._numbers[3, :, None]
 
     @property
     def min_length(self) -> float:
@@ -68,19 +87,18 @@ class _Helical(Curve):
     @np.errstate(all="ignore")
     def position(self, t: Floats) -> Floats:
         """Return the points at t, (n,), as a (3, n) float64 array."""
-        return _helical_position(self._center, self._a, self._b, self._rise, t)
+        center, a, b, rise = self._numbers[:, :, None]
+        return _helical_position(center, a, b, rise, t)
 
     @staticmethod
     def batch_evaluator(curves: Sequence[_Helical]) -> Evaluate:
         """Return an evaluator of helical curves: see `Curve.batch_evaluator`."""
-        center = np.concatenate([curve._center for curve in curves], axis=1)
-        a = np.concatenate([curve._a for curve in curves], axis=1)
-        b = np.concatenate([curve._b for curve in curves], axis=1)
-        rise = np.concatenate([curve._rise for curve in curves], axis=1)
+        numbers = np.array([curve._numbers for curve in curves]).reshape(-1, 12).T.copy()
 
         @np.errstate(all="ignore")
         def evaluate(which: Ints, t: Floats) -> Floats:
-            return _helical_position(center[:, which], a[:, which], b[:, which], rise[:, which], t)
+            center, a, b, rise = numbers.take(which, axis=1).reshape(4, 3, -1)
+            return _helical_position(center, a, b, rise, t)
 
         return evaluate
 
@@ -144,7 +162,44 @@ class Circle(_Helical):
         radius = arguments.positive("radius", radius)
         u, v, _ = orthonormal_basis("normal", normal)
         super().__init__(center, radius * u, radius * v, closed=closed)
-        self._arguments = {"center": self._center[:, 0], "radius": radius, "normal": normal}
+        self._radius, self._normal = radius, normal
+
+    @cached_property
+    def _arguments(self) -> Mapping[str, object]:  # type: ignore[override]  # made when it is shown
+        return {"center": self._numbers[0], "radius": self._radius, "normal": self._normal}
+
+    @classmethod
+    @np.errstate(all="ignore")
+    def many(
+        cls, center: Floats, radius: Floats, normal: Floats, closed: Sequence[bool]
+    ) -> list[Circle | None]:
+        """Return many circles, which cost less than one by one; None where an argument is wrong.
+
+        Parameters
+        ----------
+        center, normal : (n, 3) float64 array
+        radius : (n,) float64 array
+        closed : sequence of bool
+
+        """
+        u, v, good = orthonormal_bases(normal)
+        good &= (radius > 0) & (radius <= arguments.MAX_MAGNITUDE)
+        for points in center, normal:
+            good &= (np.abs(points) <= arguments.MAX_MAGNITUDE).all(axis=1)
+        size = radius[:, None]
+        numbers = np.stack((center, size * u, size * v, np.zeros_like(center)), axis=1)
+        circles: list[Circle | None] = []
+        rows = zip(numbers, radius.tolist(), normal, closed, good.tolist(), strict=True)
+        for row, own_radius, own_normal, is_closed, is_good in rows:
+            if not is_good:
+                circles.append(None)
+                continue
+            circle = cls.__new__(cls)
+            circle._numbers, circle._radius, circle._normal = row, own_radius, own_normal
+            if not is_closed:
+                circle.closed = False
+            circles.append(circle)
+        return circles
 
 
 class Arc(_Helical):

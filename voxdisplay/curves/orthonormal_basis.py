@@ -16,7 +16,7 @@ import numpy as np
 from voxdisplay.curves import arguments
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from voxdisplay.compute.array_types import Floats
 
@@ -51,3 +51,33 @@ def orthonormal_basis(name: str, direction: ArrayLike) -> tuple[Floats, Floats, 
 def _norm(parts: list[float]) -> float:
     row = np.array(parts)
     return math.sqrt(row.dot(row))
+
+
+def orthonormal_bases(directions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Return u and v, (n, 3) each, of many directions, (n, 3): to the bit `orthonormal_basis`.
+
+    Also where there are any, (n,): a direction of length 0 has none.
+    """
+    most = np.abs(directions).max(axis=1)
+    parts = directions / np.where(most > 0, most, 1.0)[:, None]
+    length = _norms(parts)
+    there = length > 0
+    parts = parts / np.where(there, length, 1.0)[:, None]
+    x, y, z = parts.T
+    across = np.array([math.hypot(*pair) >= 1e-9 for pair in parts[:, 1:].tolist()], dtype=bool)
+    u = np.stack(
+        (
+            np.where(across, 1.0 - x * x, -y * x),
+            np.where(across, -x * y, 1.0 - y * y),
+            np.where(across, -x * z, -y * z),
+        ),
+        axis=1,
+    )
+    u /= _norms(u)[:, None]
+    a, b, c = u.T
+    return u, np.stack((y * c - z * b, z * a - x * c, x * b - y * a), axis=1), there
+
+
+def _norms(rows: Floats) -> Floats:
+    # By the same function as `_norm`, which may round otherwise than a sum of products.
+    return np.sqrt([row.dot(row) for row in rows])

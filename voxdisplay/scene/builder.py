@@ -6,6 +6,7 @@ tell by identity what has not changed. Must not know JSON text but to name place
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -40,6 +41,8 @@ T = TypeVar("T")
 
 MAX_ITEMS = 100_000
 """Most objects of a scene, repeats counted each."""
+MIN_COLUMN = 8
+"""Fewer objects of a type are built alone."""
 MAX_DEPTH = 32
 """Deepest nesting of groups."""
 
@@ -120,9 +123,28 @@ class SceneBuilder:
 
         """
         run = _Run(self, time, fit)
-        for path, scene_object in self._objects:
-            run.add(scene_object, path, self._environment, fit, None, 0)
+        simple = {} if self._environment.varies or fit else self._built_in_columns()
+        for i, (path, scene_object) in enumerate(self._objects):
+            curve = simple.get(i)
+            if curve is None:
+                run.add(scene_object, path, self._environment, fit, None, 0)
+            else:
+                run.add_simple(scene_object, path, curve)
         return Built(tuple(run.items), tuple(run.spans), tuple(dict.fromkeys(run.notes)))
+
+    def _built_in_columns(self) -> dict[int, Curve]:
+        """Return the curves of simple objects of plain numbers, by index; built type by type."""
+        members = defaultdict(list)
+        for i, (_, scene_object) in enumerate(self._objects):
+            if scene_object.is_simple:
+                members[type(scene_object)].append(i)
+        found: dict[int, Curve] = {}
+        for kind, indices in members.items():
+            if len(indices) >= MIN_COLUMN:
+                shapes = kind.build_plain([self._objects[i][1] for i in indices])
+                # Those that are None are built alone, and so are all of a type that has no columns.
+                found.update((i, shape) for i, shape in zip(indices, shapes, strict=False) if shape)
+        return found
 
     def once(
         self,
@@ -183,6 +205,7 @@ class _Run:
         self._count = 0
         self._copies = 1  # of the object that is added now, by all repeats around it
         self.notes: list[str] = []
+        self._colors: dict[Any, Any] = {None: WHITE}  # of simple objects, by their texts
 
     def add(
         self,
@@ -267,6 +290,19 @@ class _Run:
         if scene_object.part is not None:
             begin, end = context.numbers("part", scene_object.part).tolist()
             self.spans.append(PartSpan(first, len(self.items), begin, end))
+
+    def add_simple(self, scene_object: SceneObject, path: str, curve: Curve) -> None:
+        """Add a simple object of which the curve has been built."""
+        self._count += 1
+        if self._count > MAX_ITEMS or len(self.items) >= MAX_ITEMS:
+            raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
+        text = scene_object.color
+        colors = self._colors.get(text)
+        if colors is None:
+            colors = self._colors[text] = read_colors(text, f"{path}.color")
+            colors.flags.writeable = False  # of several items
+        tag = str(scene_object.__struct_config__.tag)
+        self.items.append(SceneItem(tag, curve, colors, path, self.builder.source, None, self.fit))
 
     def _is_during(self, scene_object: SceneObject, context: EvaluationContext) -> bool:
         """Return whether an object is there at the present time."""

@@ -4,8 +4,10 @@ Descriptions and types of the keys are those of the JSON Schema. Values are chec
 it must not know files. In angles, ``deg`` is a constant: ``"90*deg"``.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
+import numpy as np
 from msgspec import Meta, field
 
 from voxdisplay import bodies, curves
@@ -144,6 +146,23 @@ class Circle(CurveObject, tag="circle", frozen=True):
             context.numbers("normal", self.normal),
             closed=self.closed is not False,
         )
+
+    @classmethod
+    def build_plain(cls, objects: Sequence["Circle"]) -> list[curves.Curve | None]:
+        """Return many circles: `SceneObject.build_plain`."""
+        rows = [
+            (*each.center, *each.normal, each.radius) if each.thickness is None else ("",)
+            for each in objects
+        ]
+        found: list[curves.Curve | None] = [None] * len(objects)
+        plain = [i for i, row in enumerate(rows) if set(map(type, row)) == {float}]
+        if plain:
+            table = np.array([rows[i] for i in plain])
+            closed = [objects[i].closed is not False for i in plain]
+            circles = curves.Circle.many(table[:, :3], table[:, 6], table[:, 3:6], closed)
+            for i, circle in zip(plain, circles, strict=True):
+                found[i] = circle
+        return found
 
 
 class Ellipse(CurveObject, tag="ellipse", frozen=True):

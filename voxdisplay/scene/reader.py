@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 
 from voxdisplay.argument_checks import wrong_kind
+from voxdisplay.compute.garbage_collection import garbage_collection_paused
 from voxdisplay.errors import SceneError, did_you_mean, similar_file
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
@@ -120,17 +121,22 @@ def _read(data: bytes | str, folder: Path | None, file: str | None) -> Scene:
         )
     source = JsonText(data if isinstance(data, str) else _decode(data, file), file)
     try:
-        raw = source.parse()
+        with garbage_collection_paused():
+            return _scene(_parsed(source, data), folder, source)
+    except SceneError as error:
+        raise source.add_location(error) from error.__cause__
+
+
+def _parsed(source: JsonText, data: bytes | str) -> Any:
+    """Return the value of a text; raise SceneError that says what it is if it is no scene."""
+    try:
+        return source.parse()
     except SceneError as error:
         start = data[:4096].encode(errors="replace") if isinstance(data, str) else data
         if foreign := recognise(start):
             problem = f"this is {foreign.kind}, not a scene"
-            raise SceneError(problem, path="", hint=foreign.hint, file=file) from error
+            raise SceneError(problem, path="", hint=foreign.hint, file=source.file) from error
         raise
-    try:
-        return _scene(raw, folder, source)
-    except SceneError as error:
-        raise source.add_location(error) from error.__cause__
 
 
 def _decode(data: bytes, file: str | None) -> str:
@@ -160,6 +166,7 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
         built = SceneBuilder([scene_object], ["$"], environment, files, source).build()
         return Scene(files.size, built.items, built.notes, built.spans)
     file: SceneFile = _convert(raw, SceneFile, source)
+    del raw  # of a large scene, it takes more memory than the rest
     paths = [f"$.objects[{i}]" for i in range(len(file.objects))]
     notes = () if file.objects else ("the scene has no objects: there is nothing to show",)
     if file.duration is not None:

@@ -3,7 +3,8 @@
 It must not know object types.
 """
 
-from typing import Annotated, ClassVar
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta, Struct
 
@@ -54,6 +55,12 @@ class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=
         ),
     ] = None
 
+    @property
+    def is_simple(self) -> bool:
+        """True if it is there once, whole, as it is, in colours that depend on nothing."""
+        more = self.transform or self.repeat or self.during or self.part
+        return not more and (self.color is None or isinstance(self.color, str))
+
     def build(self, context: EvaluationContext) -> list[Curve | Body]:
         """Return what the object is made of, in drawing order.
 
@@ -64,3 +71,12 @@ class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=
 
         """
         raise NotImplementedError
+
+    @classmethod
+    def build_plain(cls, objects: Sequence[Any]) -> list[Curve | None]:  # noqa: ARG003 - for those that can
+        """Return the curves of many objects of this type, read in columns; empty if it has none.
+
+        None for an object that is to be built alone: one that has more than plain numbers, or a
+        wrong one, so that its error is that of `build`.
+        """
+        return []

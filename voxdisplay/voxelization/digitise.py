@@ -6,9 +6,7 @@ know how they are done.
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -19,6 +17,7 @@ import numpy as np
 
 from voxdisplay.compute import kernel_backend, parallel
 from voxdisplay.compute.array_types import Bools, Ints
+from voxdisplay.compute.garbage_collection import garbage_collection_paused
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import CurveError
 from voxdisplay.voxelization.adaptive_sampling import (
@@ -123,7 +122,7 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
     seconds = (perf_counter() - begin) / len(voxels)
     begins = bounds[:-1].tolist()
     listed = begins, ends.tolist(), closed.tolist()
-    with _garbage_collection_paused():
+    with garbage_collection_paused():
         if single.all():  # as most are
             sequences = [
                 Sequence(voxels[a:b], loop, ONE_PIECE, t[a:b], curve, seconds * (b - a))
@@ -146,22 +145,6 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
             spent = seconds * len(proven) + perf_counter() - begin
             sequences[number] = replace(proven, seconds=spent)
     return sequences
-
-
-@contextmanager
-def _garbage_collection_paused() -> Iterator[None]:
-    """Pause the garbage collector while many objects are made that all stay.
-
-    It would go through all of them again and again. If it is off, it stays off.
-    """
-    if not gc.isenabled():
-        yield
-        return
-    try:
-        gc.disable()  # in here: an interrupt may come as soon as that is done
-        yield
-    finally:
-        gc.enable()
 
 
 def _with_proof(

@@ -1,0 +1,90 @@
+"""Objects of plain numbers, which are read in columns: as if each were alone in its scene."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import voxdisplay as vd
+from voxdisplay.scene import builder
+
+COUNT = 3 * builder.MIN_COLUMN
+
+
+def circles():
+    rng = np.random.default_rng(6)
+    found = [
+        {
+            "type": "circle",
+            "center": rng.uniform(-9, 9, 3).tolist(),
+            "radius": rng.uniform(0.1, 9),
+            "normal": (rng.normal(size=3) * 10.0 ** rng.integers(-30, 30)).tolist(),
+            "color": ["teal", "#123456"][k % 2],
+        }
+        for k in range(COUNT)
+    ]
+    found[1] |= {"radius": "2*3"}
+    found[2] |= {"transform": [{"translate": [1, 2, 3]}]}
+    found[3] |= {"repeat": {"k": 2}, "radius": "1 + k"}
+    found[4] |= {"thickness": 2}
+    found[5] |= {"closed": False}
+    found[6] |= {"center": [1, 2, 3], "normal": [1, 0, 0]}
+    del found[7]["normal"], found[8]["color"]
+    found[9] |= {"color": ["red", "blue"]}
+    found[10] |= {"color": {"map": "viridis", "by": "z"}}
+    return found
+
+
+def read(objects):
+    return vd.read_scene(json.dumps({"size": [17, 17, 17], "objects": objects}, indent=1))
+
+
+def test_many_objects_are_those_that_each_is_alone() -> None:
+    many = read(circles()).items
+    alone = [item for each in circles() for item in read([each]).items]
+    t = np.linspace(0, 2 * np.pi, 9)
+    assert len(many) == len(alone) == COUNT + 1
+    for one, other in zip(many, alone, strict=True):
+        assert (one.type, repr(one.shape)) == (other.type, repr(other.shape))
+        if isinstance(one.shape, vd.Circle):
+            assert np.array_equal(one.curve.position(t), other.curve.position(t))
+            assert (one.curve.closed, one.curve.t_range) == (other.curve.closed, (0, 2 * np.pi))
+        if isinstance(one.color, np.ndarray):
+            assert np.array_equal(one.color, other.color)
+    assert [item.path for item in many[:3]] == [f"$.objects[{i}]" for i in range(3)]
+
+
+def test_a_circle_of_many_is_pickled_alone() -> None:
+    curve = read(circles()).items[-1].curve
+    alone = pickle.loads(pickle.dumps(curve))  # noqa: S301 - our own
+    assert repr(alone) == repr(curve)
+    assert len(pickle.dumps(curve)) < 1000
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"radius": -1},
+        {"radius": 0},
+        {"radius": 1e101},
+        {"center": [0, 1e101, 0]},
+        {"normal": [0, 0, 0]},
+        {"normal": [1e101, 0, 0]},
+        {"color": "grren"},
+        {"radius": "nope"},
+    ],
+)
+def test_the_first_wrong_object_is_named(wrong: dict[str, object]) -> None:
+    objects = circles()
+    place = COUNT - 5
+    objects[place] |= wrong
+    objects[-1] |= {"radius": -5}
+    with pytest.raises(vd.SceneError) as alone:
+        read([circles()[place] | wrong])
+    with pytest.raises(vd.SceneError) as many:
+        read(objects)
+    assert many.value.path.startswith(f"$.objects[{place}]")
+    assert many.value.path == alone.value.path.replace("[0]", f"[{place}]", 1)
+    assert many.value.hint == alone.value.hint
+    assert many.value.line > alone.value.line
