@@ -64,7 +64,7 @@ def farm(tmp_path_factory):
         yield address, start_worker
 
 
-@pytest.mark.parametrize("chunk_frames", [5, 20, 60])
+@pytest.mark.parametrize("chunk_frames", [1, 5, 20, 60])
 def test_the_same_bytes_as_in_one_process(farm, tmp_path, chunk_frames):
     show = Spin()
     write_recording(tmp_path / "serial.vxs", show)

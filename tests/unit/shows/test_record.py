@@ -40,7 +40,7 @@ def test_chunks_of_any_size_give_the_same_bytes(expected, tmp_path, chunk_frames
     assert seen[-1] == (40, 40)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, 2, 4])
 def test_processes_give_the_same_bytes(expected, tmp_path, jobs):
     path = tmp_path / "a.vxs"
     record(rendering(Spin()), path, engine=process_pool(jobs), chunk_frames=9)

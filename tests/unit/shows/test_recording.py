@@ -156,7 +156,8 @@ class TestWhole:
 
 
 class TestDamaged:
-    def test_all_whole_frames_before_a_cut_are_found(self, original, tmp_path):
+    @pytest.mark.parametrize("cuts", [60, pytest.param(1000, marks=pytest.mark.slow)])
+    def test_all_whole_frames_before_a_cut_are_found(self, original, tmp_path, cuts):
         _, data, frames, recording = original
         ends = []
         for number in range(recording.frame_count):
@@ -164,7 +165,7 @@ class TestDamaged:
             ends.append(found.offset + found.size)
         rng = random.Random(1)
         head = recording.recorded_frame(0).offset
-        for cut in rng.sample(range(head, len(data) - 1), 60):
+        for cut in rng.sample(range(head, len(data) - 1), cuts):
             path = tmp_path / "cut.vxs"
             path.write_bytes(data[:cut])
             left = Recording(path)
