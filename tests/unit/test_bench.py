@@ -72,4 +72,9 @@ def test_the_table_of_scale_runs():
 def test_the_table_of_playing_runs():
     command = [sys.executable, str(BENCH), "play", "--quick"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert run.stdout.count("\n") == 2 + 3 * 4
+    assert run.stdout.count("\n") == 2 + 3 * (4 + 3 * 2)
+    assert all(
+        f"{show:<19}{kind:<10}" in run.stdout
+        for show in ("rotating curve", "100 moving Beziers", "tumbling torus")
+        for kind in ("object", "scene", "recording", "playlist")
+    )

@@ -1,9 +1,11 @@
 """Benchmark of playing: frames asked, shown and dropped, and how even their swaps are.
 
 Three shows at 30 frames a second, over real ptys to an emulator in another process that is paced
-at a line's rate, and over emulated USB. Four ways: a plain loop that presents without waiting and
-sleeps, the same with `Display.clock`, and `Display.play` by the host's clock and by the device's
-ticks. "line" is what the line carries of such frames; the processor is shared by all that runs.
+at a line's rate, and over emulated USB. Each is played as an object of Python, a scene file, a
+recording of that, and a playlist of both. Ways: `Display.play` by the host's clock and by the
+device's ticks; for objects also a plain loop that presents without waiting and sleeps, and the same
+with `Display.clock`. "line" is what the line carries of such frames, 30 at most; "of it" is the
+share that was shown. The processor is shared by all that runs.
 """
 
 from __future__ import annotations
@@ -12,16 +14,25 @@ import contextlib
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import voxdisplay as vd
 from benchmarks.link import SEED
-from voxdisplay.display.plan import Line, Receiver, plan
+from voxdisplay.display.plan import Line, Receiver
+from voxdisplay.display.show_plan import plan_show
+from voxdisplay.shows.binding import Playable, bind_timeline
+from voxdisplay.shows.record import record
+from voxdisplay.shows.recording_writer import RecordingFormat, drawing_features
+from voxdisplay.shows.rendering import Rendering
 
 FPS = 30
 SIZE = (128, 128, 128)
@@ -103,11 +114,79 @@ class TumblingTorus(BenchShow):
         frame.draw(np.stack((index % 128, index // 128 % 128, index // 16384), 1), "cyan")
 
 
-SHOWS: dict[str, Callable[[float], BenchShow]] = {
-    "rotating curve": RotatingCurve,
-    "100 moving Beziers": MovingBeziers,
-    "tumbling torus": TumblingTorus,
+def curve_scene() -> list[dict[str, Any]]:
+    """Return the objects of the paper's curve, turning."""
+    return [
+        {
+            "type": "parametric",
+            "x": "64 + 40*cos(t + a)",
+            "y": "64 + 40*sin(t + a)",
+            "z": "24 + 40*(1 - cos(4*t))",
+            "t": ["-170*deg", "170*deg"],
+            "color": "#ff8800",
+        }
+    ]
+
+
+def bezier_scene() -> list[dict[str, Any]]:
+    """Return a hundred Beziers of 1200 expressions."""
+    chance = np.random.default_rng(SEED)
+    middle = chance.uniform(16, 112, (100, 1, 3)) + chance.uniform(-24, 24, (100, 4, 3))
+    phase = chance.uniform(0, 2 * np.pi, (100, 4, 3))
+
+    def point(curve: int, row: int) -> list[str]:
+        pairs = zip(middle[curve, row], phase[curve, row], strict=True)
+        return [f"clamp({m:.3f} + 8*sin({p:.3f} + a), 0.5, 127.5)" for m, p in pairs]
+
+    colors = ("orange", "#0af", "lime", "white")
+    return [
+        {"type": "bezier", "points": [point(n, row) for row in range(4)], "color": colors[n % 4]}
+        for n in range(100)
+    ]
+
+
+def torus_scene() -> list[dict[str, Any]]:
+    """Return the shell of a torus, tumbling."""
+    about = [64, 64, 64]
+    turns = [
+        {"rotate": [1, 0, 0], "angle": "a", "about": about},
+        {"rotate": [0, 0, 1], "angle": "2*a", "about": about},
+    ]
+    torus = {"type": "torus", "center": about, "major": 36, "minor": 15, "color": "cyan"}
+    return [torus | {"transform": turns}]
+
+
+SHOWS: dict[str, tuple[Callable[[float], BenchShow], Callable[[], list[dict[str, Any]]]]] = {
+    "rotating curve": (RotatingCurve, curve_scene),
+    "100 moving Beziers": (MovingBeziers, bezier_scene),
+    "tumbling torus": (TumblingTorus, torus_scene),
 }
+
+
+def files_of(
+    objects: list[dict[str, Any]], seconds: float, folder: Path
+) -> dict[str, Callable[[], Playable]]:
+    """Write a scene, a recording and a playlist; return readers of them, by their kinds."""
+    scene = {
+        "size": SIZE,
+        "duration": seconds,
+        "fps": FPS,
+        "params": {"a": f"tau*time/{_TURN_S}"},
+        "objects": objects,
+    }
+    paths = {kind: folder / f"{kind}.json" for kind in ("scene", "playlist")}
+    paths["recording"] = folder / "recording.vxs"
+    paths["scene"].write_text(json.dumps(scene))
+    half = seconds / 2
+    entries = [
+        {"show": "scene.json", "until": half},
+        {"show": "recording.vxs", "from": half},
+    ]
+    paths["playlist"].write_text(json.dumps({"playlist": entries}))
+    kind = vd.PixelFormat.RGB888
+    wanted = RecordingFormat(vd.Grid(*SIZE), kind, FPS * 1000, drawing_features(kind))
+    record(Rendering(vd.load_scene(paths["scene"]), wanted), paths["recording"])
+    return {kind: partial(vd.load_show, paths[kind]) for kind in ("scene", "recording", "playlist")}
 
 
 @dataclass(frozen=True)
@@ -152,8 +231,8 @@ def _clocked(display: vd.Display, show: BenchShow) -> Played:
     return _loop(display, show, display.clock(fps=FPS, seconds=show.duration))
 
 
-def _played(pacing: str) -> Callable[[vd.Display, BenchShow], Played]:
-    def run(display: vd.Display, show: BenchShow) -> Played:
+def _played(pacing: str) -> Callable[[vd.Display, Any], Played]:
+    def run(display: vd.Display, show: Any) -> Played:
         report = display.play(show, clock="host" if pacing == "host" else "device")
         gap = report.gap_ms
         return Played(
@@ -164,9 +243,11 @@ def _played(pacing: str) -> Callable[[vd.Display, BenchShow], Played]:
     return run
 
 
-WAYS: dict[str, Callable[[vd.Display, BenchShow], Played]] = {
+LOOPS: dict[str, Callable[[vd.Display, BenchShow], Played]] = {
     "loop, sleep": _sleeping,
     "loop, clock": _clocked,
+}
+WAYS: dict[str, Callable[[vd.Display, Any], Played]] = {
     "play, host": _played("host"),
     "play, device": _played("device"),
 }
@@ -189,26 +270,61 @@ def _port(baud: int) -> Iterator[str]:
             process.terminate()
 
 
+def _carried(show: Any, line: Line) -> float:
+    """Return the frames per second that a line carries of a show."""
+    source = bind_timeline(show, vd.Frame(SIZE), loop=False).segments[-1].show
+    costs = plan_show(Stretch(source), (line,), Receiver(refresh_hz=REFRESH_HZ))
+    bytes_of_all = costs.mean_bytes[0]
+    return min(line.bytes_per_s / max(bytes_of_all, costs.worst_plans[0].answer_bytes), REFRESH_HZ)
+
+
+class Stretch:
+    """The first frames of a show, so that little is planned."""
+
+    loop = False
+
+    def __init__(self, show: Any) -> None:
+        self.frame, self.fps = show.frame, show.fps
+        self.frame_count = min(show.frame_count, 8)
+        self.duration = self.frame_count / self.fps
+        if hasattr(show, "encoded_frame"):
+            self.encoded_frame = show.encoded_frame
+
+
 def bench_play(repeats: int, *, quick: bool = False) -> None:
-    """Print the table: each show, line and way, for twice as many seconds as repeats."""
+    """Print the table: each show, kind, line and way, for twice as many seconds as repeats."""
     seconds = 0.4 if quick else 2.0 * repeats
     print(f"shows of {FPS} frames a second, {REFRESH_HZ} Hz, {seconds:g} s each")
-    print(f"{'show':<20}{'line':>12}{'line fps':>9}  {'way':<14}{'asked':>6}{'shown':>6}"
-          f"{'dropped':>8}{'fps':>7}{'gap ms p5':>10}{'p50':>7}{'p95':>7}  ticks")  # fmt: skip
-    for name, kind in SHOWS.items():
+    print(f"{'show':<19}{'as':<10}{'line':>12}{'line fps':>9}  {'way':<13}{'asked':>6}{'shown':>6}"
+          f"{'dropped':>8}{'fps':>6}{'of it':>7}{'gap ms p5':>10}{'p50':>7}{'p95':>7}  "
+          "ticks")  # fmt: skip
+    for name, (kind, objects) in SHOWS.items():
         show = kind(seconds)
         show.frame(0)  # what is loaded with the first picture does not count
-        for baud in (12_000_000,) if quick else (*BAUDS, 0):
-            line = Line.of_baud(baud) if baud else Line("USB", 13 * 512 * 8000.0)
-            most = plan(show.frame(1), line, Receiver(refresh_hz=REFRESH_HZ)).frames_per_s
-            for way, run in WAYS.items():
-                with _port(baud) as port, vd.open(port) as display:
-                    found = run(display, show)
-                ticks = " ".join(f"{n}:{found.ticks[n]}" for n in sorted(found.ticks, key=int)[:6])
-                low, middle, high = found.gaps_ms
-                print(f"{name:<20}{line.name:>12}{min(most, FPS):>9.1f}  {way:<14}{found.asked:>6}"
-                      f"{found.shown:>6}{found.dropped:>8}{found.fps:>7.1f}{low:>10.1f}"
-                      f"{middle:>7.1f}{high:>7.1f}  {ticks}", flush=True)  # fmt: skip
+        with tempfile.TemporaryDirectory() as folder:
+            kinds: dict[str, Callable[[], Any]] = {"object": partial(_same, show)}
+            kinds |= files_of(objects(), seconds, Path(folder))
+            for baud in (12_000_000,) if quick else (*BAUDS, 0):
+                for as_, loaded in kinds.items():
+                    _bench_line(name, as_, loaded, baud)
+
+
+def _same(show: Any) -> Any:
+    return show
+
+
+def _bench_line(name: str, as_: str, loaded: Callable[[], Any], baud: int) -> None:
+    """Print the rows of one kind of a show on one line."""
+    line = Line.of_baud(baud) if baud else Line("USB", 13 * 512 * 8000.0)
+    most = min(_carried(loaded(), line), FPS)
+    for way, run in ({**LOOPS, **WAYS} if as_ == "object" else WAYS).items():
+        with _port(baud) as port, vd.open(port) as display:
+            found = run(display, loaded())
+        ticks = " ".join(f"{n}:{found.ticks[n]}" for n in sorted(found.ticks, key=int)[:6])
+        low, middle, high = found.gaps_ms
+        print(f"{name:<19}{as_:<10}{line.name:>12}{most:>9.1f}  {way:<13}{found.asked:>6}"
+              f"{found.shown:>6}{found.dropped:>8}{found.fps:>6.1f}{found.fps / most:>7.0%}"
+              f"{low:>10.1f}{middle:>7.1f}{high:>7.1f}  {ticks}", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -20,7 +20,9 @@ from voxdisplay.shows.show import EncodedFrame
 Progress = Callable[[int, int], object]
 """Called with the number of frames rendered, and of all."""
 
-_CHUNK_FRAMES = 30  # some seconds of work for a large scene, and one lost at most
+# Some seconds of work for a large scene, and one lost at most; numbers of a moving scene are
+# computed for 64 frames together, which no more than two chunks should have to do.
+_CHUNK_FRAMES = 32
 
 
 def record(
