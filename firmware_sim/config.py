@@ -26,6 +26,7 @@ FEATURES: Final = {
     "read": spec.FEATURE_READ,
     "digest": spec.FEATURE_DIGEST,
     "fade": spec.FEATURE_FADE,
+    "arc2": spec.FEATURE_ARC2,
 }
 _INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the format INDEX8
 _COLORED: Final = frozenset(("fade",))  # not with MONO1

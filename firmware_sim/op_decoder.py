@@ -5,7 +5,7 @@ grid.
 """
 
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import accumulate
 from typing import Final
 
@@ -200,9 +200,19 @@ class _PacketDecoder:
         self._draw_chain(octant, count, crumbs)
 
     def arc(self, _: int) -> None:
-        pieces = decode_chains(self._operands, self._grid, self._format, self._pen)
+        self._draw_pieces(decode_chains(self._operands, self._grid, self._format, self._pen))
+
+    def arc2(self, _: int) -> None:
+        pen = self._fade or self._pen
+        self._draw_pieces(decode_chains(self._operands, self._grid, self._format, pen, second=True))
+
+    def _draw_pieces(self, pieces: Iterable[tuple[bytes | fades.Fade, list[int]]]) -> None:
         for pen, voxels in pieces:
-            self._page.plot(array("Q", set(voxels)), pen)
+            if isinstance(pen, fades.Fade):
+                for voxel, pixel in pen.pens(voxels, again=False):
+                    self._page.plot(array("Q", (voxel,)), pixel)
+            else:
+                self._page.plot(array("Q", set(voxels)), pen)
 
     def _draw_chain(self, octant: int, count: int, raw: bytes) -> None:
         self._check_cursor()
@@ -317,6 +327,7 @@ def _op_table(features: int) -> list[_Op | None]:
         (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _PacketDecoder.step),
         (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _PacketDecoder.from_),
         (spec.FEATURE_ARC, spec.OP_ARC, 0, _PacketDecoder.arc),
+        (spec.FEATURE_ARC2, spec.OP_ARC2, 0, _PacketDecoder.arc2),
         (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _PacketDecoder.brick),
         (None, spec.OP_SKIP, last, _PacketDecoder.skip),
         (None, spec.OP_RUN, last, _PacketDecoder.run),

@@ -1,4 +1,4 @@
-"""Decoder of range-coded chains, the op ARC, into pieces of one pen each (7.7).
+"""Decoder of range-coded chains, the ops ARC and ARC2, into pieces of one pen each (7.7, 7.10).
 
 Draws nothing. Refuses steps off the grid at once, because what follows them has no meaning.
 """
@@ -7,11 +7,14 @@ from collections.abc import Iterator
 from typing import Final
 
 from firmware_sim import spec
+from firmware_sim.fades import Blend, Fade
 from firmware_sim.grid import Grid
 from firmware_sim.memory import PixelFormat
 from firmware_sim.operands import Operands
 from firmware_sim.range_decoder import RangeDecoder
 
+_SIDE_BITS: Final = 10  # of a coordinate in a Morton index
+_STOP_BITS: Final = 4  # of the number of a fade's colours
 _HISTORY: Final = 0x7F  # mask of seven steps
 _OTHERS: Final = 0x3F  # mask of the six before the latest
 
@@ -67,9 +70,14 @@ class _Axis:
 
 
 def decode_chains(
-    operands: Operands, grid: Grid, pixel_format: PixelFormat, pen: bytes
-) -> Iterator[tuple[bytes, list[int]]]:
-    """Decode an ARC.
+    operands: Operands,
+    grid: Grid,
+    pixel_format: PixelFormat,
+    pen: bytes | Fade,
+    *,
+    second: bool = False,
+) -> Iterator[tuple[bytes | Fade, list[int]]]:
+    """Decode an ARC or ARC2.
 
     Parameters
     ----------
@@ -79,10 +87,12 @@ def decode_chains(
         Those of the page.
     pen
         The pen before the op.
+    second
+        True for ARC2.
 
     Yields
     ------
-    pen : bytes
+    pen : bytes or Fade
         The pen of a piece.
     voxels : list of int
         Indices of its voxels, possibly repeated.
@@ -90,23 +100,21 @@ def decode_chains(
     Raises
     ------
     PacketError
-        TRUNCATED, PADDING or OUTSIDE, after the pieces before have been yielded.
+        TRUNCATED, PADDING, OUTSIDE or COUNT, after the pieces before have been yielded.
     """
     bits = RangeDecoder(
         operands.remaining(),
         lambda: operands.error(spec.CODE_TRUNCATED, "the payload ends inside the op"),
     )
     axes = [_Axis(side) for side in grid.sides]
-    pixel_bits = 1 if pixel_format.code == spec.FORMAT_MONO1 else 8 * pixel_format.size
-    first = True
+    has_near = second and max(grid.sides) <= spec.ARC2_MAX_SIDE
+    latest: int | None = None  # Morton index of the latest start
     while bits.bit(spec.ARC_MORE):
-        jump = first or bits.bit(spec.ARC_JUMP)
-        first = False
+        jump = latest is None or bits.bit(spec.ARC_JUMP)
         if bits.bit(spec.ARC_INK):
-            pen = bits.plain_bits(pixel_bits).to_bytes(pixel_format.size, "little")
+            pen = _pen(bits, operands, pixel_format, second=second)
         if jump:
-            for axis in axes:
-                axis.reset(bits.plain_bits(axis.bits))
+            latest = _start(bits, operands, axes, latest if has_near else None)
         count = bits.number()
         voxels = []
         if jump:
@@ -117,6 +125,51 @@ def decode_chains(
         yield pen, voxels
     if not bits.exhausted:
         raise operands.error(spec.CODE_PADDING, "bytes behind the last bit")
+
+
+def _pen(
+    bits: RangeDecoder, operands: Operands, pixel_format: PixelFormat, *, second: bool
+) -> bytes | Fade:
+    """Decode the pen of a piece."""
+    mono = pixel_format.code == spec.FORMAT_MONO1
+    if not second or mono or not bits.bit(spec.ARC2_FADE):
+        pixel = bits.plain_bits(1 if mono else 8 * pixel_format.size)
+        return pixel.to_bytes(pixel_format.size, "little")
+    stops = bits.plain_bits(_STOP_BITS) + 1
+    count = bits.number() + 1
+    place = bits.number()
+    if place >= count:
+        raise operands.error(spec.CODE_COUNT, f"voxel {place} of {count}")
+    size = 1 if pixel_format.code == spec.FORMAT_INDEX8 else 3
+    colors = [bytes(bits.plain_bits(8) for _ in range(size)) for _ in range(stops)]
+    return Fade(pixel_format.code, Blend(colors, count, place))
+
+
+def _start(bits: RangeDecoder, operands: Operands, axes: list[_Axis], latest: int | None) -> int:
+    """Decode where a piece begins, and return its Morton index.
+
+    ``latest`` is that of the latest start, or None if none can be near.
+    """
+    if latest is not None and bits.bit(spec.ARC2_NEAR):
+        latest += bits.number(spec.ARC2_DELTA, spec.ARC2_MAX_DELTA)
+        if latest >> 3 * _SIDE_BITS:
+            raise operands.error(spec.CODE_OUTSIDE, f"Morton index {latest}")
+        for shift, axis in enumerate(axes):
+            axis.reset(_every_third_bit(latest >> shift))
+        return latest
+    for axis in axes:
+        axis.reset(bits.plain_bits(axis.bits))
+    return sum(_spread_bits(axis.coordinate) << shift for shift, axis in enumerate(axes))
+
+
+def _spread_bits(number: int) -> int:
+    """Return a number with two zeros between its bits, which are at most ten that matter."""
+    return int(f"{number:b}", 8)
+
+
+def _every_third_bit(number: int) -> int:
+    """Return bits 0, 3, 6, ... of a number as bits 0, 1, 2, ..."""
+    return int("".join(str(int(digit) & 1) for digit in f"{number:o}"), 2)
 
 
 def _checked_index(operands: Operands, grid: Grid, axes: list[_Axis]) -> int:

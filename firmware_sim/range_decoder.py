@@ -28,8 +28,8 @@ class RangeDecoder:
     def __init__(self, data: bytes, cut_off: Callable[[], Exception]) -> None:
         self._data = data + bytes(spec.ARC_BEHIND)
         self._cut_off = cut_off
-        self._chances = [spec.ARC_HALF] * spec.ARC_MODELS
-        self._seen = [0] * spec.ARC_MODELS
+        self._chances = [spec.ARC_HALF] * spec.ARC2_MODELS  # those of ARC are the first
+        self._seen = [0] * spec.ARC2_MODELS
         self._range = _RANGE
         self._code = int.from_bytes(self._data[:_BEGIN], "big")
         self._at = _BEGIN
@@ -87,9 +87,9 @@ class RangeDecoder:
             value = value << 1 | self._decode((self._range >> _SHIFT) * _ONE)
         return value
 
-    def number(self) -> int:
-        """Decode a number from 0 to 65534."""
+    def number(self, first: int = spec.ARC_COUNT, longest: int = spec.ARC_MAX_K) -> int:
+        """Decode a number, from 0 to 65534 with the models of COUNT."""
         k = 0
-        while k < spec.ARC_MAX_K and self.bit(spec.ARC_COUNT + k):
+        while k < longest and self.bit(first + k):
             k += 1
         return (1 << k) - 1 + self.plain_bits(k)

@@ -68,6 +68,7 @@ FEATURE_PALETTE: Final = 6
 FEATURE_READ: Final = 7
 FEATURE_DIGEST: Final = 8
 FEATURE_FADE: Final = 10
+FEATURE_ARC2: Final = 11
 
 # 6 DATA, frames and pages
 DATA_FLAG_CLEAR: Final = 1
@@ -86,6 +87,7 @@ OP_RAMP: Final = 0x09
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
 OP_ARC: Final = 0x58
+OP_ARC2: Final = 0x5A
 OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
 OP_RUN: Final = 0xA0
@@ -107,6 +109,13 @@ ARC_ENOUGH: Final = 6
 ARC_BEHIND: Final = 3
 ARC_MAX_K: Final = 15
 ARC_MAX_RUN: Final = 255
+
+ARC2_NEAR: Final = 266
+ARC2_FADE: Final = 267
+ARC2_DELTA: Final = 268
+ARC2_MODELS: Final = 298
+ARC2_MAX_DELTA: Final = 30
+ARC2_MAX_SIDE: Final = 1024
 
 # 8 The digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1

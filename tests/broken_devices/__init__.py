@@ -16,6 +16,7 @@ from broken_devices import (  # noqa: F401 - each registers its own
     range_coded_chains,
     reads,
     refusals,
+    second_chains,
     shapes,
 )
 from broken_devices.mutant import MUTANTS as MUTANTS

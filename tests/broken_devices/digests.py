@@ -19,6 +19,7 @@ EVERY_DIGEST = (
 
 
 @mutant(
+    "7.9/ramps",
     *EVERY_DIGEST,
     "8/given-up",
     likely="adds dark voxels",
@@ -51,6 +52,7 @@ def digest_forgets_to_take_out(patch):
 
 
 @mutant(
+    "7.9/ramps",
     *EVERY_DIGEST,
 )
 def digest_of_the_back_page(patch):

@@ -41,6 +41,12 @@ def z_runs_fastest(patch):
 
 
 @mutant(
+    "7.9/fade-chains",
+    "7.9/fade-cursor-set",
+    "7.9/fade-ended",
+    "7.9/fade-goes-on",
+    "7.9/fade-past-its-end",
+    "7.9/fade-rounding",
     "7.1/octants",
     "7.1/from",
     "7.1/chain-lengths",
@@ -61,6 +67,13 @@ def step_one_too_few(patch):
 
 
 @mutant(
+    "7.9/fade-chains",
+    "7.9/fade-cursor-set",
+    "7.9/fade-ended",
+    "7.9/fade-goes-on",
+    "7.9/fade-past-its-end",
+    "7.9/fade-rounding",
+    "7.9/fade-runs",
     "7.1/octants",
     "7.1/from",
     "7.1/chain-lengths",
@@ -78,18 +91,22 @@ def octant_signs(patch):
     )
 
 
-@mutant("7.1/octants", "7.1/from", likely="bit 0 is for axis main + 1")
+@mutant("7.9/fade-chains", "7.1/octants", "7.1/from", likely="bit 0 is for axis main + 1")
 def crumb_bits_swapped(patch):
     swapped = [bytes((0, 2, 1, 3)[c] for c in row) for row in op_decoder._CRUMBS]
     patch.setattr(op_decoder, "_CRUMBS", swapped)
 
 
-@mutant("7.1/octants", "7.1/from", likely="lowest bits")
+@mutant("7.9/fade-chains", "7.1/octants", "7.1/from", likely="lowest bits")
 def crumbs_high_first(patch):
     patch.setattr(op_decoder, "_CRUMBS", [row[::-1] for row in op_decoder._CRUMBS])
 
 
 @mutant(
+    "7.9/fade-chains",
+    "7.9/fade-cursor-set",
+    "7.9/fade-ended",
+    "7.9/fade-rounding",
     "7.1/octants",
     "7.1/from",
     "7.1/chain-lengths",
@@ -107,7 +124,13 @@ def chain_start_left_out(patch):
     around(patch, Decoder, "_draw_chain", walk)
 
 
-@mutant("7.1/chain-cursor", likely="stayed at the first")
+@mutant(
+    "7.9/fade-cursor-set",
+    "7.9/fade-goes-on",
+    "7.9/fade-past-its-end",
+    "7.1/chain-cursor",
+    likely="stayed at the first",
+)
 def chain_cursor_stays(patch):
     def walk(old, self, octant, count, raw):
         first = self._cursor
@@ -159,7 +182,7 @@ def leb128_asks_for_a_sixth_byte(patch):
     around(patch, Operands, "count", count)
 
 
-@mutant("7.2/literal-pen", "7.5/difference-pen", likely="left as it was")
+@mutant("7.9/fade-ended", "7.2/literal-pen", "7.5/difference-pen", likely="left as it was")
 def literal_leaves_pen(patch):
     def write(old, self, count, pixels):
         pen = self._pen

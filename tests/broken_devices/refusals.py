@@ -15,6 +15,11 @@ def _refused(patch, change):
 
 
 @mutant(
+    "7.10/arc2-fade-refused",
+    "7.10/arc2-outside",
+    "7.10/arc2-refused",
+    "7.9/fade-refused",
+    "7.9/ramp-refused",
     "4/read-fields",
     "5/session-zero",
     "6/waits-unchecked",

@@ -54,7 +54,7 @@ def shape_cursor_stays(patch):
         on_op(patch, name, stay)
 
 
-@mutant("7.3/dots", "7.3/dots-cursor", "7.8/shapes-outside")
+@mutant("7.9/fade-runs", "7.3/dots", "7.3/dots-cursor", "7.8/shapes-outside")
 def dots_one_too_few(patch):
     def places(old, self, count):
         axes = old(self, count)
@@ -134,6 +134,6 @@ def palette_not_cleared(patch):
     around(patch, Page, "clear", clear)
 
 
-@mutant("7.6/colors", "7.6/palette-of-a-page", likely="palette is not in the digest")
+@mutant("7.9/ramps", "7.6/colors", "7.6/palette-of-a-page", likely="palette is not in the digest")
 def palette_not_in_the_digest(patch):
     around(patch, Page, "_color_terms", lambda old, self, place: 0)

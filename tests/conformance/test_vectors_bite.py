@@ -13,10 +13,20 @@ import pytest
 SPEC_MUTATIONS = Path(__file__).parents[1] / "spec_mutations.py"
 
 # No byte on the wire depends on these: the referee compares them with the document.
-RESERVED = {"FEATURE_ARC"}
+RESERVED = {"FEATURE_ARC", "FEATURE_ARC2"}
 MADE_OF_OTHERS = {"LAYOUT_HEADER", "CRC_WIDTH", "CRC_REFIN", "CRC_REFOUT", "CRC_CHECK"}
 # The driver takes these for more voxels than a vector has: unit tests hold them.
-CHOSEN = {"OP_LINE", "OP_BOX", "OP_DOTS", "OP_FADE", "OP_RAMP", "FEATURE_FADE", "LIMIT_MAX_FADE"}
+CHOSEN = {
+    "ARC2_MAX_SIDE",
+    "OP_ARC2",
+    "OP_LINE",
+    "OP_BOX",
+    "OP_DOTS",
+    "OP_FADE",
+    "OP_RAMP",
+    "FEATURE_FADE",
+    "LIMIT_MAX_FADE",
+}
 OF_THE_OTHER_SIDE = {
     "driver": {"LIMIT_MAX_SILENT", "LIMIT_MAX_OCTANT", "LIMIT_MAX_SIDE"} | CHOSEN,
     "device": {"LIMIT_MAX_STATUS"},
@@ -35,8 +45,9 @@ CARRIER = {f"USB_{n}" for n in ("CLASS", "SUBCLASS", "PROTOCOL", "TEST_VENDOR", 
 TOLD_APART = {
     f"ARC_{name}" for name in ("COUNT", "LONE", "TURN", "MAIN", "HISTORY", "RUNS", "MODELS")
 }
+TOLD_APART |= {f"ARC2_{name}" for name in ("NEAR", "FADE", "DELTA", "MODELS")}
 # Seen 6 times or 7, a model learns as fast; curves are longer than a vector in tests of units only.
-LONGER = {"ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN"}
+LONGER = {"ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN", "ARC2_MAX_DELTA"}
 # The document has no vector for these yet.
 AWAITED = {
     "driver": {"ARC_BEHIND"},  # of who reads

@@ -24,6 +24,7 @@ _OPS = {
     spec.OP_FADE: "FADE",
     spec.OP_RAMP: "RAMP",
     spec.OP_ARC: "ARC",
+    spec.OP_ARC2: "ARC2",
     spec.OP_STEP: "STEP",
     spec.OP_FROM: "FROM",
     spec.OP_OCT: "OCT",
@@ -86,7 +87,7 @@ class AnnotatingDecoder(ReferenceDecoder):
     def _describe_op(self, op: int, at: int, pen: int) -> str:
         operands = self._payload[at + 1 : self._at]
         words = [f"{op_name(op):6}"]
-        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op != spec.OP_ARC:
+        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op not in {spec.OP_ARC, spec.OP_ARC2}:
             main, signs = self.axes_of(op & 0x1F)
             words.append("".join("-+"[sign > 0] + "xyz"[axis] for axis, sign in enumerate(signs)))
             words.append(f"by {'xyz'[main]},")

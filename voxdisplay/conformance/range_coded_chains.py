@@ -28,8 +28,8 @@ class Coder(Protocol):
 
 class _Models:
     def __init__(self) -> None:
-        self.p = [spec.ARC_HALF] * spec.ARC_MODELS
-        self.seen = [0] * spec.ARC_MODELS
+        self.p = [spec.ARC_HALF] * spec.ARC2_MODELS  # those of ARC are the first
+        self.seen = [0] * spec.ARC2_MODELS
 
     def learn(self, i: int, bit: int) -> None:
         shift = 1 + (self.seen[i] >> 1)
@@ -150,12 +150,13 @@ class _Axis:
 
 
 @dataclass(slots=True)
-class _AxisMemory:
+class AxisMemory:
     """Step model: what the coder remembers of the three axes."""
 
     axes: list[_Axis] = field(default_factory=lambda: [_Axis(), _Axis(), _Axis()])
 
     def step(self, coder: Coder, want: Voxel = (0, 0, 0)) -> Voxel:
+        """Code a step."""
         axes = self.axes
         streak = [axis.streak for axis in axes]
         m = streak.index(max(streak))
@@ -193,16 +194,18 @@ class _AxisMemory:
         return axis.direction
 
 
-def _number(coder: Coder, want: int = 0) -> int:
+def number(
+    coder: Coder, want: int = 0, first: int = spec.ARC_COUNT, longest: int = spec.ARC_MAX_K
+) -> int:
+    """Code a number: its length with the models from ``first`` on."""
     k = 0
-    while k < spec.ARC_MAX_K and coder.bit(
-        spec.ARC_COUNT + k, want=int(want >= (1 << (k + 1)) - 1)
-    ):
+    while k < longest and coder.bit(first + k, want=int(want >= (1 << (k + 1)) - 1)):
         k += 1
     return (1 << k) - 1 + coder.plain(k, want - (1 << k) + 1)
 
 
-def _pen_bits(device: AnnouncedDevice) -> int:
+def pen_bits(device: AnnouncedDevice) -> int:
+    """Return the bits of a pen."""
     return 1 if device.format == spec.FORMAT_MONO1 else 8 * device.pixel_bytes
 
 
@@ -227,18 +230,18 @@ def decode(
         x, y, z. It may lie off the grid: the caller must not go on then.
     """
     coder = Decoder(data, refusal)
-    memory, at, jump = _AxisMemory(), (0, 0, 0), 1
+    memory, at, jump = AxisMemory(), (0, 0, 0), 1
     pen: int | None = None
     first = True
     while coder.bit(spec.ARC_MORE):
         jump = 1 if first else coder.bit(spec.ARC_JUMP)
         first = False
         if coder.bit(spec.ARC_INK):
-            pen = coder.plain(_pen_bits(device))
+            pen = coder.plain(pen_bits(device))
         if jump:
             x, y, z = (coder.plain((side - 1).bit_length()) for side in device.grid)
-            at, memory = (x, y, z), _AxisMemory()
-        steps = _number(coder)
+            at, memory = (x, y, z), AxisMemory()
+        steps = number(coder)
         if jump:
             yield pen, at
         for _ in range(steps):
@@ -260,19 +263,19 @@ class Piece:
 def encode(device: AnnouncedDevice, pieces: list[Piece]) -> bytes:
     """Return the op ARC that draws pieces."""
     coder = Encoder()
-    memory, at = _AxisMemory(), (0, 0, 0)
-    for number, piece in enumerate(pieces):
+    memory, at = AxisMemory(), (0, 0, 0)
+    for at_piece, piece in enumerate(pieces):
         coder.bit(spec.ARC_MORE, want=1)
         places = list(piece.voxels)
-        if number:
+        if at_piece:
             coder.bit(spec.ARC_JUMP, want=int(piece.jump))
         if coder.bit(spec.ARC_INK, want=int(piece.pen is not None)):
-            coder.plain(_pen_bits(device), piece.pen or 0)
+            coder.plain(pen_bits(device), piece.pen or 0)
         if piece.jump:
-            at, memory = places.pop(0), _AxisMemory()
+            at, memory = places.pop(0), AxisMemory()
             for a, side in zip(at, device.grid, strict=True):
                 coder.plain((side - 1).bit_length(), a)
-        _number(coder, len(places))
+        number(coder, len(places))
         for place in places:
             memory.step(coder, (place[0] - at[0], place[1] - at[1], place[2] - at[2]))
             at = place

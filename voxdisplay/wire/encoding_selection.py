@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.pixel_map import contains
-from voxdisplay.wire import range_coded_chains, spans, spec, voxel_sets
+from voxdisplay.wire import range_coded_chains, sorted_chains, spans, spec, voxel_sets
 from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.fades import FADED, FadedRows
@@ -127,11 +127,17 @@ def _offer_range_coded(best: _BestLayout, drawn: DrawnVoxels, sets: float) -> No
 
     """
     config = best.config
-    if not config.has(spec.FEATURE_ARC) or not len(drawn):
+    first, second = config.has(spec.FEATURE_ARC), config.has(spec.FEATURE_ARC2)
+    if not (first or second) or not len(drawn):
         return
     drawn = _without_repeats(drawn)
+    second &= not first or sorted_chains.may_gain(drawn, config)
     voxels = config.grid.voxels_at(drawn.index)
     step_bits = _LEAST_STEP_BITS * (1 - sets) + _LEAST_SET_STEP_BITS * sets
+    if second:
+        if sorted_chains.least_bytes(drawn, step_bits, config) < best.total_bytes:
+            best.offer_payloads(sorted_chains.encode_sorted_chains(drawn, config))
+        return
     least = range_coded_chains.least_bytes(voxels, drawn.values, step_bits, config)
     if least < best.total_bytes:
         best.offer_payloads(range_coded_chains.encode_range_coded(voxels, drawn.values, config))

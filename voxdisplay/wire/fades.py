@@ -50,7 +50,12 @@ def fade_op(spread: Spread, place: int) -> bytes:
 
 def faded_op(pen: int, spreads: Sequence[Spread]) -> bytes:
     """Return the op FADE that sets a pen of `FADED` or above."""
-    return fade_op(spreads[(pen >> _SPREAD_BITS) - 1], pen & FADED - 1)
+    return fade_op(*spread_at(pen, spreads))
+
+
+def spread_at(pen: int, spreads: Sequence[Spread]) -> tuple[Spread, int]:
+    """Return the spread and the place of a pen of `FADED` or above."""
+    return spreads[(pen >> _SPREAD_BITS) - 1], pen & FADED - 1
 
 
 def fade_op_bytes(pens: Ints, spreads: Sequence[Spread]) -> Ints:
@@ -61,11 +66,11 @@ def fade_op_bytes(pens: Ints, spreads: Sequence[Spread]) -> Ints:
     return np.asarray(heads[np.maximum((pens >> _SPREAD_BITS) - 1, 0)] + longer)
 
 
-def _can_fade(spread: Spread | None, config: EncoderConfig) -> bool:
+def _can_fade(
+    spread: Spread | None, config: EncoderConfig, most_stops: int, most_voxels: int
+) -> bool:
     """Return whether FADE takes a spread, and leaves room for a chain in a payload."""
-    if spread is None or spread.count > spec.LIMIT_MAX_FADE:
-        return False
-    if len(spread.stops) > spec.LIMIT_MAX_COLORS:
+    if spread is None or spread.count > most_voxels or len(spread.stops) > most_stops:
         return False
     return len(fade_op(spread, spread.count - 1)) <= config.max_payload // 2
 
@@ -89,15 +94,34 @@ class FadedRows:
     op_bytes: int
 
     @classmethod
-    def of(cls, drawn: DrawnVoxels, config: EncoderConfig) -> FadedRows | None:
-        """Return which voxels take fewer bytes under a fade; None if none does."""
+    def of(
+        cls,
+        drawn: DrawnVoxels,
+        config: EncoderConfig,
+        *,
+        feature: int = spec.FEATURE_FADE,
+        most_stops: int = spec.LIMIT_MAX_COLORS,
+        most_voxels: int = spec.LIMIT_MAX_FADE,
+    ) -> FadedRows | None:
+        """Return which voxels take fewer bytes under a fade; None if none does.
+
+        Parameters
+        ----------
+        drawn : DrawnVoxels
+        config : EncoderConfig
+        feature : int
+            The feature without which there are no fades.
+        most_stops, most_voxels : int
+            Limits of a fade.
+
+        """
         places = drawn.places
-        if places is None or not config.has(spec.FEATURE_FADE):
+        if places is None or not config.has(feature):
             return None
         number = np.full(len(drawn.kinds), -1, dtype=np.int64)
         spreads: list[Spread] = []
         for item, spread in enumerate(drawn.spreads):
-            if spread is not None and _can_fade(spread, config):
+            if spread is not None and _can_fade(spread, config, most_stops, most_voxels):
                 number[item] = len(spreads)
                 spreads.append(spread)
         number = number[drawn.item]

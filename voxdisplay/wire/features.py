@@ -34,7 +34,7 @@ def feature_bits(features: Collection[str]) -> int:
 
 
 def select_features(features: Collection[str], bytes_per_s: float) -> tuple[str, ...]:
-    """Return the features to use on a line: all but ARC where the line outpaces its coder.
+    """Return the features to use on a line: without ARC and ARC2 where it outpaces their coder.
 
     Parameters
     ----------
@@ -46,4 +46,4 @@ def select_features(features: Collection[str], bytes_per_s: float) -> tuple[str,
     """
     if bytes_per_s < SLOW_BYTES_PER_S:
         return tuple(features)
-    return tuple(name for name in features if name != "arc")
+    return tuple(name for name in features if name not in {"arc", "arc2"})

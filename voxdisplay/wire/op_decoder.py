@@ -315,16 +315,29 @@ class _Parser:
         ):
             self._colors[first + at] = (red, green, blue)
 
-    def read_arc(self) -> None:
-        """Read ARC, which takes the rest."""
+    def read_arc(self, *, second: bool = False) -> None:
+        """Read ARC, which takes the rest; or ARC2, under which a fade goes on."""
         raw = self._take(len(self._data) - self._at)
         try:
-            pieces = list(decode_range_coded(raw, self._grid, self._format, self._pen))
+            pieces = list(decode_range_coded(raw, self._grid, self._format, second=second))
         except ValueError as error:
             raise self._error(str(error)) from error
-        for pen, voxels in pieces:
-            self._reserve(len(voxels))
-            self._shapes.add_dots(self._ops, pen, np.array(voxels, dtype=np.int64))
+        if not second:
+            self._fade.end()
+        for ink, voxels in pieces:
+            if isinstance(ink, Spread):
+                self._fade.begin(ink, ink.first)
+            elif ink is not None:
+                self._pen = ink
+                self._fade.end()
+            if voxels:
+                pen = self._row_pen(len(voxels), again=False)
+                self._shapes.add_dots(self._ops, pen, np.array(voxels, dtype=np.int64))
+            self._ops += 1  # the pens of a fade are counted for each op by itself
+
+    def read_arc2(self) -> None:
+        """Read ARC2."""
+        self.read_arc(second=True)
 
     def _chain(self, octant: int, begin: int, *, again: bool = False) -> None:
         steps = self._take(1)[0] + 1
@@ -421,6 +434,7 @@ _SIMPLE: Final = {
     spec.OP_FADE: _Parser.read_fade,
     spec.OP_RAMP: _Parser.read_ramp,
     spec.OP_ARC: _Parser.read_arc,
+    spec.OP_ARC2: _Parser.read_arc2,
 }
 _COUNTED: Final = {
     spec.OP_SKIP: _Parser.read_skip,

@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+import numpy as np
+
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire import spec
@@ -16,7 +19,11 @@ _LEAST_RANGE: Final = 1 << 24
 _EVEN_CHANCE: Final = 4096
 _SCALE_BITS: Final = 13
 _HISTORY: Final = 127
+_SIDE_BITS: Final = 10  # of a Morton index
 _OLDER: Final = 63  # six steps of the history
+
+# Pen of a piece: a pixel value, or a spread whose first place is that of its first voxel.
+Ink = int | Spread
 
 
 class _Bits:
@@ -27,8 +34,8 @@ class _Bits:
         self._code = int.from_bytes(self._data[:3], "big")
         self._at = 3
         self._range = _LEAST_RANGE
-        self._chance = [spec.ARC_HALF] * spec.ARC_MODELS
-        self._seen = [0] * spec.ARC_MODELS
+        self._chance = [spec.ARC_HALF] * spec.ARC2_MODELS
+        self._seen = [0] * spec.ARC2_MODELS
 
     @property
     def finished(self) -> bool:
@@ -127,9 +134,9 @@ class _Axis:
 
 
 def decode_range_coded(
-    data: bytes, grid: Grid, format_: PixelFormat, pen: int
-) -> Iterator[tuple[int, list[int]]]:
-    """Yield the pieces of an ARC: pixel value, and indices of its voxels.
+    data: bytes, grid: Grid, format_: PixelFormat, *, second: bool = False
+) -> Iterator[tuple[Ink | None, list[int]]]:
+    """Yield the pieces of an ARC: pen if it has one of its own, and indices of its voxels.
 
     Parameters
     ----------
@@ -137,8 +144,8 @@ def decode_range_coded(
         All that follows the op byte.
     grid, format_
         Those of the display.
-    pen : int
-        Pixel value before the op.
+    second : bool
+        Whether it is an ARC2.
 
     Raises
     ------
@@ -148,24 +155,60 @@ def decode_range_coded(
     """
     bits = _Bits(data)
     axes = [_Axis(side) for side in grid]
-    pixel_bits = 1 if format_ is PixelFormat.MONO1 else 8 * format_.bytes
     first = True
+    start = (0, 0, 0)
     while bits.by(spec.ARC_MORE):
         jump = first or bool(bits.by(spec.ARC_JUMP))
-        first = False
-        if bits.by(spec.ARC_INK):
-            pen = bits.plain(pixel_bits)
+        ink = _ink(bits, format_, second=second) if bits.by(spec.ARC_INK) else None
         if jump:
-            for axis in axes:
-                axis.begin(bits.plain((axis.side - 1).bit_length()))
+            near = second and not first and max(grid) <= spec.ARC2_MAX_SIDE
+            if near and bits.by(spec.ARC2_NEAR):
+                start = _near_start(bits, start)
+            else:
+                x, y, z = (bits.plain((side - 1).bit_length()) for side in grid)
+                start = (x, y, z)
+            for axis, place in zip(axes, start, strict=True):
+                axis.begin(place)
+        first = False
         steps = bits.number()
         voxels = [_index(axes, grid)] if jump else []
         for _ in range(steps):
             _step(bits, axes)
             voxels.append(_index(axes, grid))
-        yield pen, voxels
+        yield ink, voxels
     if not bits.finished:
         raise ValueError("bytes behind the last bit of ARC")
+
+
+def _ink(bits: _Bits, format_: PixelFormat, *, second: bool) -> Ink:
+    """Read the pen of a piece."""
+    if format_ is PixelFormat.MONO1:
+        return bits.plain(1)
+    if not second or not bits.by(spec.ARC2_FADE):
+        return bits.plain(8 * format_.bytes)
+    stops, count, place = bits.plain(4) + 1, bits.number() + 1, bits.number()
+    if place >= count:
+        raise ValueError(f"a fade begins at voxel {place} of {count}")
+    size = 1 if format_ is PixelFormat.INDEX8 else 3
+    colors = np.array([bits.plain(8) for _ in range(stops * size)], dtype=np.uint8)
+    return Spread(colors.reshape(stops, size), count, place)
+
+
+def _near_start(bits: _Bits, start: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Read a start by the difference of its Morton index from that of another."""
+    k = 0
+    while k < spec.ARC2_MAX_DELTA and bits.by(spec.ARC2_DELTA + k):
+        k += 1
+    morton = (1 << k) - 1 + bits.plain(k)
+    morton += sum(
+        (start[axis] >> bit & 1) << 3 * bit + axis for bit in range(_SIDE_BITS) for axis in range(3)
+    )
+    if morton >> 3 * _SIDE_BITS:
+        raise ValueError("ARC2 leaves the grid at a start")
+    x, y, z = (
+        sum((morton >> 3 * bit + axis & 1) << bit for bit in range(_SIDE_BITS)) for axis in range(3)
+    )
+    return x, y, z
 
 
 def _index(axes: list[_Axis], grid: Grid) -> int:

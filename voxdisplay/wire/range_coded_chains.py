@@ -7,24 +7,27 @@ know curves, nor which voxels are covered by later ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from voxdisplay.raster.display_list import Spread
 from voxdisplay.wire import spec
+from voxdisplay.wire.fades import FADED, runs_of_pens
 from voxdisplay.wire.op_encoding import EncoderConfig, Ints
 
 # Probabilities are parts of 4096.
 _ONE = 4096
 _LEAST_RANGE = 1 << 24
-_LONGEST_PIECE = (2 << spec.ARC_MAX_K) - 2
+LONGEST_PIECE = (2 << spec.ARC_MAX_K) - 2
 
 # Bits without a model use one more, whose state never changes.
-_PLAIN = spec.ARC_MODELS
+_PLAIN = spec.ARC2_MODELS  # the models of ARC are the first of those of ARC2
 _FIXED = _ONE << 3
 _FRESH = spec.ARC_HALF << 3
 
@@ -37,9 +40,12 @@ _FIRST_WINDOW = 5
 
 
 def encode_range_coded(
-    voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
+    voxels: NDArray[np.integer],
+    pens: NDArray[np.integer],
+    config: EncoderConfig,
+    make: Callable[..., Window] | None = None,
 ) -> list[bytes]:
-    """Return the payloads that draw voxels in their order; each is one ARC.
+    """Return the payloads that draw voxels in their order; each is one op.
 
     Parameters
     ----------
@@ -49,6 +55,8 @@ def encode_range_coded(
     pens : (n,) integer array
         Pixel value of each.
     config : EncoderConfig
+    make : callable, optional
+        As `Window.of`, which is for ARC.
 
     Returns
     -------
@@ -56,11 +64,12 @@ def encode_range_coded(
         At most ``config.max_payload`` bytes each.
 
     """
+    make = make or Window.of
     payloads = []
     at = 0
     window = _FIRST_WINDOW * config.max_payload
     while at < len(voxels):
-        part = _Window.of(voxels[at : at + window], pens[at : at + window], config)
+        part = make(voxels[at : at + window], pens[at : at + window], config)
         payload, drawn = _encode_payload(part, config)
         if drawn == window and at + drawn < len(voxels):
             window *= 2  # there is room for more
@@ -97,7 +106,7 @@ def least_bytes(
     return (bits + step_bits * (len(voxels) - 1 - far)) / 8
 
 
-def _encode_payload(part: _Window, config: EncoderConfig) -> tuple[bytes, int]:
+def _encode_payload(part: Window, config: EncoderConfig) -> tuple[bytes, int]:
     """Return one payload, and the number of voxels of the window that it draws."""
     coder = _RangeCoder(config.max_payload - 1 - _TAIL_BYTES)
     pen, drawn = config.format.full, 0
@@ -106,22 +115,27 @@ def _encode_payload(part: _Window, config: EncoderConfig) -> tuple[bytes, int]:
         fits = _encode_piece(coder, part, head, begin, end)
         if fits == 0:
             break
-        drawn, pen = begin + fits, part.pens[begin]
+        drawn, pen = begin + fits, pen_after(part.pens[begin], fits)
         if drawn < end:
             break
     coder.code([spec.ARC_MORE], [spec.ARC_MORE], [0], force=True)
-    return bytes((spec.OP_ARC,)) + coder.finish(), drawn
+    return bytes((part.op,)) + coder.finish(), drawn
+
+
+def pen_after(pen: int, voxels: int) -> int:
+    """Return the pen after a piece that begins with a pen: that of the next place of a fade."""
+    return pen + voxels if pen >= FADED else pen
 
 
 def _encode_piece(
-    coder: _RangeCoder, part: _Window, head: list[tuple[int, int]], begin: int, end: int
+    coder: _RangeCoder, part: Window, head: list[tuple[int, int]], begin: int, end: int
 ) -> int:
     """Encode as many voxels of a piece as fit; return their number."""
     jumps = begin == 0 or not part.joined[begin - 1]
     want = end - begin
     while want > 0:
         before = coder.state()
-        models, bits = zip(*head, *_count_bits(want - jumps), strict=True)
+        models, bits = zip(*head, *number_bits(want - jumps), strict=True)
         # The step to voxel i is the (i - 1)th of the part.
         first, last = begin if jumps else begin - 1, begin + want - 1
         low, high = part.offset[first], part.offset[last]
@@ -138,16 +152,16 @@ def _encode_piece(
     return 0
 
 
-def _count_bits(value: int) -> list[tuple[int, int]]:
-    """Return models and bits of a count from 0 to _LONGEST_PIECE (Elias gamma code)."""
+def number_bits(value: int) -> list[tuple[int, int]]:
+    """Return models and bits of a count from 0 to LONGEST_PIECE (Elias gamma code)."""
     k = (value + 1).bit_length() - 1
     length = [(spec.ARC_COUNT + i, 1) for i in range(k)]
     if k < spec.ARC_MAX_K:
         length.append((spec.ARC_COUNT + k, 0))
-    return length + _raw_bits(value + 1 - (1 << k), k)
+    return length + plain_bits(value + 1 - (1 << k), k)
 
 
-def _raw_bits(value: int, count: int) -> list[tuple[int, int]]:
+def plain_bits(value: int, count: int) -> list[tuple[int, int]]:
     """Return bits without a model, most significant first."""
     return [(_PLAIN, value >> i & 1) for i in reversed(range(count))]
 
@@ -175,7 +189,7 @@ class _RangeCoder:
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
-        self._states = [_FRESH] * spec.ARC_MODELS + [_FIXED]
+        self._states = [_FRESH] * spec.ARC2_MODELS + [_FIXED]
         self._low = 0
         self._range = _LEAST_RANGE
         # Bytes with their carry into the previous one, so below 512; the first is not sent.
@@ -237,7 +251,7 @@ class _RangeCoder:
 
 
 @dataclass(frozen=True)
-class _Window:
+class Window:
     """Window of voxels that may fill a payload, with the models of the steps between them.
 
     Attributes
@@ -262,21 +276,28 @@ class _Window:
     others: list[int]
     bits: list[int]
     config: EncoderConfig
+    spreads: tuple[Spread, ...] = ()
+
+    op: ClassVar[int] = spec.OP_ARC
 
     @classmethod
     def of(
-        cls, voxels: NDArray[np.integer], pens: NDArray[np.integer], config: EncoderConfig
-    ) -> _Window:
+        cls,
+        voxels: NDArray[np.integer],
+        pens: NDArray[np.integer],
+        config: EncoderConfig,
+        spreads: tuple[Spread, ...] = (),
+    ) -> Self:
         """Return a window of voxels; the first begins a payload."""
         places = voxels.astype(np.int64)
         steps = np.diff(places, axis=0)
         joined = np.abs(steps).max(axis=1, initial=0) == 1
-        cuts = np.flatnonzero(~joined | (np.diff(pens.astype(np.int64)) != 0)) + 1
+        cuts = np.flatnonzero(~joined | (np.diff(runs_of_pens(pens.astype(np.int64))) != 0)) + 1
         bounds = [0, *cuts.tolist(), len(voxels)]
         pieces = [
-            (begin, min(begin + _LONGEST_PIECE, end))
+            (begin, min(begin + LONGEST_PIECE, end))
             for low, end in pairwise(bounds)
-            for begin in range(low, end, _LONGEST_PIECE)
+            for begin in range(low, end, LONGEST_PIECE)
         ]
         ones, others, bits, used = _step_contexts(steps[joined], _first_steps(joined))
         count = np.zeros(len(steps), dtype=np.int64)
@@ -291,6 +312,7 @@ class _Window:
             others=others[used].tolist(),
             bits=bits[used].tolist(),
             config=config,
+            spreads=spreads,
         )
 
     def head(self, begin: int, pen: int) -> list[tuple[int, int]]:
@@ -302,10 +324,20 @@ class _Window:
         new = self.pens[begin]
         bits.append((spec.ARC_INK, int(new != pen)))
         if new != pen:
-            bits += _raw_bits(new, self.config.format.full.bit_length())
+            bits += self.ink(new)
         if jumps:
-            for place, size in zip(self.voxels[begin], self.config.grid, strict=True):
-                bits += _raw_bits(place, (size - 1).bit_length())
+            bits += self.start(begin)
+        return bits
+
+    def ink(self, pen: int) -> list[tuple[int, int]]:
+        """Return models and bits of a pen."""
+        return plain_bits(pen, self.config.format.full.bit_length())
+
+    def start(self, begin: int) -> list[tuple[int, int]]:
+        """Return models and bits of the voxel at which a piece begins anywhere."""
+        bits = []
+        for place, size in zip(self.voxels[begin], self.config.grid, strict=True):
+            bits += plain_bits(place, (size - 1).bit_length())
         return bits
 
 

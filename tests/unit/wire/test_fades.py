@@ -99,10 +99,8 @@ def test_a_gradient_costs_little_more_than_one_color(pixel_format):
 
 
 def test_a_curve_of_a_scene_is_a_fade(tmp_path):
-    scene = {
-        "grid": [128] * 3,
-        "objects": [{"type": "circle", "center": [64] * 3, "radius": 50, "color": RAINBOW}],
-    }
+    circle = {"type": "circle", "center": [64] * 3, "radius": 50, "color": RAINBOW}
+    scene = {"size": [128] * 3, "objects": [circle]}
     frame, again = Frame(GRID), Frame(GRID)
     (tmp_path / "circle.json").write_text(json.dumps(scene))
     frame.draw(vd.load_scene(tmp_path / "circle.json"))

@@ -11,6 +11,7 @@ from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is t
     voxel_sets,
     fades,
     range_coded_chains,
+    second_chains,
     digests,
     acks,
     window,
