@@ -3,9 +3,9 @@
 Shells by this engine in numpy and compiled, by trimesh's three methods and by Open3D; solids by
 this engine, by trimesh with filling and by PyVista. Others take a pitch in mesh units and place
 voxels themselves: a pitch of 1 and, where they allow it, the grid's corner are given. All sets are
-judged by the same measure: lines between dark neighbours that cross the mesh, distances of centres
-(of a solid's outer layer), solid voxels that are not those of this engine. What is not installed is
-left out.
+judged by the same measure: lines between dark neighbours that cross the mesh, voxels beside those
+of the smallest set without such lines, distances of centres, voxels that are not those of this
+engine. What is not installed is left out; DGtal's bindings for Python have no voxeliser of meshes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import voxdisplay as vd
 from voxdisplay.compute import kernel_backend
-from voxdisplay.voxelization.measure_mesh import mesh_distances, mesh_tunnels
+from voxdisplay.voxelization.measure_mesh import mesh_distances, mesh_minimum, mesh_tunnels
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -151,6 +151,7 @@ SHELLS: dict[str, tuple[str, Method]] = {
     "extra fast": ("numba", engine("shell", compiled=True)),
     "trimesh subdivide": ("trimesh", with_trimesh("subdivide")),
     "trimesh ray": ("rtree", with_trimesh("ray")),
+    "trimesh binvox": ("trimesh", with_trimesh("binvox")),
     "Open3D": ("open3d", with_open3d),
 }
 SOLIDS: dict[str, tuple[str, Method]] = {
@@ -187,7 +188,7 @@ def timed(run: Callable[[], Any], repeats: int) -> tuple[float, Voxels]:
 
 def bench_bodies(repeats: int, *, quick: bool = False) -> None:
     """Print the table."""
-    head = f"{'mesh':<11}{'grid':>5}  {'':<7}{'tool':<19}{'N':>9}{'tunnels':>9}"
+    head = f"{'mesh':<11}{'grid':>5}  {'':<7}{'tool':<19}{'N':>9}{'thick':>7}{'tunnels':>9}"
     print(f"{head}{'e_max':>7}{'e_av':>7}{'others':>8}{'ms':>10}{'ratio':>8}")
     before = kernel_backend.set_enabled(False)
     try:
@@ -197,8 +198,9 @@ def bench_bodies(repeats: int, *, quick: bool = False) -> None:
     finally:
         kernel_backend.set_enabled(before)
     print(
-        "tunnels: lines between dark neighbours that cross the mesh. Others: voxels that are not\n"
-        "those of this engine. ms: median, with the voxels as an array; ratio: to this engine."
+        "thick: voxels per voxel of the smallest set without tunnels. tunnels: lines between dark\n"
+        "neighbours that cross the mesh. Others: voxels that are not those of this engine.\n"
+        "ms: median, with the voxels as an array; ratio: to this engine."
     )
 
 
@@ -222,12 +224,14 @@ def bench_job(
             continue
         index = set((voxels @ (1, size, size**2)).tolist())
         own, own_ms = (index, elapsed_ms) if name == "this" else (own, own_ms)
-        figures = f"{'-':>9}{'-':>7}{'-':>7}"
+        figures = f"{'-':>7}{'-':>9}{'-':>7}{'-':>7}"
         if len(voxels) <= JUDGED and "shell" in head:
             box = (0, 0, 0), (size, size, size)
             apart = mesh_distances(voxels, vertices, faces)
             tunnels = mesh_tunnels(voxels, vertices, faces, box)
-            figures = f"{tunnels:9d}{apart.max():7.3f}{apart.mean():7.3f}"
+            minimum = mesh_minimum(vertices, faces, box)
+            thick = f"{len(voxels) / minimum:7.3f}" if minimum else f"{'-':>7}"
+            figures = f"{thick}{tunnels:9d}{apart.max():7.3f}{apart.mean():7.3f}"
         print(
             f"{head}{name:<19}{len(voxels):9d}{figures}{len(index ^ own):8d}"
             f"{elapsed_ms:10.1f}{elapsed_ms / own_ms:8.2f}"

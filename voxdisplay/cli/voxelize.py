@@ -214,6 +214,8 @@ def _report(
         "e_av": _rounded(report.e_av),
         "tunnels": report.tunnels,
         "cover": _rounded(report.cover),
+        "minimum": report.minimum,
+        "thickness": _rounded(report.thickness),
         "enclosed": report.enclosed,
         "clipped": clipped,
         "seconds": round(voxels.seconds, 6),

@@ -21,6 +21,7 @@ from voxdisplay.voxelization.measure_mesh import (
     VoxelLookup,
     mesh_cover,
     mesh_distances,
+    mesh_minimum,
     mesh_tunnels,
 )
 from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -46,6 +47,9 @@ class BodyReport:
         no 6-connected path leads through. None for volumes and points.
     cover : float or None
         For meshes: greatest distance, in max norm, of a point of the surface from a lit centre.
+    minimum : int or None
+        For shells of meshes: size of the smallest set of voxels without tunnels, however far from
+        the surface. None if that is too large to be found.
     enclosed : int or None
         Number of dark voxels to which no 6-connected path leads from outside; None if the set is
         too large to be filled.
@@ -65,6 +69,12 @@ class BodyReport:
     enclosed: int | None
     seconds: float
     certified: bool = False
+    minimum: int | None = None
+
+    @property
+    def thickness(self) -> float | None:
+        """Number of voxels per voxel of the smallest set: 1 is as thin as can be."""
+        return self.voxels / self.minimum if self.minimum else None
 
 
 def report_on(
@@ -88,6 +98,7 @@ def report_on(
     distances: Floats = np.empty(0)
     tunnels: int | None = None
     cover: float | None = None
+    minimum: int | None = None
     if body is not None and kind in {"surface", "solid"}:
         geometry = body.geometry(box.corners)
         tunnels = 0
@@ -99,6 +110,7 @@ def report_on(
             if isinstance(geometry, TriangleMesh) and kind == "surface":
                 inside = _inside(geometry, box)
                 cover = mesh_cover(voxels, geometry.vertices, inside) if len(inside) else None
+                minimum = mesh_minimum(geometry.vertices, geometry.faces, box)
     return BodyReport(
         voxels=len(voxels),
         kind=kind,
@@ -106,6 +118,7 @@ def report_on(
         e_av=float(distances.mean()) if len(distances) else None,
         tunnels=tunnels,
         cover=cover,
+        minimum=minimum,
         enclosed=count_enclosed(voxels),
         seconds=seconds,
     )

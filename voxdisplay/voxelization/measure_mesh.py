@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.compute.array_types import Bools, Floats, Ints
 from voxdisplay.voxelization.index_ranges import expand_ranges
+from voxdisplay.voxelization.smallest_cover import MAX_LINES, smallest_cover
 
 REACH = 1.5
 """Distances up to this many voxels are found; larger ones are given as infinite."""
@@ -127,23 +128,58 @@ def mesh_tunnels(
 
     """
     lookup = VoxelLookup(voxels)
+    begin, end = crossed_lines(vertices, faces, box)
+    return int(((lookup.rows(begin) < 0) & (lookup.rows(end) < 0)).sum())
+
+
+def mesh_minimum(
+    vertices: Floats, faces: Ints, box: tuple[tuple[int, int, int], tuple[int, int, int]]
+) -> int | None:
+    """Return the size of the smallest set of voxels of a box without tunnels through a mesh.
+
+    None if the mesh is too large for that: see `smallest_cover`.
+    """
+    begin, end = crossed_lines(vertices, faces, box)
+    if len(begin) > MAX_LINES:
+        return None
+    low, sides = np.array(box[0]), np.subtract(box[1], box[0])
+    numbers = [
+        (each - low) @ np.array((1, sides[0], sides[0] * sides[1]), dtype=np.int64)
+        for each in (begin, end)
+    ]
+    is_odd = (begin - low).sum(axis=1) & 1 == 1
+    return smallest_cover(np.where(is_odd, *numbers[::-1]), np.where(is_odd, *numbers))
+
+
+def crossed_lines(
+    vertices: Floats, faces: Ints, box: tuple[tuple[int, int, int], tuple[int, int, int]]
+) -> tuple[Ints, Ints]:
+    """Return the lines between the centres of 6-neighbours of a box that cross a mesh.
+
+    Returns
+    -------
+    begin, end : (n, 3) int64 array
+        The voxels at the ends, distinct pairs.
+
+    """
     low, high = np.array(box[0]), np.array(box[1])
+    sides = high - low
     # As the mesh is drawn; then areas are exact up to coordinates of 1024.
     points = np.rint((vertices - low) * _LATTICE) / _LATTICE
-    total = 0
+    lines = []
     for axis in range(3):
         found = [
             cells
             for triangles in _pieces(points, faces, cut=False)
-            for cells in _crossed_edges(triangles, axis, high - low)
+            for cells in _crossed_edges(triangles, axis, sides)
         ]
         cells = np.concatenate([np.empty((0, 3), dtype=np.int64), *found])
-        after = cells + (np.arange(3) == axis)
-        inside = (cells >= 0).all(axis=1) & (after < high - low).all(axis=1)
-        cells, after = cells[inside] + low, after[inside] + low
-        dark = (lookup.rows(cells) < 0) & (lookup.rows(after) < 0)
-        total += len({tuple(cell) for cell in cells[dark].tolist()})
-    return total
+        step = (np.arange(3) == axis).astype(np.int64)
+        inside = (cells >= 0).all(axis=1) & (cells + step < sides).all(axis=1)
+        cells = np.unique(cells[inside], axis=0) + low
+        lines.append((cells, cells + step))
+    begin, end = (np.concatenate(ends) for ends in zip(*lines, strict=True))
+    return begin, end
 
 
 def _crossed_edges(triangles: Floats, axis: int, sides: Ints) -> Iterator[Ints]:

@@ -11,6 +11,7 @@ import voxdisplay as vd
 from voxdisplay.cli.voxelize import voxelize
 from voxdisplay.voxelization.flood_fill import count_enclosed
 from voxdisplay.voxelization.measure_mesh import mesh_cover, mesh_distances, mesh_tunnels
+from voxdisplay.voxelization.smallest_cover import MAX_LINES, smallest_cover
 
 BOX = vd.Box((1.25, 1.5, 2), (9, 8, 9.75))
 CLIP = (11, 10, 12)
@@ -89,6 +90,45 @@ def test_what_a_snake_of_dark_voxels_reaches_is_not_enclosed():
     lit[6, 2, 2] = lit[6, 3, 2] = False
     assert count_enclosed(np.argwhere(lit)) == 2
     assert count_enclosed(np.empty((0, 3), dtype=int)) == 0
+
+
+def matching(even, odd):
+    """The size of the largest matching, by one augmenting path after the other."""
+    others, mate = {}, {}
+    for one, other in zip(even, odd, strict=True):
+        others.setdefault(one, []).append(other)
+
+    def augment(one, seen):
+        for other in set(others[one]) - seen:
+            seen.add(other)
+            if other not in mate or augment(mate[other], seen):
+                mate[other] = one
+                return True
+        return False
+
+    return sum(augment(one, set()) for one in others)
+
+
+def test_the_smallest_cover_is_as_large_as_the_largest_matching():
+    chance = np.random.default_rng(0)
+    for _ in range(200):
+        count, size = chance.integers(0, 40), chance.integers(2, 14)
+        even, odd = chance.integers(0, size, (2, count))
+        assert smallest_cover(even, odd) == matching(even.tolist(), odd.tolist())
+    assert smallest_cover(*np.zeros((2, MAX_LINES + 1), dtype=np.int64)) is None
+
+
+def test_shells_are_nearly_as_thin_as_can_be():
+    flat = vd.voxelize(vd.Mesh([(0, 0, 3.2), (9, 0, 3.2), (9, 9, 3.2)], [(0, 1, 2)]), clip=CLIP)
+    assert (flat.report.minimum, flat.report.thickness) == (len(flat), 1)
+    u, v = np.meshgrid(np.linspace(0, np.pi, 40), np.linspace(0, 2 * np.pi, 80, endpoint=False))
+    points = np.stack((np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)), axis=-1)
+    i, j = np.indices((80, 39)).reshape(2, -1)
+    a, b, c, d = i * 40 + j, i * 40 + j + 1, (i + 1) % 80 * 40 + j + 1, (i + 1) % 80 * 40 + j
+    faces = np.concatenate((np.stack((a, b, c), axis=1), np.stack((a, c, d), axis=1)))
+    ball = vd.voxelize(vd.Mesh(points.reshape(-1, 3) * 12 + 14, faces), clip=(28, 28, 28))
+    assert 1 < ball.report.thickness < 1.1
+    assert vd.voxelize(BOX, clip=CLIP).report.thickness == 1
 
 
 def test_points_and_empty_sets_have_no_distances():
