@@ -9,7 +9,6 @@ import contextlib
 import errno
 import ipaddress
 import os
-import secrets
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -143,7 +142,7 @@ def symbolic_link(link: Path, target: str) -> Iterator[None]:
     """
     if link.exists() and not link.is_symlink():
         raise FileExistsError(f"{link} exists and is no link: remove it or take another path")
-    beside = link.with_name(f".{link.name}.{secrets.token_hex(6)}.tmp")
+    beside = link.with_name(f".{link.name}.{os.urandom(6).hex()}.tmp")
     try:
         beside.symlink_to(target)
         beside.replace(link)

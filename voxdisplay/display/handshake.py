@@ -5,7 +5,7 @@ Any session that the device had ends by it; what it shows does not change. Must 
 
 from __future__ import annotations
 
-import secrets
+import os
 import time
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ _MAX_WAIT_S = 0.25
 
 def random_session() -> int:
     """Return a random session number (protocol.md, section 5)."""
-    return 1 + secrets.randbelow(0xFFFF)
+    return 1 + int.from_bytes(os.urandom(8), "little") % 0xFFFF
 
 
 def request_info(
