@@ -7,15 +7,17 @@ how they are voxelised, and neither displays nor colours of displays.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import wraps
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from voxdisplay.argument_checks import choice
-from voxdisplay.curves import arguments
+from voxdisplay.argument_checks import choice, described
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.short_repr import short_repr
+from voxdisplay.errors import BodyError, VoxDisplayError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -42,6 +44,13 @@ class Body(ABC):
 
     fill: Fill = "shell"
     _arguments: Mapping[str, object] = MappingProxyType({})
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        if checked_methods.is_foreign(cls):
+            for name, checked in (("bounds", _checked_bounds), ("geometry", _checked_geometry)):
+                if callable(vars(cls).get(name)):
+                    setattr(cls, name, checked(vars(cls)[name]))
 
     def __repr__(self) -> str:
         shown = [f"{k}={short_repr(v)}" for k, v in self._arguments.items() if v is not None]
@@ -160,6 +169,50 @@ class TransformedBody(Body):
         return TransformedBody(
             self.body, outer @ self.matrix, outer @ self.offset + arguments.vector("offset", offset)
         )
+
+
+def _checked_bounds(method: Callable[..., Any]) -> Callable[..., Bounds]:
+    what = method.__qualname__
+
+    @wraps(method)
+    def bounds(self: Body) -> Bounds:
+        found = _called(what, method, self)
+        hint = "it must return the low and the high corner of a box: two arrays of three numbers"
+        if not isinstance(found, tuple | list | np.ndarray) or len(found) != 2:
+            raise BodyError(f"{what} returned {described(found)}", hint=hint)
+        low, high = (arguments.real_numbers(what, corner) for corner in found)
+        if low.shape != (3,) or high.shape != (3,) or not (low <= high).all():
+            raise BodyError(f"{what} returned corners {low} and {high}", hint=hint)
+        return low, high
+
+    return bounds
+
+
+def _checked_geometry(method: Callable[..., Any]) -> Callable[..., Geometry]:
+    what = method.__qualname__
+
+    @wraps(method)
+    def geometry(self: Body, bounds: Bounds, *, certified: bool = False) -> Geometry:
+        from voxdisplay.bodies import geometry as forms  # noqa: PLC0415 - not for curves alone
+
+        found = _called(what, method, self, bounds, certified=certified)
+        if not isinstance(found, forms.Geometry):
+            raise BodyError(
+                f"{what} returned {described(found)}",
+                hint="it must return a geometry: see voxdisplay.bodies.geometry",
+            )
+        return found
+
+    return geometry
+
+
+def _called(what: str, method: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    try:
+        return method(*given, **named)
+    except VoxDisplayError:
+        raise
+    except Exception as error:
+        raise BodyError(str(checked_methods.raised(what, error))) from error
 
 
 def invertible(name: str, value: ArrayLike) -> Floats:

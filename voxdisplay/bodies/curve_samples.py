@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from voxdisplay.compute.array_types import Floats, Ints
+from voxdisplay.curves import checked_methods
 from voxdisplay.curves.curve import Curve
 from voxdisplay.errors import BodyError
 
@@ -61,6 +62,7 @@ def sample_curve(curve: Curve, low: Floats, high: Floats) -> Samples:
         If the curve has no point somewhere, or more than `MAX_POINTS` are needed.
 
     """
+    checked_methods.check_curve(curve)
     a, b = curve.t_range
     t = np.unique(np.concatenate((np.linspace(a, b, _FIRST + 1), curve.breaks)))
     points = _points(curve, t)

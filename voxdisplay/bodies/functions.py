@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from voxdisplay.compute.array_types import Floats
-from voxdisplay.curves import arguments
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.formula_arguments import Formula, parse_formula
 from voxdisplay.errors import BodyError, CurveError
 from voxdisplay.expressions.interval import Interval
@@ -124,6 +124,8 @@ class Vectorised:
             except (TypeError, ValueError) as error:  # as of math.cos, given an array
                 self._one_by_one = True
                 self._refuse_if_unable(variables, error)
+            except Exception as error:
+                raise self._raised(error) from error
         out = np.empty((self._rows, n))
         for i, point in enumerate(zip(*(each.tolist() for each in variables), strict=True)):
             try:
@@ -132,26 +134,33 @@ class Vectorised:
                 raise
             except (ArithmeticError, ValueError):  # as of 1 / 0 and math.log(0)
                 out[:, i] = np.nan
+            except Exception as error:
+                raise self._raised(error) from error
         return out
+
+    def _raised(self, error: Exception) -> BodyError:
+        return BodyError(str(checked_methods.raised(self._what, error)))
 
     def _refuse_if_unable(self, variables: tuple[Floats, ...], cause: Exception) -> None:
         try:
             self._function(*(float(each[0]) if each.size else 0.0 for each in variables))
-        except (ArithmeticError, ValueError):
-            return
         except TypeError:
             names = ", ".join(self._variables)
             raise BodyError(
                 f"{self._what} cannot be called: {type(cause).__name__}: {cause}",
                 hint=f"it must take arrays {names} of n numbers and return {self._wanted()}",
             ) from cause
+        except Exception:  # noqa: BLE001 - called again, it is told
+            return
 
     def _wanted(self) -> str:
         return "n numbers" if self._rows == 1 else f"{self._rows} rows of n numbers"
 
     def _checked(self, result: Any, n: int) -> Floats:
         if self._rows > 1 and isinstance(result, tuple | list) and len(result) == self._rows:
-            result = np.stack(np.broadcast_arrays(*result, np.empty(n))[: self._rows])
+            rows = [arguments.real_numbers(self._what, row) for row in result]
+            if all(row.shape in {(), (1,), (n,)} for row in rows):
+                result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[: self._rows])
         numbers = arguments.real_numbers(self._what, result)
         if self._rows == 1 and numbers.shape in ((n,), (), (1,)):
             numbers = np.broadcast_to(numbers, (1, n))
@@ -159,7 +168,7 @@ class Vectorised:
             numbers = numbers[:, None]
         if numbers.shape != (self._rows, n):
             raise BodyError(
-                f"{self._what} returned shape {np.shape(result)} for {n} points",
+                f"{self._what} returned shape {numbers.shape} for {n} points",
                 hint=f"it must return {self._wanted()}",
             )
-        return np.asarray(numbers, dtype=np.float64)
+        return numbers

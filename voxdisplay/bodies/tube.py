@@ -17,7 +17,7 @@ from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds
 from voxdisplay.bodies.implicit import ImplicitFunction
 from voxdisplay.compute.array_types import Floats
-from voxdisplay.curves import arguments
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.circular import Circle
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.formula_arguments import Formula
@@ -171,6 +171,7 @@ class Tube(Body):
 
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> BallChain:  # noqa: ARG002 - by samples
         """Return balls about points within a tolerance of the curve: `Body.geometry`."""
+        checked_methods.check_curve(self.along)
         t = np.linspace(*self.along.t_range, 257)
         none = np.empty((0, 3))
         reach = BallChain(none, np.empty(0), np.empty(0, np.int64), self.metric, {}).reach

@@ -26,6 +26,7 @@ MAX_MAGNITUDE = 1e100
 
 _NO_NUMBERS = "cMmV"
 """Kinds of arrays that numpy would convert: complex numbers, dates, durations, records."""
+_TEXTS = "SU"
 
 
 class ArgumentError(CurveError, BodyError):
@@ -151,9 +152,16 @@ def curve_points(what: str, result: object, n: int) -> Floats:
 
 def real_numbers(what: str, result: object) -> Floats:
     """Return a copy of what a callable returned as float64, or raise CurveError."""
-    numbers = np.asarray(result)
-    if np.iscomplexobj(numbers):
-        raise CurveError(
-            f"{what} returned complex numbers", hint="return real ones: .real, .imag or abs()"
-        )
-    return unmasked(result if argument_checks.is_masked_array(result) else numbers)
+    try:
+        if argument_checks.is_masked_array(result):
+            return unmasked(result)
+        numbers = np.asarray(result)
+        kind = "complex numbers" if np.iscomplexobj(numbers) else None
+        if kind is None and numbers.dtype.kind in _NO_NUMBERS + _TEXTS:
+            raise TypeError  # noqa: TRY301 - numpy would convert texts as well
+        if kind is None:
+            return unmasked(numbers)
+    except (OverflowError, TypeError, ValueError):
+        found = argument_checks.described(result)
+        raise CurveError(f"{what} returned no numbers: {found}") from None
+    raise CurveError(f"{what} returned {kind}", hint="return real ones: .real, .imag or abs()")

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats, Ints
+from voxdisplay.curves import checked_methods
 from voxdisplay.curves.short_repr import short_repr
 
-NO_BREAKS: Floats = np.empty(0)
-NO_BREAKS.flags.writeable = False
+NO_BREAKS = checked_methods.NO_BREAKS
 
 
 class Curve(ABC):
@@ -53,25 +52,18 @@ class Curve(ABC):
         # evaluator of the formula it replaced: they would prove another curve.
         owners = {name: owner for owner in reversed(cls.__mro__) for name in vars(owner)}
         order = cls.__mro__.index
-        if isinstance(vars(cls).get("breaks"), list | tuple):
-            cls.breaks = np.array(vars(cls)["breaks"], dtype=np.float64)  # type: ignore[assignment]
         for name in _OF_THE_FORMULA:
             if order(owners["position"]) < order(owners[name]):
                 setattr(cls, name, vars(Curve)[name])
+        if checked_methods.is_foreign(cls):
+            checked_methods.check_class(cls)
 
     def __repr__(self) -> str:
         arguments = self._arguments or {"t_range": getattr(self, "t_range", None)}
         shown = [f"{k}={short_repr(v)}" for k, v in arguments.items() if v is not None]
         return f"{type(self).__name__}({', '.join(shown)})"
 
-    @cached_property
-    def breaks(self) -> Floats:
-        """Parameters inside the range, (k,) ascending, where the direction may turn sharply.
-
-        The vertices of a polyline, for example. A hint for sampling, never needed for
-        correctness. May be assigned.
-        """
-        return NO_BREAKS
+    breaks = checked_methods.Breaks(NO_BREAKS)
 
     @property
     def degree(self) -> int | None:

@@ -11,9 +11,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from voxdisplay import argument_checks
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats
-from voxdisplay.curves import arguments
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.formula_arguments import Bounds, Formula, parse_formula, parse_range
 from voxdisplay.errors import CurveError
@@ -231,44 +230,57 @@ class _Vectorised:
         a, b = t_range
         trial = np.array([a, a + (b - a) / 2])
         try:
-            self(trial)
+            self._all_at_once(trial)
         except CurveError:
             raise
+        except ArithmeticError:
+            self(trial)
         except (TypeError, ValueError) as error:  # as of math.cos and "if t < 0", given an array
             self._one_by_one = True
             try:
                 self(trial)
-            except CurveError:
+            except CurveError as other:
+                if isinstance(other.__cause__, TypeError):
+                    raise CurveError(
+                        f"{what} cannot be called: {type(error).__name__}: {error}",
+                        hint="it must take an (n,) array and return a (3, n) array",
+                    ) from error
                 raise
-            except (TypeError, ValueError):
-                raise CurveError(
-                    f"{what} cannot be called: {type(error).__name__}: {error}",
-                    hint="it must take an (n,) array and return a (3, n) array",
-                ) from error
+        except Exception as error:
+            raise checked_methods.raised(what, error) from error
 
     def __call__(self, t: Floats) -> Floats:
         with np.errstate(all="ignore"):
             if not self._one_by_one:
                 try:
-                    # A copy: a function that works in place must not change the caller's t.
-                    return _rows(self._what, self._function(t.copy()), t.size)
+                    points: Floats = checked_methods.call(self._what, self._all_at_once, t)
                 except ArithmeticError:  # at one of them, maybe: the others have values
                     if t.size == 1:
                         return np.full((3, 1), np.nan)
+                else:
+                    return points
                 parts = [self(t[i : i + 1]) for i in range(t.size)]
                 return np.concatenate(parts, axis=1) if parts else np.empty((3, 0))
-            points = np.empty((3, t.size))
+            one_by_one = np.empty((3, t.size))
             for i, one in enumerate(t.tolist()):
-                points[:, i] = _point(self._what, self._function, one)
-            return points
+                one_by_one[:, i] = _point(self._what, self._function, one)
+            return one_by_one
+
+    def _all_at_once(self, t: Floats) -> Floats:
+        # A copy: a function that works in place must not change the caller's t.
+        return _rows(self._what, self._function(t.copy()), t.size)
 
 
 def _point(what: str, function: Function, t: float) -> Floats:
     """Call a callable for one parameter; return (3,), nan where it has no value there."""
     try:
         result = function(t)
+    except CurveError:
+        raise
     except (ArithmeticError, ValueError):  # as of 1 / 0 and math.log(0)
         return np.full(3, np.nan)
+    except Exception as error:
+        raise checked_methods.raised(what, error) from error
     point = arguments.real_numbers(what, result)
     if point.shape != (3,):
         raise CurveError(f"{what} returned shape {point.shape}, not (3,), for one parameter")
@@ -278,9 +290,7 @@ def _point(what: str, function: Function, t: float) -> Floats:
 def _rows(what: str, result: Any, n: int) -> Floats:
     """Return a checked copy of what a callable returned: (3, n), or rows that broadcast to that."""
     if isinstance(result, tuple | list) and len(result) == 3:
-        rows = [
-            arguments.unmasked(row) if argument_checks.is_masked_array(row) else row
-            for row in result
-        ]
-        result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[:3])
+        rows = [arguments.real_numbers(what, row) for row in result]
+        if all(row.shape in {(), (1,), (n,)} for row in rows):
+            result = np.stack(np.broadcast_arrays(*rows, np.empty(n))[:3])
     return arguments.curve_points(what, result, n)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.curves import arguments
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.one_sided_limits import Limit, limit
 from voxdisplay.errors import CurveError
@@ -192,6 +192,7 @@ def complete(curve: Curve, also: Iterable[float] = ()) -> Curve:
 
     """
     also = list(also)
+    checked_methods.check_curve(curve)
     if curve.always_defined and not also:
         return curve
     if isinstance(curve, CompletedCurve):

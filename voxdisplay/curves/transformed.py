@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from voxdisplay.compute.array_types import Bools, Evaluate, Floats
-from voxdisplay.curves import arguments
+from voxdisplay.curves import arguments, checked_methods
 from voxdisplay.curves.curve import Curve
 from voxdisplay.expressions.interval import Interval, interval
 
@@ -38,6 +38,7 @@ class Transformed(Curve):
     def __init__(
         self, curve: Curve, matrix: ArrayLike = 1.0, offset: ArrayLike = (0, 0, 0)
     ) -> None:
+        checked_methods.check_curve(curve)
         self.curve = curve
         self._scale: float | None = None
         self._columns: tuple[tuple[int, ...], ...] = ((0,), (1,), (2,))

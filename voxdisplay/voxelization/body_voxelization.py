@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from voxdisplay.argument_checks import choice
 from voxdisplay.errors import BodyError
 from voxdisplay.voxelization.voxel_box import VoxelBox
 
@@ -59,8 +60,16 @@ def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> Voxe
 
     """
     began_s = time.perf_counter()
+    choice("fill", body.fill, ("shell", "solid"))
+    choice("kind", body.kind, ("surface", "solid", "volume", "points"))
     geometry = body.geometry(box.corners, certified=certified)
-    module, name = _VOXELISERS[type(geometry).__name__]
+    kind = type(geometry).__name__
+    if kind not in _VOXELISERS:
+        raise BodyError(
+            f"{body} is of a geometry that cannot be voxelised: {kind}",
+            hint=f"it must be one of {', '.join(_VOXELISERS)}",
+        )
+    module, name = _VOXELISERS[kind]
     package = __name__.rpartition(".")[0]
     voxelize: Voxeliser = getattr(import_module(f"{package}.surfaces.{module}"), name)
     voxels = voxelize(geometry, box, body, certified=certified)

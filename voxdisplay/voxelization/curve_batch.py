@@ -144,7 +144,7 @@ class CurveBatch:
             return complete(curve, also)
         except CurveError as error:
             message = f"{self.message_prefix(index)}{error}"
-            raise CurveError(message, axis=error.axis, hint=error.hint) from None
+            raise CurveError(message, axis=error.axis, hint=error.hint) from error.__cause__
 
     def complete_undefined(self) -> bool:
         """Complete the curve that was last found to have no point at a parameter.

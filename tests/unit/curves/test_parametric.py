@@ -57,7 +57,7 @@ class TestParametric:
             (lambda t: t.sum(), r"shape \(\), not \(3, 2\)"),
             (lambda t: (math.cos(t), t), r"shape \(2,\), not \(3,\)"),
             (lambda: 1, "cannot be called: TypeError"),
-            (lambda t: ("a", t, t), "cannot be called"),
+            (lambda t: ("a", t, t), "returned no numbers: str 'a'"),
         ],
     )
     def test_a_callable_of_another_shape_is_refused(self, function: object, message: str) -> None:

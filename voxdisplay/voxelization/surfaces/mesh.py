@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from voxdisplay.compute import kernel_backend
 from voxdisplay.voxelization.surfaces.lit_mask import lit_mask
 from voxdisplay.voxelization.surfaces.mesh_attributes import has_attributes, interpolate
@@ -19,7 +21,6 @@ from voxdisplay.voxelization.voxel_box import Triple, VoxelBox
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from voxdisplay.bodies.body import Body
@@ -37,6 +38,12 @@ def voxelize_mesh(
     certified: bool = False,
 ) -> VoxelSet:
     """Return the voxels of a mesh inside a box: see `body_voxelization.Voxeliser`."""
+    if not len(geometry.vertices):  # as of a surface of which nothing is in the box
+        nothing = {name: values[:0] for name, values in geometry.parameters.items()}
+        proven = certified and geometry.follows_body
+        return VoxelSet(
+            box, np.empty(0, dtype=np.int64), body.kind, None, nothing, certified=proven
+        )
     mesh = snap(geometry, box)
     kernel_backend.enable_if_worthwhile(len(mesh.faces))
     topology = analyse(mesh)
