@@ -33,7 +33,7 @@ _HEAD_PACKETS: Final = 16  # HELLO, INFO and META are among so many
 
 @dataclass(frozen=True)
 class ShowHead:
-    """What a recording says at its beginning.
+    """Contents of INFO and META at the beginning of a recording.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def emulator():
 
 @pytest.fixture
 def run():
-    """Run ``voxdisplay``; give the finished process."""
+    """Run ``voxdisplay``; return the finished process."""
 
     def run(*arguments, stdin="", cwd=ROOT, **environment):
         variables = {**os.environ, **environment}
@@ -90,7 +90,7 @@ def run():
 
 @pytest.fixture
 def scene(tmp_path):
-    """Write a scene file; give its path."""
+    """Write a scene file; return its path."""
 
     def write(content, name="scene.json"):
         path = tmp_path / name

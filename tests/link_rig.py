@@ -40,7 +40,7 @@ def random_frame(rng, pixel_format="index8", density=0.5):
 
 
 class Faults:
-    """What a bad line does to bytes; rates are for each byte, ``packet`` for each segment."""
+    """Faults of a line; rates are for each byte, ``packet`` for each segment."""
 
     def __init__(self, seed, *, flip=0.0, drop=0.0, packet=0.0, delimiter=0.0):
         self.rng = random.Random(seed)

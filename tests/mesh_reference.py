@@ -83,7 +83,7 @@ def corners_of(vertices, faces):
 
 
 def net_edges(triangles):
-    """How much more often each edge is run along in one direction than in the other."""
+    """Return how much more often each edge is run along in one direction than in the other."""
     net = {}
     for triangle in triangles:
         for k in range(3):
@@ -96,7 +96,7 @@ def net_edges(triangles):
 
 
 def is_oriented(vertices, faces):
-    """Whether all edges cancel, perhaps with the help of triangles that have no area."""
+    """Return whether all edges cancel, perhaps with the help of triangles that have no area."""
     given = [tuple(vertices[k] for k in face) for face in faces]
     return any(
         not any(net_edges(triangles).values()) for triangles in (given, corners_of(vertices, faces))

@@ -36,7 +36,7 @@ def open_link(**info):
 
 
 def show_frame(link, number=0, now=0.0):
-    """Show a frame of one packet, the first of a session; give what stands for it."""
+    """Show a frame of one packet, the first of a session; return what stands for it."""
     ticket = link.present([b"\xa0"])
     transmit(link, now)
     assert receive(link, ack(1, 0, frame=number, flags=1), now) == [FrameShown(ticket, 0)]

@@ -71,7 +71,7 @@ def off(value: float, printed: float) -> str:
 
 
 def main() -> int:
-    """Print the tables; give 0 if all counts are the paper's."""
+    """Print the tables; return 0 if all counts are the paper's."""
     print(
         f"{'table':<6}{'R=A':>4}{'w':>3}{'var':>4} {'tangent':<11}{'N':>5}{'printed':>8}"
         f"{'e_max':>8}{'printed':>8}{'e_av':>8}{'printed':>8}"

@@ -17,7 +17,7 @@ COMMANDS = [
 
 @pytest.fixture
 def resets(monkeypatch):
-    """What was passed on each time that a port was to be opened."""
+    """Return what is passed on each time that a port was to be opened."""
     passed = []
 
     def open_transport(port, **options):

@@ -38,7 +38,7 @@ SCENE = {
 
 @pytest.fixture
 def recorded(run, scene, tmp_path):
-    """Record the scene; give the path and what was printed."""
+    """Record the scene; return the path and what was printed."""
     path = tmp_path / "spin.vxs"
     done = run("record", scene(SCENE), "-o", path, "--check", 2, "--json")
     assert done.returncode == 0, done.stderr

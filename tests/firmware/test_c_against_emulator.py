@@ -214,7 +214,7 @@ def leb128(k: int) -> bytes:
 
 
 def comparable(answers: list[bytes], size: int) -> list[tuple[Any, ...]]:
-    """What two devices must have in common: no texts, no name, and voxels instead of their code."""
+    """Return what two devices must answer alike: no texts, no name, and voxels, not their code."""
     found: list[tuple[Any, ...]] = []
     for packet in answers:
         kind = packet[0] >> 4

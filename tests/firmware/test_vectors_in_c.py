@@ -18,7 +18,7 @@ def each(kind: str) -> pytest.MarkDecorator:
 
 
 def of_version_1_0(vector: document.Vector) -> bool:
-    """Whether a device has no feature of a later version: the reference device has none."""
+    """Return whether a device has no feature of a later version: the reference device has none."""
     wanted = dict(vector.lines).get("features", "").split("|")
     return all(LITERALS[f"FEATURE_{name}"] < 9 for name in wanted if name)
 

@@ -25,7 +25,7 @@ TESTS = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def farm(tmp_path_factory):
-    """Start a scheduler and two workers; give the address, and a function that starts a worker."""
+    """Start a scheduler and two workers; yield the address, and a function that starts a worker."""
     folder = tmp_path_factory.mktemp("farm")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -17,7 +17,7 @@ pytestmark = browsers.NEEDED
 
 
 def middle(picture):
-    """Where the light is, in pixels, of a canvas with neither box nor glow."""
+    """Return where the light is, in pixels, of a canvas with neither box nor glow."""
     light = picture.astype(float).sum(axis=2)
     light -= light[0, 0]
     total = light.sum()

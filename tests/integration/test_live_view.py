@@ -30,7 +30,7 @@ pytestmark = browsers.NEEDED
 
 @contextlib.contextmanager
 def emulator_with_view(where="127.0.0.1:0", *options):
-    """Run an emulator that is viewed; give a display that is open on it, and the URL."""
+    """Run an emulator that is viewed; yield a display that is open on it, and the URL."""
     command = [sys.executable, "-m", "firmware_sim", "--tcp", "127.0.0.1:0", "--refresh", "0"]
     command += ["--size", "3x5x7", "--view", where, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:

@@ -31,7 +31,7 @@ class Tty:
         self._slave = slave
 
     def read_packets(self):
-        """Give header and payload of each packet that comes, until the tty is gone."""
+        """Yield header and payload of each packet that comes, until the tty is gone."""
         data = b""
         while True:
             try:

@@ -197,7 +197,7 @@ except TransportClosed:
 
 
 def _decode(device: Device, payloads: list[bytes]) -> tuple[float, float]:
-    """Let a device decode the same frame for a while; give frames a second of CPU time, of time.
+    """Return frames per second of CPU time, and of time, of a device that decodes one frame.
 
     On a busy machine the watcher takes time from everybody; CPU time is the device's own.
     """

@@ -191,7 +191,7 @@ def files_of(
 
 @dataclass(frozen=True)
 class Played:
-    """What became of a show; gaps in milliseconds, ticks as of `PlayReport`."""
+    """Figures of a show that was played; gaps in milliseconds, ticks as of `PlayReport`."""
 
     asked: int
     shown: int

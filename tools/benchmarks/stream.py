@@ -196,7 +196,7 @@ def reader(frame: Frame, bytes_per_s: float) -> Iterator[Reader]:
 
 @dataclass(frozen=True)
 class Streamed:
-    """What became of a stream, but for its beginning.
+    """Figures of a stream, but for its beginning.
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ def stream(
             turn = 0
 
             def until(end_s: float) -> tuple[stream_reader.Heard, float]:
-                """Tell whether the stream goes on: not long enough yet, or too few frames."""
+                """Return whether the stream goes on: not long enough yet, or too few frames."""
                 nonlocal turn
                 enough = other.heard().frames + _FRAMES
                 while time.perf_counter() < end_s or other.heard().frames < enough:

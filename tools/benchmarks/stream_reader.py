@@ -83,7 +83,7 @@ def _of_session(info: packets.Info, session: int) -> packets.Info:
 
 @dataclass
 class Heard:
-    """What has come over the line.
+    """Counts of what has come over the line.
 
     Attributes
     ----------

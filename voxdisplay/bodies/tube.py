@@ -45,7 +45,7 @@ class _TorusDistance:
 
     @property
     def always_defined(self) -> bool:
-        """Whether it has a value everywhere: `SpaceFunction`."""
+        """True if it has a value everywhere: `SpaceFunction`."""
         return True
 
     def __call__(self, x: Floats, y: Floats, z: Floats, /) -> Floats:

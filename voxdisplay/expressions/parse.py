@@ -186,7 +186,7 @@ _INFIX_WORDS = {
     "if": "write if(condition, a, b)",
     "else": "write if(condition, a, b)",
 }
-"""What words between two operands, as in other languages, are here."""
+"""Operators here for words between two operands in other languages."""
 
 
 class _Parser:

@@ -86,7 +86,7 @@ SYNONYMS = {
     "infinity": "numbers are finite",
     "nan": "numbers are finite",
 }
-"""What the functions and constants of other languages are called or made of here."""
+"""Names or formulas here for functions and constants of other languages."""
 
 ARGUMENT_HINTS = {
     ("log", 2): "write log(x) / log(base)",
@@ -96,7 +96,7 @@ ARGUMENT_HINTS = {
     ("mod", 1): "write mod(a, b)",
     ("atan2", 1): "write atan(x), or atan2(y, x)",
 }
-"""What is meant by a function with so many arguments, where it takes another number."""
+"""Functions that are meant where one has so many arguments, and takes another number."""
 
 
 def suggest(word: str, known: Iterable[str]) -> str | None:

@@ -18,7 +18,7 @@ MAX_LINE = 1 << 16
 """Longest line, in characters; bounds the number of columns."""
 
 COMMENTS = ("#", "%", "//", "!")
-"""What a line of words begins with that is no row; names of columns may stand behind it."""
+"""Beginnings of lines of words that are no rows; names of columns may stand behind them."""
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", None: "blanks"}
 ROWS_HINT = (
     "each line holds x, y and z, separated by commas, semicolons, tabs or blanks; "

@@ -15,4 +15,4 @@ ARCHIVE_DAMAGE: Final = (
     OSError,  # a place before the file's beginning
     ValueError,  # a name that is no text
 )
-"""What `zipfile` raises for a damaged archive, beside what it raises for an unreadable file."""
+"""Exceptions of `zipfile` for damaged archives, beside those for unreadable files."""

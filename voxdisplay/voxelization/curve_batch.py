@@ -180,7 +180,7 @@ class CurveBatch:
 
     @cached_property
     def declared_closed(self) -> NDArray[np.int8]:
-        """What each curve says: 1 if it is closed, 0 if not, -1 if it does not say."""
+        """Closedness that each curve states: 1 if it is closed, 0 if not, -1 if it does not say."""
         said = [curve.closed for curve in self.curves]
         return np.array([-1 if each is None else bool(each) for each in said], dtype=np.int8)
 

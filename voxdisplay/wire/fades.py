@@ -166,7 +166,7 @@ class FadedPens:
 
     @property
     def active(self) -> bool:
-        """Whether there is a fade."""
+        """True if there is a fade."""
         return self._spread is not _NONE
 
     @property

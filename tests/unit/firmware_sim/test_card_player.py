@@ -57,7 +57,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def data_of(tmp_path_factory):
-    """Give the bytes and digests of a show's recording."""
+    """Return the bytes and digests of a show's recording."""
     folder = tmp_path_factory.mktemp("card")
     kept = {}
 

@@ -21,7 +21,7 @@ STILL = {"type": "segment", "from": [0.5, 0.5, 0.5], "to": [2.5, 4.5, 6.5]}
 
 @pytest.fixture
 def write(tmp_path):
-    """Write files beside each other; give the path of the last."""
+    """Write files beside each other; return the path of the last."""
 
     def write(**files):
         for name, content in files.items():

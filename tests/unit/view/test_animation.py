@@ -32,7 +32,7 @@ def turn():
 
 
 def local_palettes(data):
-    """How many pictures of a GIF have a palette of their own, by the format's own blocks."""
+    """Return how many pictures of a GIF have a palette of their own, by the format's own blocks."""
     at = 13 + (3 << (data[10] & 7) + 1)  # the header, and the palette of all
     assert data[10] & 0x80
     own = 0

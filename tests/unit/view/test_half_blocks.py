@@ -19,7 +19,7 @@ CELL = re.compile(r"\x1b\[([\d;]*)m|(.)")
 
 
 def screen(lines):
-    """What a terminal makes of it: characters, and colours above and below of each cell."""
+    """Return the screen of a terminal: characters, and colours above and below of each cell."""
     characters, pixels = [], np.zeros((2 * len(lines), COLUMNS), dtype=object)
     for row, line in enumerate(lines):
         front = back = None

@@ -32,7 +32,7 @@ GRID = vd.Grid(3, 5, 7)
 
 @contextlib.contextmanager
 def served(source, host="127.0.0.1", allow_origins=()):
-    """Serve a source in a thread; give the URL."""
+    """Serve a source in a thread; yield the URL."""
     ready, place = threading.Event(), {}
 
     async def serve():

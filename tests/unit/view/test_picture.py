@@ -32,7 +32,7 @@ def page(grid, voxels, format_=RGB, color=(255, 255, 255)):
 
 
 def light_of(grid, voxels, look=BARE, **how):
-    """How bright each pixel is, less the ground: (H, W)."""
+    """Return the brightness of each pixel, less that of the ground: (H, W)."""
     drawn = np.asarray(render_page(page(grid, voxels, **how), grid, how.get("format_", RGB), look))
     empty = np.asarray(render_page(page(grid, []), grid, RGB, look))
     return (drawn.astype(int) - empty).max(axis=2)
