@@ -287,6 +287,8 @@ def test_recordings_of_other_displays_are_played(run, once):
         done = run("play", once, "--port", port, "--json")
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)["wrong"] == 0
+        remark = "recorded for 16x14x12 rgb888; decoded, and encoded again for"
+        assert done.stderr.count(f"{remark} {size} {format_}\n") == 1
 
 
 def test_push_shows_the_first_frame(run, recorded):

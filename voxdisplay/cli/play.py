@@ -6,10 +6,11 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Final, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Final, Literal, TextIO
 
 import click
 
+import voxdisplay as vd
 from voxdisplay.cli.options import (
     capture_option,
     fit_option,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from voxdisplay.cli.signals import OnExit
     from voxdisplay.display.baud import Baud
     from voxdisplay.display.player import Player
+    from voxdisplay.frame import Fit
     from voxdisplay.shows.binding import Playable
     from voxdisplay.shows.play_report import PlayReport
 
@@ -120,6 +122,7 @@ def play(
     loaded = _load(shows)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
     with close_on_exit(display, on_exit), open_keyboard() as keyboard, _progress() as progress:
+        _note_fits(loaded, display.info, fit)
 
         def observe(player: Player) -> None:
             for key in keyboard.pressed():
@@ -160,6 +163,41 @@ def _load(paths: tuple[str, ...]) -> Playable:
             for remark in each.notes:
                 note(remark)
     return loaded[0] if len(loaded) == 1 else ShowSequence(tuple(loaded))
+
+
+def _note_fits(loaded: Playable, info: vd.DeviceInfo, fit: Fit) -> None:
+    """Note how shows that were made for other displays are changed, each way once."""
+    remarks = (_fit_remark(each, info, fit) for each in _single_shows(loaded))
+    for remark in dict.fromkeys(remarks):
+        if remark:
+            note(remark)
+
+
+def _single_shows(loaded: Any) -> Iterator[Any]:
+    """Yield all shows of sequences and playlists."""
+    from voxdisplay.shows.playlist import Playlist  # noqa: PLC0415
+    from voxdisplay.shows.sequence import ShowSequence  # noqa: PLC0415
+
+    if isinstance(loaded, ShowSequence):
+        for each in loaded.shows:
+            yield from _single_shows(each)
+    elif isinstance(loaded, Playlist):
+        for entry in loaded.entries:
+            yield entry.source
+    else:
+        yield loaded
+
+
+def _fit_remark(show: Any, info: vd.DeviceInfo, fit: Fit) -> str | None:
+    if isinstance(show, vd.Scene):  # to fit contents, all of a scene would be measured
+        return show.placement_for(info.grid, fit)[1] if fit != "content" else None
+    if not hasattr(show, "pixel_format"):
+        return None
+    made_for = f"{show.grid} {show.pixel_format.value}"
+    here = f"{info.grid} {info.format.value}"
+    if made_for == here:
+        return None
+    return f"recorded for {made_for}; decoded, and encoded again for {here}"
 
 
 def _handle_key(key: bytes, player: Player) -> None:

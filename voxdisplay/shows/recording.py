@@ -129,6 +129,16 @@ class Recording:
         return len(self._places)
 
     @property
+    def grid(self) -> Grid:
+        """Grid of the displays that it was made for."""
+        return self.format.grid
+
+    @property
+    def pixel_format(self) -> PixelFormat:
+        """Their pixel format."""
+        return self.format.format
+
+    @property
     def fps(self) -> float:
         """Frames per second."""
         return self.format.millihertz / 1000
