@@ -281,7 +281,11 @@ class VoxelModel(AffineSamples):
         if max(-self._low.min(), self._high.max()) > _MAX_COORDINATE:
             raise ArgumentError("voxels", f"are further away than {_MAX_COORDINATE}")
         self.colors = None
-        if colors is not None:
+        if isinstance(colors, np.ndarray) and colors.dtype == np.uint8:
+            if colors.shape != (len(self.voxels), 3):
+                raise ArgumentError("colors", f"have the shape {colors.shape}, not a row a voxel")
+            self.colors = colors.copy()
+        elif colors is not None:
             given = arguments.array("colors", colors, (len(self.voxels), 3))
             if not ((given >= 0) & (given <= 255) & (given == np.rint(given))).all():
                 raise ArgumentError("colors", "are whole numbers, 0 to 255")
@@ -297,6 +301,13 @@ class VoxelModel(AffineSamples):
 
     def geometry(self, bounds: Bounds, *, certified: bool = False) -> LitVoxels:  # noqa: ARG002 - exact anyway
         """Return the voxels within a box: `Body.geometry`."""
+        if (self.matrix == np.eye(3)).all():  # no two fall into one
+            moved = self.voxels + np.floor(self.offset + 0.5).astype(self.voxels.dtype)
+            held = ((moved >= np.floor(bounds[0])) & (moved < bounds[1])).all(axis=1)
+            if not held.all():
+                moved, held = moved[held], np.flatnonzero(held)
+                return LitVoxels(moved, None if self.colors is None else self.colors[held])
+            return LitVoxels(moved, self.colors)
         axes = self._axes()
         sizes = np.linalg.norm(self.matrix, axis=0)
         found, rows = [], []

@@ -118,8 +118,9 @@ def _joined(
     """Return the voxels, (N, 3), of placed models, and their colours, (N, 3)."""
     palette = default_palette() if contents.palette is None else contents.palette
     voxels = np.concatenate([voxels for voxels, _ in placed])
-    index = np.concatenate([index for _, index in placed]).astype(np.intp)
-    return voxels.astype(np.int32), palette[index - 1]
+    index = np.concatenate([index for _, index in placed])
+    # Colour index i is palette entry i - 1.
+    return voxels.astype(np.int32), np.roll(palette, 1, axis=0).take(index, axis=0)
 
 
 def _next_chunk(reader: ByteReader) -> tuple[bytes, ByteReader]:
@@ -165,11 +166,12 @@ def _read_model(chunk: ByteReader, size: NDArray[np.int64] | None) -> _Model:
     found = voxels.astype(np.uint8).reshape(-1, 4)
     if size is None:
         raise chunk.error("voxels of a model without a size")
-    outside = (found[:, :3] >= size).any(axis=1)
-    if outside.any():
+    if len(found) and (found[:, :3].max(axis=0) >= size).any():
+        outside = (found[:, :3] >= size).any(axis=1)
         first = tuple(found[outside][0, :3].tolist())
         raise chunk.error(f"voxel {first} is outside its model of {' x '.join(map(str, size))}")
-    return _Model(size, found[found[:, 3] > 0])
+    lit = found[:, 3] > 0
+    return _Model(size, found if lit.all() else found[lit])
 
 
 def _read_attributes(chunk: ByteReader) -> Attributes:

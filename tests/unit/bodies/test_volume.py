@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import voxdisplay as vd
+from voxdisplay.bodies import VoxelModel
+from voxdisplay.curves.arguments import ArgumentError
 from voxdisplay.raster.color_map import color_map
 
 VALUES = np.random.default_rng(3).integers(0, 100, size=(7, 5, 3)).astype(np.float64)
@@ -165,3 +167,15 @@ def test_a_turned_model_has_no_holes():
 def test_wrong_arguments_are_named(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def test_models_that_are_moved_alone_keep_their_voxels_and_order() -> None:
+    voxels = np.array([(1, 2, 3), (4, 0, 6), (1, 2, 3)])
+    colors = np.array([(9, 9, 9), (1, 2, 3), (4, 5, 6)], dtype=np.uint8)
+    model = VoxelModel(voxels, colors, offset=(0.6, -0.4, 1))
+    found = vd.voxelize(model, clip=(7, 7, 7))
+    assert found.voxels.tolist() == [[2, 2, 4]]
+    assert found.colors.tolist() == [[4, 5, 6]]  # of equal ones the last; one is outside
+    assert model.colors is not colors
+    with pytest.raises(ArgumentError, match="colors have the shape"):
+        VoxelModel(voxels, colors[:2])

@@ -23,7 +23,8 @@ def voxelize_lit(
 ) -> VoxelSet:
     """Return the voxels inside a box: see `body_voxelization.Voxeliser`."""
     rows = np.flatnonzero(box.inside(geometry.voxels))
-    index = box.index_of(geometry.voxels[rows])
+    whole = len(rows) == len(geometry.voxels)
+    index = box.index_of(geometry.voxels if whole else geometry.voxels[rows])
     order = np.argsort(index, kind="stable")
     index = index[order]
     last = np.append(index[1:] != index[:-1], np.ones(len(index[:1]), dtype=bool))
