@@ -303,11 +303,10 @@ class VoxelModel(AffineSamples):
         """Return the voxels within a box: `Body.geometry`."""
         if (self.matrix == np.eye(3)).all():  # no two fall into one
             moved = self.voxels + np.floor(self.offset + 0.5).astype(self.voxels.dtype)
-            held = ((moved >= np.floor(bounds[0])) & (moved < bounds[1])).all(axis=1)
-            if not held.all():
-                moved, held = moved[held], np.flatnonzero(held)
-                return LitVoxels(moved, None if self.colors is None else self.colors[held])
-            return LitVoxels(moved, self.colors)
+            kept = ((moved >= np.floor(bounds[0])) & (moved < bounds[1])).all(axis=1)
+            if np.all(kept):
+                return LitVoxels(moved, self.colors)
+            return LitVoxels(moved[kept], None if self.colors is None else self.colors[kept])
         axes = self._axes()
         sizes = np.linalg.norm(self.matrix, axis=0)
         found, rows = [], []
