@@ -25,6 +25,7 @@ FEATURES: Final = {
     "palette": spec.FEATURE_PALETTE,
     "read": spec.FEATURE_READ,
     "digest": spec.FEATURE_DIGEST,
+    "slabs": spec.FEATURE_SLABS,
     "fade": spec.FEATURE_FADE,
     "arc2": spec.FEATURE_ARC2,
 }

@@ -15,6 +15,7 @@ from firmware_sim.memory import Page, PixelFormat
 from firmware_sim.operands import OPERAND_MASK, Operands
 from firmware_sim.packet_error import PacketError
 from firmware_sim.range_coded_chains import decode_chains
+from firmware_sim.range_coded_slabs import decode_slabs
 from firmware_sim.shapes import Brick, box, brick_offsets, line
 
 # Tables by byte: its four crumbs, its eight MONO1 pixels, its two differences modulo 256. A byte
@@ -214,6 +215,10 @@ class _PacketDecoder:
             else:
                 self._page.plot(array("Q", set(voxels)), pen)
 
+    def slabs(self, _: int) -> None:
+        for voxels in decode_slabs(self._operands, self._grid):
+            self._page.plot(array("Q", voxels), self._pen)
+
     def _draw_chain(self, octant: int, count: int, raw: bytes) -> None:
         self._check_cursor()
         crumbs = int.from_bytes(raw, "little")
@@ -327,6 +332,7 @@ def _op_table(features: int) -> list[_Op | None]:
         (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _PacketDecoder.step),
         (None, spec.OP_FROM, spec.LIMIT_MAX_OCTANT, _PacketDecoder.from_),
         (spec.FEATURE_ARC, spec.OP_ARC, 0, _PacketDecoder.arc),
+        (spec.FEATURE_SLABS, spec.OP_SLABS, 0, _PacketDecoder.slabs),
         (spec.FEATURE_ARC2, spec.OP_ARC2, 0, _PacketDecoder.arc2),
         (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _PacketDecoder.brick),
         (None, spec.OP_SKIP, last, _PacketDecoder.skip),

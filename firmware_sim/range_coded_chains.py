@@ -17,6 +17,7 @@ _SIDE_BITS: Final = 10  # of a coordinate in a Morton index
 _STOP_BITS: Final = 4  # of the number of a fade's colours
 _HISTORY: Final = 0x7F  # mask of seven steps
 _OTHERS: Final = 0x3F  # mask of the six before the latest
+_PACE: Final = 2  # the shift of a model is 1 + (seen >> 1)
 
 
 class _Axis:
@@ -105,6 +106,9 @@ def decode_chains(
     bits = RangeDecoder(
         operands.remaining(),
         lambda: operands.error(spec.CODE_TRUNCATED, "the payload ends inside the op"),
+        spec.ARC2_MODELS,  # those of ARC are the first
+        _PACE,
+        spec.ARC_ENOUGH,
     )
     axes = [_Axis(side) for side in grid.sides]
     has_near = second and max(grid.sides) <= spec.ARC2_MAX_SIDE

@@ -1,4 +1,4 @@
-"""Adaptive binary range decoder (7.7).
+"""Adaptive binary range decoder (7.7, 7.11).
 
 Knows nothing of what the bits mean.
 """
@@ -23,13 +23,28 @@ class RangeDecoder:
         The sequence.
     cut_off
         Returns the exception to raise if the sequence ends too early.
+    models
+        How many models there are.
+    pace
+        Bits after which a model adapts more slowly.
+    enough
+        Where a model stops counting.
     """
 
-    def __init__(self, data: bytes, cut_off: Callable[[], Exception]) -> None:
+    def __init__(
+        self,
+        data: bytes,
+        cut_off: Callable[[], Exception],
+        models: int,
+        pace: int,
+        enough: int,
+    ) -> None:
         self._data = data + bytes(spec.ARC_BEHIND)
         self._cut_off = cut_off
-        self._chances = [spec.ARC_HALF] * spec.ARC2_MODELS  # those of ARC are the first
-        self._seen = [0] * spec.ARC2_MODELS
+        self._chances = [spec.ARC_HALF] * models
+        self._seen = [0] * models
+        self._shifts = [1 + seen // pace for seen in range(enough + 1)]
+        self._enough = enough
         self._range = _RANGE
         self._code = int.from_bytes(self._data[:_BEGIN], "big")
         self._at = _BEGIN
@@ -73,11 +88,11 @@ class RangeDecoder:
 
     def _update(self, model: int, chance: int, bit: int) -> None:
         seen = self._seen[model]
-        shift = 1 + (seen >> 1)
+        shift = self._shifts[seen]
         self._chances[model] = (
             chance - (chance >> shift) if bit else chance + (_ONE - chance >> shift)
         )
-        if seen < spec.ARC_ENOUGH:
+        if seen < self._enough:
             self._seen[model] = seen + 1
 
     def plain_bits(self, count: int) -> int:

@@ -88,7 +88,7 @@ class VectorDevice:
         return sender.encode_packet(body[0] >> 4, body[0] & 15, body[1], body[2], body[3:])
 
 
-EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "ARC2", "READ", "DIGEST"}
+EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "ARC2", "READ", "DIGEST", "SLABS"}
 ONLY_INDEX8 = {"DIFF", "PALETTE"}
 NOT_MONO1 = {"FADE"}
 

@@ -14,6 +14,7 @@ from broken_devices import (  # noqa: F401 - each registers its own
     ops,
     packets,
     range_coded_chains,
+    range_coded_slabs,
     reads,
     refusals,
     second_chains,

@@ -24,7 +24,7 @@ def rx_buffer_too_small(patch):
 
 @mutant("5/info-fields")
 def unknown_feature(patch):
-    _announce(patch, features=0x3FF)
+    _announce(patch, features=0x8000_0FFF)
 
 
 @mutant("5/info-fields")

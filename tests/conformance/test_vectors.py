@@ -8,6 +8,7 @@ import pytest
 from drawing import decode_plainly
 from vector_device import VectorDevice, features_of, flags_of, state_of
 
+from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT
 from voxdisplay.raster.pixel_format import PixelFormat
@@ -23,6 +24,7 @@ from voxdisplay.wire.page_update import PageUpdate
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import PayloadLayout
 from voxdisplay.wire.range_coded_chains import encode_range_coded
+from voxdisplay.wire.slabs import encode_slabs
 from voxdisplay.wire.spans import decode_spans, encode_spans
 
 
@@ -131,10 +133,10 @@ def test_digest_of_the_driver(vector):
     assert found & 0xFFFFFFFF == vector.integer("digest")
 
 
-# What a plain reading knows, and what the driver codes: all but range-coded chains.
-no_arc = pytest.mark.parametrize(
+# What a plain reading knows, and what the driver codes: all that is not range-coded.
+not_range_coded = pytest.mark.parametrize(
     "vector",
-    [v for v in document.vectors("ops") if not v.name.startswith(("arc-", "arc2-"))],
+    [v for v in document.vectors("ops") if not v.name.startswith(("arc-", "arc2-", "slabs-"))],
     ids=str,
 )
 
@@ -149,7 +151,7 @@ def test_ops_as_the_driver_reads_them(vector):
     assert dict(zip(places, pixels, strict=True)) == vector.voxels()
 
 
-@no_arc
+@not_range_coded
 def test_ops_by_a_plain_reading(vector):
     format_ = PixelFormat[vector["format"]]
     page = decode_plainly([vector.hex("ops")], vector.grid, format_).page
@@ -216,14 +218,14 @@ def test_coders_of_the_driver(vector):
         assert decode_spans(page[12:], count, pixel_format).tolist() == values[:count].tolist()
 
 
-@no_arc
+@not_range_coded
 def test_coders_of_the_driver_by_a_plain_reading(vector):
     """The same with all features of the format."""
     format_ = PixelFormat[vector["format"]]
     meant = decode_plainly([vector.hex("ops")], vector.grid, format_)
     pixels = np.array(meant.page)
     content = PageUpdate(None, np.flatnonzero(pixels), lambda index: pixels[index])
-    features = features_of(vector) - {"palette", "read", "digest", "arc", "arc2"}
+    features = features_of(vector) - {"palette", "read", "digest", "arc", "arc2", "slabs"}
     bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in features)
     config = EncoderConfig(Grid(*vector.grid), format_, 64, bits)
     drawn = decode_plainly(
@@ -271,3 +273,38 @@ def test_arcs_of_the_driver(vector):
     pixel_format = PixelFormat(vector["format"].lower())
     config = EncoderConfig(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_ARC)
     assert encode_range_coded(voxels, pens, config) == [vector.hex("ops")]
+
+
+slabs = pytest.mark.parametrize(
+    "vector", [v for v in document.vectors("ops") if v.name.startswith("slabs-")], ids=str
+)
+
+
+@slabs
+def test_slabs_as_the_driver_reads_them(vector):
+    grid, format_ = Grid(*vector.grid), PixelFormat[vector["format"]]
+    meant = {place: int.from_bytes(pixel, "little") for place, pixel in vector.voxels().items()}
+    drawn = decode_ops([vector.hex("ops")], grid, format_)
+    voxels = map(tuple, grid.voxels_at(drawn.index).tolist())
+    assert dict(zip(voxels, drawn.values.tolist(), strict=True)) == meant
+
+
+@pytest.mark.parametrize("name", ["slabs-one-box", "slabs-wide-grid", "slabs-shell"])
+def test_slabs_of_the_driver(name):
+    """These vectors have the boxes that the document recommends."""
+    (vector,) = [v for v in document.vectors("ops") if v.name == name]
+    pixel_format = PixelFormat[vector["format"]]
+    config = EncoderConfig(Grid(*vector.grid), pixel_format, 1024, 1 << spec.FEATURE_SLABS)
+    voxels = np.array(list(vector.voxels()))
+    (pen,) = set(vector.voxels().values())
+    index = np.sort(config.grid.index_of(voxels))
+    assert encode_slabs(index, int.from_bytes(pen, "little"), config) == [vector.hex("ops")]
+
+
+@pytest.mark.parametrize(
+    "vector", [v for v in document.vectors("refused") if v.name.startswith("slabs-")], ids=str
+)
+def test_refused_slabs_as_the_driver_reads_them(vector):
+    if vector["code"] != "OP":  # the driver reads what it is given
+        with pytest.raises(RemoteProtocolError):
+            decode_ops([vector.hex("ops")], Grid(*vector.grid), PixelFormat[vector["format"]])

@@ -25,6 +25,10 @@ _OPS = {
     spec.OP_RAMP: "RAMP",
     spec.OP_ARC: "ARC",
     spec.OP_ARC2: "ARC2",
+    spec.OP_SLABS: "SLABS",
+}
+# Ops whose low five bits hold an operand.
+_OPS_WITH_OPERAND = {
     spec.OP_STEP: "STEP",
     spec.OP_FROM: "FROM",
     spec.OP_OCT: "OCT",
@@ -53,7 +57,7 @@ class Remark:
 
 def op_name(op: int) -> str:
     """Return the name of an op byte."""
-    return _OPS.get(op) or _OPS.get(op & 0xE0, "") or f"op {op:02X}"
+    return _OPS.get(op) or _OPS_WITH_OPERAND.get(op & 0xE0, "") or f"op {op:02X}"
 
 
 class AnnotatingDecoder(ReferenceDecoder):
@@ -87,7 +91,7 @@ class AnnotatingDecoder(ReferenceDecoder):
     def _describe_op(self, op: int, at: int, pen: int) -> str:
         operands = self._payload[at + 1 : self._at]
         words = [f"{op_name(op):6}"]
-        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op not in {spec.OP_ARC, spec.OP_ARC2}:
+        if op & 0xE0 in {spec.OP_STEP, spec.OP_FROM} and op not in _OPS:
             main, signs = self.axes_of(op & 0x1F)
             words.append("".join("-+"[sign > 0] + "xyz"[axis] for axis, sign in enumerate(signs)))
             words.append(f"by {'xyz'[main]},")

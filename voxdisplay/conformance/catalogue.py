@@ -83,6 +83,7 @@ SECTIONS = {
     "7.6": "the palette",
     "7.7": "range-coded chains",
     "7.8": "the grid's edges",
+    "7.11": "range-coded slabs",
     "8": "the digest",
     "9": "ACK",
     "9.1": "the window",

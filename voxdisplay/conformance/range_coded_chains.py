@@ -26,23 +26,32 @@ class Coder(Protocol):
         """Code a number of n bits without models; return it."""
 
 
-class _Models:
-    def __init__(self) -> None:
-        self.p = [spec.ARC_HALF] * spec.ARC2_MODELS  # those of ARC are the first
-        self.seen = [0] * spec.ARC2_MODELS
+class Models:
+    """Adaptive models: how many, after how many bits one adapts more slowly and stops counting."""
+
+    def __init__(self, count: int, pace: int, enough: int) -> None:
+        self.p = [spec.ARC_HALF] * count
+        self.seen = [0] * count
+        self.pace = pace
+        self.enough = enough
 
     def learn(self, i: int, bit: int) -> None:
-        shift = 1 + (self.seen[i] >> 1)
+        """Adapt a model to a bit."""
+        shift = 1 + self.seen[i] // self.pace
         if bit:
             self.p[i] -= self.p[i] >> shift
         else:
             self.p[i] += (4096 - self.p[i]) >> shift
-        self.seen[i] = min(self.seen[i] + 1, spec.ARC_ENOUGH)
+        self.seen[i] = min(self.seen[i] + 1, self.enough)
+
+
+def _chain_models() -> Models:
+    return Models(spec.ARC2_MODELS, 2, spec.ARC_ENOUGH)  # those of ARC are the first
 
 
 class _RangeCoder:
-    def __init__(self) -> None:
-        self.models = _Models()
+    def __init__(self, models: Models | None) -> None:
+        self.models = models or _chain_models()
         self.range = _TOP
 
     def bit(self, i: int, j: int | None = None, want: int = 0) -> int:
@@ -66,8 +75,10 @@ class _RangeCoder:
 class Decoder(_RangeCoder):
     """Range decoder: ignores the values to encode."""
 
-    def __init__(self, data: bytes, refusal: Callable[[int], Exception]) -> None:
-        super().__init__()
+    def __init__(
+        self, data: bytes, refusal: Callable[[int], Exception], models: Models | None = None
+    ) -> None:
+        super().__init__(models)
         self._data = data
         self._refusal = refusal
         self._at = 0
@@ -103,8 +114,8 @@ class Decoder(_RangeCoder):
 class Encoder(_RangeCoder):
     """Range encoder."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, models: Models | None = None) -> None:
+        super().__init__(models)
         self._low = 0
         self._numbers: list[int] = []
 

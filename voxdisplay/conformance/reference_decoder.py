@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from voxdisplay.conformance import range_coded_chains, second_chains
+from voxdisplay.conformance import range_coded_chains, range_coded_slabs, second_chains
 from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
 from voxdisplay.conformance.fades import Fade, blend, color_bytes
 from voxdisplay.conformance.reference_page import Page, rgb
@@ -250,6 +250,11 @@ class ReferenceDecoder:
                 self.pen, self.fade = pen, None
             self.write_row([voxel])
 
+    def op_slabs(self, _: int) -> None:
+        """SLABS: draw range-coded slabs."""
+        for voxel in range_coded_slabs.decode(self.rest(), self.device, self.refusal):
+            self.write_voxels([voxel])
+
     def op_pen(self, _: int) -> None:
         """PEN: set the pen."""
         pen = self.pixel_of(self._take(self.device.pixel_bytes))
@@ -422,6 +427,7 @@ _OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] 
     (spec.OP_FROM, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_from),
     (spec.OP_ARC, 0, "ARC", ReferenceDecoder.op_arc),
     (spec.OP_ARC2, 0, "ARC2", ReferenceDecoder.op_arc2),
+    (spec.OP_SLABS, 0, "SLABS", ReferenceDecoder.op_slabs),
     (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", ReferenceDecoder.op_brick),
     (spec.OP_SKIP, 31, "", ReferenceDecoder.op_skip),
     (spec.OP_RUN, 31, "", ReferenceDecoder.op_run),

@@ -2,9 +2,10 @@
 
 Ordered voxels are encoded as chains, sets of voxels as bricks, dots and boxes, or as spans in scan
 order. Each candidate is laid out and its bytes are counted, unless a lower bound rules it out.
-Range coding is slow: for a fast link ARC is left out of the features (`features`). Each voxel has
-one pixel value here, so that op blocks may come in any order; for a fast line dense sets are
-encoded in independent slabs, so that the first can be sent at once. Must not know frames or links.
+Range coding is slow: for a fast link ARC and SLABS are left out of the features (`features`). Each
+voxel has one pixel value here, so that op blocks may come in any order; for a fast line dense sets
+are encoded in independent parts, so that the first can be sent at once. Must not know frames or
+links.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.pixel_map import contains
-from voxdisplay.wire import range_coded_chains, sorted_chains, spans, spec, voxel_sets
+from voxdisplay.wire import range_coded_chains, slabs, sorted_chains, spans, spec, voxel_sets
 from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.fades import FADED, FadedRows
@@ -31,6 +32,9 @@ _CHAINS_FROM = 800_000
 _LONE_FRACTION = 16  # unless one voxel in so many is isolated
 # Bits of a range-coded step, at least: curves were seen to take 1.1, surfaces in any order 4.
 _LEAST_STEP_BITS, _LEAST_SET_STEP_BITS = 0.5, 2.0
+# Pixel values that may get slabs of their own, in packets of their own: each costs so many bytes.
+_MANY_PENS = 16
+_PACKET_BYTES = 9
 # Bytes of a typical set for each byte of its lower bound.
 _TYPICAL_FACTOR = 1.5
 
@@ -56,6 +60,67 @@ def encode_update(
         At most ``config.max_payload`` bytes each, none of them empty.
 
     """
+    known = _with_known_order(update, config) if config.has(spec.FEATURE_SLABS) else update
+    if config.has(spec.FEATURE_SLABS) and len(known.unordered):
+        yield from _encode_with_slabs(update, known, config, first)
+    else:
+        yield from _encode_parts(update, config, first)
+
+
+def _encode_with_slabs(
+    update: PageUpdate, known: PageUpdate, config: EncoderConfig, first: OpBlocks | None
+) -> Iterator[list[bytes]]:
+    """Yield the payloads of an update, its sets range-coded if that takes fewer bytes on the wire.
+
+    Both are counted before anything is yielded: range coding is for slow lines.
+    """
+    best: list[bytes] = []
+    for portion in _encode_parts(update, config, first):
+        best += portion
+        yield []
+    in_slabs, index = _encode_sets(known, config)
+    if in_slabs:
+        rest = PageUpdate(known.ordered, index, known.pixels_at)
+        for portion in _encode_parts(rest, config, first):
+            in_slabs += portion
+            yield []
+        if _wire_bytes(in_slabs) < _wire_bytes(best):
+            best = in_slabs
+    yield best
+
+
+def _wire_bytes(payloads: list[bytes]) -> int:
+    """Return the bytes of payloads on the wire, about."""
+    return sum(map(len, payloads)) + _PACKET_BYTES * len(payloads)
+
+
+def _encode_sets(update: PageUpdate, config: EncoderConfig) -> tuple[list[bytes], Ints]:
+    """Return range-coded slabs of the pixel values that take fewer bytes so, and the other voxels.
+
+    An op has one pen: of many values the most frequent are tried.
+    """
+    index, values = update.unordered, update.pixels_at(update.unordered)
+    if is_incompressible(index, values):
+        return [], index
+    pens, rank, counts = np.unique(values, return_inverse=True, return_counts=True)
+    bytes_as_set = counts
+    if voxel_sets.has_set_ops(config) and len(pens) > 1:
+        bytes_as_set = voxel_sets.encode_set(index, values, config).bytes_per_value
+    payloads: list[bytes] = []
+    rest = np.ones(len(index), dtype=np.bool_)
+    for number in np.argsort(-counts, kind="stable")[:_MANY_PENS].tolist():
+        rows = rank == number
+        coded = slabs.encode_slabs(index[rows], int(pens[number]), config)
+        if len(pens) == 1 or _wire_bytes(coded) < bytes_as_set[number]:
+            payloads += coded
+            rest &= ~rows
+    return payloads, index[rest]
+
+
+def _encode_parts(
+    update: PageUpdate, config: EncoderConfig, first: OpBlocks | None
+) -> Iterator[list[bytes]]:
+    """Yield the payloads of an update without range-coded slabs, part after part."""
     chained = None if len(update.unordered) else update.ordered
     update = _with_known_order(update, config)
     for part in partition(update, config):

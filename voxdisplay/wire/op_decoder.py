@@ -22,6 +22,7 @@ from voxdisplay.wire import op_expansion, spec
 from voxdisplay.wire.fades import FadedPens
 from voxdisplay.wire.op_encoding import Ints
 from voxdisplay.wire.range_coded_chain_decoder import decode_range_coded
+from voxdisplay.wire.slab_decoder import decode_slabs
 
 # Bits of a mask or of crumbs, by byte: all, and those for the first and for the second other axis.
 _ONES: Final = bytes(byte.bit_count() for byte in range(256))
@@ -339,6 +340,16 @@ class _Parser:
         """Read ARC2."""
         self.read_arc(second=True)
 
+    def read_slabs(self) -> None:
+        """Read SLABS, which takes the rest."""
+        raw = self._take(len(self._data) - self._at)
+        try:
+            for index in decode_slabs(raw, self._grid):
+                self._reserve(len(index))
+                self._shapes.add_dots(self._ops, self._pen, index)
+        except ValueError as error:
+            raise self._error(str(error)) from error
+
     def _chain(self, octant: int, begin: int, *, again: bool = False) -> None:
         steps = self._take(1)[0] + 1
         crumbs = self._take(-(-steps // 4))
@@ -434,6 +445,7 @@ _SIMPLE: Final = {
     spec.OP_FADE: _Parser.read_fade,
     spec.OP_RAMP: _Parser.read_ramp,
     spec.OP_ARC: _Parser.read_arc,
+    spec.OP_SLABS: _Parser.read_slabs,
     spec.OP_ARC2: _Parser.read_arc2,
 }
 _COUNTED: Final = {

@@ -129,6 +129,7 @@ _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]
     "RAMP": (spec.OP_RAMP, 0xFF, lambda payload, at, _config: 4 + 3 * (payload[at + 3] + 1)),
     "STEP": (spec.OP_STEP, 0xE0, _chain),
     "ARC": (spec.OP_ARC, 0xFF, _rest),
+    "SLABS": (spec.OP_SLABS, 0xFF, _rest),
     "ARC2": (spec.OP_ARC2, 0xFF, _rest),
     "FROM": (spec.OP_FROM, 0xE0, _chain),
     "OCT": (spec.OP_OCT, 0xE0, _brick),

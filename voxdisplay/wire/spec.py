@@ -68,6 +68,7 @@ FEATURE_ARC: Final = 5
 FEATURE_PALETTE: Final = 6
 FEATURE_READ: Final = 7
 FEATURE_DIGEST: Final = 8
+FEATURE_SLABS: Final = 9
 FEATURE_FADE: Final = 10
 FEATURE_ARC2: Final = 11
 
@@ -88,6 +89,7 @@ OP_RAMP: Final = 0x09
 OP_STEP: Final = 0x20
 OP_FROM: Final = 0x40
 OP_ARC: Final = 0x58
+OP_SLABS: Final = 0x59
 OP_ARC2: Final = 0x5A
 OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
@@ -119,6 +121,19 @@ ARC2_DELTA: Final = 268
 ARC2_MODELS: Final = 298
 ARC2_MAX_DELTA: Final = 30
 ARC2_MAX_SIDE: Final = 1024
+
+# Section 7.11: range-coded slabs
+SLABS_MORE: Final = 0
+SLABS_NEXT: Final = 1
+SLABS_FLAG: Final = 2
+SLABS_FULL: Final = 258
+SLABS_GROUP: Final = 322
+SLABS_SHAPE: Final = 386
+SLABS_MODELS: Final = 2434
+SLABS_ENOUGH: Final = 6
+SLABS_PACE: Final = 3
+SLABS_CELL: Final = 4
+SLABS_SIDE_BITS: Final = 4
 
 # Section 8: the digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1

@@ -21,8 +21,9 @@ def test_present_read_and_clear(format_, refresh):
     display, pipe = open_display(pixel_format=format_, refresh=refresh)
     assert display.info.grid == GRID
     assert display.info.format.value == format_
-    every = {"line", "box", "dots", "oct", "arc", "read", "digest"}
+    every = {"line", "box", "dots", "oct", "arc", "read", "digest", "arc2", "slabs"}
     every |= {"diff", "palette"} if format_ == "index8" else set()
+    every |= {"fade"} if format_ != "mono1" else set()
     assert set(display.info.features) == every
     for number in (1, 2):
         frame = random_frame(display, number)

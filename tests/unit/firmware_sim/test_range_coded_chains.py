@@ -227,7 +227,7 @@ def test_the_longest_number() -> None:
     coder = Coder()
     for value in (65_534, 0, 32_766, 32_767, 1):
         coder.number(value)
-    bits = RangeDecoder(coder.end(), AssertionError)
+    bits = RangeDecoder(coder.end(), AssertionError, 266, 2, 6)
     assert [bits.number() for _ in range(5)] == [65_534, 0, 32_766, 32_767, 1]
     assert bits.exhausted
 

@@ -12,6 +12,7 @@ from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is t
     fades,
     range_coded_chains,
     second_chains,
+    range_coded_slabs,
     digests,
     acks,
     window,

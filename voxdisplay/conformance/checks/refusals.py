@@ -106,6 +106,7 @@ def reserved_ops(probe: Probe) -> None:
         spec.OP_FADE: "FADE",
         spec.OP_RAMP: "RAMP",
         spec.OP_ARC: "ARC",
+        spec.OP_SLABS: "SLABS",
         spec.OP_ARC2: "ARC2",
     }
     for op in range(256):
