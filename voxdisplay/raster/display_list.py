@@ -195,21 +195,24 @@ class DisplayList:
         if self._resolved:
             return
         drawn = concatenate_drawn(self._items)
-        index, values, row = drawn.index, drawn.values, None
+        self._items = [drawn]  # the same picture; the parts need no memory any more
+        index, values = drawn.index, drawn.values
         if not (index[1:] > index[:-1]).all():
-            key = np.sort(index << _ROW_BITS | np.arange(len(index)))  # faster than argsort
+            key = index << _ROW_BITS
+            key |= np.arange(len(index))
+            key.sort()  # faster than argsort
             row = key & ((1 << _ROW_BITS) - 1)
-            index = key >> _ROW_BITS
-            del key
-            values = values[row]
+            key >>= _ROW_BITS
+            index, values = key, values[row]
             last = np.append(index[1:] != index[:-1], True)
             if not last.all():
                 # A covered voxel never shows again: a newer item would have drawn it.
                 final = values[last]
                 visible = np.empty(len(row), dtype=np.bool_)
                 visible[row] = values == final[np.cumsum(last) - last]
-                drawn = drawn.select(visible)
                 index, values = index[last], final
+                del key, row
+                drawn = drawn.select(visible)
         self._items = [drawn]
         self._pixels = PixelMap(index, values)
         self._resolved = True

@@ -40,10 +40,10 @@ from voxdisplay.voxelization.voxel_events import VoxelEvents
 
 # Curves handled at once: enough to make the cost of a batch negligible, but fewer if they are long:
 # all processors together hold at most so many voxels.
-MAX_BATCH_CURVES = 4096
+MAX_BATCH_CURVES = 2048
 MAX_BATCH_VOXELS = 2_000_000
 # Batches for each processor before their size is adapted again to the length of the curves.
-BATCHES_PER_PROCESSOR = 8
+BATCHES_PER_PROCESSOR = 4
 
 ONE_PIECE = np.zeros(1, dtype=np.int64)
 ONE_PIECE.flags.writeable = False

@@ -94,11 +94,15 @@ def _stays(samples: Samples, corners: Ints, closed: Bools) -> Bools:
     cosine = -(back * on).sum(axis=0) / np.maximum(lengths[0] * lengths[1], TINY)
     stays &= cosine < MAX_COSINE
 
-    step = np.abs(samples.points[:, 1:] - samples.points[:, :-1]).max(axis=0)
-    along = np.append(0.0, np.cumsum(np.where(samples.joined, step, 0.0)))
     turns = stays.nonzero()[0]
-    first, last = samples.bounds[piece[turns]], samples.bounds[piece[turns] + 1] - 1
+    bounds = samples.bounds
+    first, last = bounds[piece[turns]], bounds[piece[turns] + 1] - 1
     at = corners[turns]
+    step = np.abs(samples.points[:, 1:] - samples.points[:, :-1]).max(axis=0)
+    along = np.zeros(samples.t.size)
+    for low, high in dict.fromkeys(zip(first.tolist(), last.tolist(), strict=True)):
+        # Piece by piece: a sum over all of them would round otherwise for each neighbour.
+        np.cumsum(step[low:high], out=along[low + 1 : high + 1])
     before = np.maximum(np.append(-1, at[:-1]), first)
     after = np.minimum(np.append(at[1:], samples.t.size), last)
     near = np.minimum(along[at] - along[before], along[after] - along[at])

@@ -314,6 +314,14 @@ def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
         for closed in (False, True)
     ]
     curves += [*CURVES.values(), Function(lambda t: (9 * t, 9 * (t > 0.5), t))]
+    # Some sides are as long as corners must be apart, up to rounding.
+    rng = np.random.default_rng(2)
+    for _ in range(80):
+        sides = np.where(rng.random(2) < 0.5, 8, rng.integers(2, 20, 2))
+        across, up = sides[:, None] * np.eye(3)[rng.permutation(3)[:2]]
+        corner = rng.integers(9, 99, 3) + rng.choice((0.0, 0.3, 0.5))
+        corners = corner + [0 * up, across, across + up, up]
+        curves.append(vd.Polyline(corners, closed=True))
     for curve, many in zip(curves, voxelize_many(curves), strict=True):
         alone = voxelize(curve)
         assert np.array_equal(alone.voxels, many.voxels)
