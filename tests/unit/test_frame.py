@@ -6,6 +6,7 @@ from drawing import page_after, values_of
 
 from voxdisplay import Circle, CurveError, Parametric, Points, Scene, Segment, read_scene, voxelize
 from voxdisplay.frame import Frame
+from voxdisplay.raster import display_list
 from voxdisplay.raster.pixel_format import PixelFormat
 
 GRID = (17, 64, 40)
@@ -330,7 +331,9 @@ def test_masked_arrays_are_refused():
 
 
 @pytest.mark.parametrize("pixels", ["mono1", "index8", "rgb565", "rgb888", "own palette"])
-def test_many_curves_drawn_together_are_as_one_by_one(pixels: str) -> None:
+def test_many_curves_drawn_together_are_as_one_by_one(
+    pixels: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng(4)
     colors = ["red", "#123456", ["red", "lime", "blue"], (1, 2, 3), "black", ["gold"] * 5]
     curves = [Circle(rng.uniform(-2, 9, 3), rng.uniform(0.2, 4)) for _ in range(30)]
@@ -343,6 +346,8 @@ def test_many_curves_drawn_together_are_as_one_by_one(pixels: str) -> None:
     drawings = together.draw_all(items)
     assert drawings == [single.draw(curve, color) for curve, color in items]
     assert any(each.clipped for each in drawings)
+    single.lit()
+    monkeypatch.setattr(display_list, "_BLOCK_ROWS", 7)
     assert together == single
     features = ["palette"]
     assert together.payloads(1024, features) == single.payloads(1024, features)

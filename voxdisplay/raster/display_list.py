@@ -7,7 +7,7 @@ Must not know curves, colours or encodings.
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.pixel_map import EMPTY, PixelMap
 
+_BLOCK_ROWS = 1 << 18
 _ROW_BITS = 32  # of a sort key: an index and a row fit one int64 together
 
 
@@ -199,23 +200,37 @@ class DisplayList:
         index, values = drawn.index, drawn.values
         if not (index[1:] > index[:-1]).all():
             key = index << _ROW_BITS
-            key |= np.arange(len(index))
+            for rows in _blocks(len(key)):
+                key[rows] |= np.arange(rows.start, rows.start + len(key[rows]))
             key.sort()  # faster than argsort
-            row = key & ((1 << _ROW_BITS) - 1)
+            row = key.astype(np.uint32)  # the lower half
             key >>= _ROW_BITS
-            index, values = key, values[row]
+            index, values = key, np.empty_like(values)
+            for rows in _blocks(len(row)):
+                values[rows] = drawn.values[row[rows]]
             last = np.append(index[1:] != index[:-1], True)
             if not last.all():
                 # A covered voxel never shows again: a newer item would have drawn it.
                 final = values[last]
                 visible = np.empty(len(row), dtype=np.bool_)
-                visible[row] = values == final[np.cumsum(last) - last]
+                before = 0
+                for rows in _blocks(len(row)):
+                    ends = last[rows]
+                    nth = np.cumsum(ends) - ends + before
+                    visible[row[rows]] = values[rows] == final[nth]
+                    before += int(np.count_nonzero(ends))
                 index, values = index[last], final
                 del key, row
                 drawn = drawn.select(visible)
         self._items = [drawn]
         self._pixels = PixelMap(index, values)
         self._resolved = True
+
+
+def _blocks(size: int) -> Iterator[slice]:
+    """Yield slices that make up so many rows, so that temporary arrays are small."""
+    for low in range(0, size, _BLOCK_ROWS):
+        yield slice(low, low + _BLOCK_ROWS)
 
 
 def _concatenated_spreads(

@@ -306,6 +306,12 @@ def test_no_curves() -> None:
     assert voxelize_many([]) == []
 
 
+def rectangle(rng: np.random.Generator, width: float, height: float) -> vd.Polyline:
+    across, up = np.array([[width], [height]]) * np.eye(3)[rng.permutation(3)[:2]]
+    corner = rng.integers(9, 99, 3) + rng.choice((0.0, 0.3, 0.5))
+    return vd.Polyline(np.array([0 * up, across, across + up, up]) + corner, closed=True)
+
+
 def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
     curves = [
         fourier_curve(seed, kind, closed=closed)
@@ -316,12 +322,8 @@ def test_a_curve_is_the_same_alone_and_in_a_batch() -> None:
     curves += [*CURVES.values(), Function(lambda t: (9 * t, 9 * (t > 0.5), t))]
     # Some sides are as long as corners must be apart, up to rounding.
     rng = np.random.default_rng(2)
-    for _ in range(80):
-        sides = np.where(rng.random(2) < 0.5, 8, rng.integers(2, 20, 2))
-        across, up = sides[:, None] * np.eye(3)[rng.permutation(3)[:2]]
-        corner = rng.integers(9, 99, 3) + rng.choice((0.0, 0.3, 0.5))
-        corners = corner + [0 * up, across, across + up, up]
-        curves.append(vd.Polyline(corners, closed=True))
+    sides = np.where(rng.random((80, 2)) < 0.5, 8, rng.integers(2, 20, (80, 2)))
+    curves += [rectangle(rng, *pair) for pair in sides]
     for curve, many in zip(curves, voxelize_many(curves), strict=True):
         alone = voxelize(curve)
         assert np.array_equal(alone.voxels, many.voxels)
