@@ -7,7 +7,6 @@ read the responses.
 
 import contextlib
 import errno
-import ipaddress
 import os
 import socket
 from collections.abc import Iterator
@@ -207,6 +206,8 @@ def require_loopback(host: str, what: str = "look on", *, remote: bool) -> None:
     OSError
         If there is no such address.
     """
+    import ipaddress  # noqa: PLC0415 - devices in the host's process have no address
+
     _, address = _resolve(host, None)
     if not (remote or ipaddress.ip_address(address[0]).is_loopback):
         raise PermissionError(

@@ -7,7 +7,7 @@ so positions can be added without a carry from one axis to the next.
 
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from functools import reduce
+from functools import cache, reduce
 from itertools import repeat
 from operator import add
 from typing import Final
@@ -29,10 +29,17 @@ def _children(level: int, mask: int) -> tuple[int, ...]:
     return tuple(half * _brick_index(c & 1, c >> 1 & 1, c >> 2) for c in range(8) if mask >> c & 1)
 
 
-# By level and mask: the positions of a node's children. Mask 00 has none, but at the lowest level
-# it writes all voxels as FF does.
-_CHILDREN: Final = [[_children(level, mask) for mask in range(256)] for level in _LEVELS]
-_CHILDREN[1][0] = _CHILDREN[1][0xFF]
+@cache
+def _children_by_mask(level: int) -> list[tuple[int, ...]]:
+    """Return the positions of a node's children by its mask.
+
+    Mask 00 has none, but at the lowest level it writes all voxels as FF does.
+    """
+    children = [_children(level, mask) for mask in range(256)]
+    if level == 1:
+        children[0] = children[0xFF]
+    return children
+
 
 # By level: the positions at which the rows of a cube begin.
 _ROWS: Final = [
@@ -127,7 +134,7 @@ class Brick:
             if j > 1 and 0 in found:
                 full = [node for node, mask in zip(nodes, found, strict=True) if not mask]
                 self.rows.append((1 << j, [node + row for node in full for row in _ROWS[j]]))
-            children = _CHILDREN[j]
+            children = _children_by_mask(j)
             nodes = [
                 node + child
                 for node, mask in zip(nodes, found, strict=True)

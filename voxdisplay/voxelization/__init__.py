@@ -16,7 +16,7 @@ from typing import Any, overload
 from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
 from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
-from voxdisplay.voxelization import measure, tangent_march
+from voxdisplay.voxelization import measure
 from voxdisplay.voxelization.body_voxelization import MAX_SPAN, box_of, voxelize_body
 from voxdisplay.voxelization.digitise import digitise
 from voxdisplay.voxelization.point_indices import point_indices
@@ -169,9 +169,12 @@ def voxelize_many(
         return list(chain.from_iterable(digitise(curves, certified=certified)))
     if certified:
         raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
+    # Curves that are drawn take the other method, and start sooner without this one.
+    from voxdisplay.voxelization.tangent_march import march  # noqa: PLC0415
+
     many = len(curves) > 1
     return [
-        tangent_march.march(
+        march(
             curve,
             variant,
             tangent=tangent,
