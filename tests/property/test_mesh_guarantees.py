@@ -55,7 +55,8 @@ def check(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if mesh.closed:
         check_mirrored(mesh, plain, seed % 3)
     check_shifted(mesh, chance.integers(-4, 5, 3))
-    assert key(voxels(mesh.split(chance))) == plain, (seed, "split")
+    if mesh.kind == "smooth" or not has_doubles(mesh):
+        assert key(voxels(mesh.split(chance))) == plain, (seed, "split")
 
 
 def check_distances(mesh: RandomMesh, found, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,6 +107,11 @@ def has_inside(mesh: RandomMesh) -> bool:
     a, b, c = (scaled[mesh.faces[:, k]] for k in range(3))
     volume = (a * np.cross(b, c)).sum()
     return bool(volume) and not voxels(mesh, fill="solid").notes
+
+
+def has_doubles(mesh: RandomMesh) -> bool:
+    """Two sides that coincide count once as long as they are the same triangles."""
+    return any("more than once" in note for note in voxels(mesh, fill="solid").notes)
 
 
 def check_mirrored(mesh: RandomMesh, plain, axis: int) -> None:
