@@ -24,7 +24,7 @@ TOLERANCE = 0.02
 """Greatest distance between triangles and surface, in voxels."""
 MAX_TRIANGLES = 1 << 20
 _LONGEST = 4.0  # edges, in voxels
-_LONG, _FAR = 24.0, 1.0  # edges of the first grid, and their middles off the surface, in voxels
+_LONG, _FAR = 24.0, 0.25  # edges of the first grid, and their middles off the surface, in voxels
 _GRID = 1 << 13  # points of the first grid, at most
 _DEEP, _SHORT = 9, 0.3  # edges halved so often, and so short, in voxels, are left: there is an end
 _SHRINKS = 0.75  # of its length is what is left of an edge that was halved, at most
@@ -127,6 +127,7 @@ class _Refinement:
         lines = [np.linspace(*ends, CELLS + 1) for ends in (u, v)]
         position = self._halve_lines(lines)
         seams = self._seam(0), self._seam(1)
+        self.lines = lines
         self.mesh = first_grid(lines[0], lines[1], position, *seams)
         self.mesh.level += int(np.log2(min(each.size - 1 for each in lines) // CELLS))
         self.length = np.zeros(0)
@@ -212,14 +213,21 @@ class _Refinement:
         """Choose the longest edges of flat triangles of which another edge is chosen.
 
         Otherwise halving could go on for ever beside an edge that happens to follow the surface in
-        its middle, with ever flatter triangles. Lengths are those in the plane of parameters.
+        its middle, with ever flatter triangles. Lengths are those in the plane of parameters, in
+        which all cells of the first grid are squares.
         """
         mesh = self.mesh
-        scale = [end - begin for begin, end in self.ranges]
+        at = np.stack(
+            [
+                np.interp(mesh.uv[:, k], line, np.linspace(0.0, 1.0, line.size))
+                for k, line in enumerate(self.lines)
+            ],
+            axis=1,
+        )
         touched = np.flatnonzero(chosen[mesh.sides].any(axis=1))
         while touched.size:
             sides = mesh.sides[touched]
-            a, b = (mesh.uv[mesh.ends[sides, k]] / scale for k in (0, 1))
+            a, b = (at[mesh.ends[sides, k]] for k in (0, 1))
             length = np.hypot(*np.moveaxis(b - a, -1, 0))
             order = np.sort(length, axis=1)
             flat = order[:, 2] > _LONGER * order[:, 1]

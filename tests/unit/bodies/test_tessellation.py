@@ -6,6 +6,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
+import voxdisplay as vd
 from voxdisplay.bodies.geometry import TriangleMesh
 from voxdisplay.bodies.surface import Surface
 from voxdisplay.errors import BodyError, CurveError
@@ -156,3 +157,20 @@ def test_solids_are_filled_where_the_box_cuts_them_and_sheets_have_no_notes() ->
     assert sheet.notes == ()
     assert sheet.parameters["v"].min() < -3.5
     assert len(sheet.parameters["u"]) == len(sheet)
+
+
+def test_a_pole_between_two_lines_of_the_first_grid_is_found():
+    found = vd.voxelize(vd.Surface("u", "v", "1/(u - 20)", u=(0, 99), v=(0, 99)), clip=(99, 99, 60))
+    assert "poles" in " ".join(found.notes)
+    x, _, z = found.voxels.T
+    assert z.max() == 59
+    heights = {int(a): int(b) for a, b in zip(x, z, strict=True) if a > 21}
+    assert all(z == int(1 / (x + 0.5 - 20)) for x, z in heights.items())
+
+
+def test_a_surface_far_larger_than_its_box_is_drawn():
+    wide = vd.Surface("u", "v", "u*v/9 + 30", u=(-1e9, 1e9), v=(-1e9, 1e9))
+    voxels = vd.voxelize(wide, clip=(40, 40, 60)).voxels + 0.5
+    assert len(voxels) > 800
+    x, y, z = voxels.T
+    assert (np.abs(x * y / 9 + 30 - z) / np.sqrt(1 + (x / 9) ** 2 + (y / 9) ** 2)).max() < 0.55
