@@ -5,7 +5,9 @@ memory with the emulator in the same process, then peak memory of the driver and
 processes of their own, over a pty. The others show moving pictures to an emulator in the same
 process, the same number of lit voxels in each volume: in the middle of it as in the smallest (the
 same voxels), or as small circles all over it (spread). A ratio is that to the smallest volume with
-as many voxels lit.
+as many voxels lit. The last table reads, voxelises and draws scenes of many circles, and of as many
+open arcs that are as long, each in a process of its own; there a ratio is that of circles to arcs,
+of what is voxelised and drawn. More objects than a scene may have are several scenes on one frame.
 """
 
 from __future__ import annotations
@@ -25,10 +27,12 @@ from numpy.typing import NDArray
 
 import voxdisplay as vd
 from firmware_sim.device_on_line import DeviceOnLine
+from voxdisplay.scene.builder import MAX_ITEMS
 
 SEED = 24
 SIDES, FORMATS = (128, 256, 512, 1024), ("mono1", "rgb888")
 LIT = (200, 2000, 20_000, 200_000)
+MANY = (20_000, 200_000)  # objects
 _MEGABYTE = 1 << 20
 _RADIUS = 8  # voxels, of the circles that are spread
 _MOVES = 8  # voxels that a picture moves by at most
@@ -153,12 +157,71 @@ def frames(
     }
 
 
-def frames_apart(*case: object) -> dict[str, float]:
-    """Run `frames` in a process of its own, so that its memory is its own."""
-    command = [sys.executable, __file__, json.dumps(case)]
+def apart(name: str, *case: object) -> dict[str, float]:
+    """Run a measurement of this module in a process of its own, so that its memory is its own."""
+    command = [sys.executable, __file__, json.dumps([name, *case])]
     run = subprocess.run(command, check=True, stdout=subprocess.PIPE)
     found: dict[str, float] = json.loads(run.stdout)
     return found
+
+
+def many_objects(kind: str, count: int) -> dict[str, float]:
+    """Read, voxelise and draw scenes of circles or arcs; return processor seconds and bytes."""
+    vd.read_scene(json.dumps({"size": [8, 8, 8], "objects": _objects(kind, 2)}))  # imports
+    texts = [
+        json.dumps({"size": [512] * 3, "objects": _objects(kind, min(count - low, MAX_ITEMS))})
+        for low in range(0, count, MAX_ITEMS)
+    ]
+    frame = vd.Frame((512, 512, 512))
+    read_s = drawn_s = voxels = 0.0
+    while texts:
+        began_s = time.process_time()
+        scene = vd.read_scene(texts.pop())
+        read_s += time.process_time() - began_s
+        began_s = time.process_time()
+        voxels += frame.draw(scene).voxels
+        drawn_s += time.process_time() - began_s
+        del scene
+    began_s = time.process_time()
+    frame.lit()
+    drawn_s += time.process_time() - began_s
+    return {
+        "voxels": voxels,
+        "read_s": read_s,
+        "drawn_s": drawn_s,
+        "peak_bytes": peak_of(os.getpid()),
+    }
+
+
+def _objects(kind: str, count: int) -> list[dict[str, Any]]:
+    """Return circles of radius 3.5 all over the volume, or arcs that are all but closed."""
+    rng = np.random.default_rng(SEED)
+    centres = rng.uniform(10, 502, (count, 3)).round(3).tolist()
+    normals = rng.normal(size=(count, 3)).round(3).tolist()
+    ends = {"start": 0.0, "end": 6.2} if kind == "arc" else {}
+    return [
+        {"type": kind, "center": center, "normal": normal, "radius": 3.5, "color": "orange"} | ends
+        for center, normal in zip(centres, normals, strict=True)
+    ]
+
+
+def bench_many(repeats: int, *, quick: bool) -> None:
+    """Print the table of scenes of many objects."""
+    print(
+        f"\n{'many objects':<24}{'voxels':>9}{'read s':>9}{'draw s':>9}{'ratio':>7}{'peak MB':>9}"
+    )
+    for count in (200,) if quick else MANY:
+        open_s = 0.0
+        for kind in ("arc", "circle"):
+            runs = [apart("many_objects", kind, count) for _ in range(1 if quick else repeats)]
+            best = {name: min(run[name] for run in runs) for name in runs[0]}
+            open_s = open_s or best["drawn_s"]
+            print(
+                f"{f'{count} {kind}s':<24}{best['voxels']:9.0f}{best['read_s']:9.2f}"
+                f"{best['drawn_s']:9.2f}{best['drawn_s'] / open_s:7.2f}"
+                f"{best['peak_bytes'] / _MEGABYTE:9.0f}",
+                flush=True,
+            )
 
 
 def bench_scale(repeats: int, *, quick: bool = False) -> None:
@@ -188,7 +251,7 @@ def bench_scale(repeats: int, *, quick: bool = False) -> None:
                 first = 0.0
                 for side in sides:
                     count = 1 if quick else max(repeats, min(30, 60_000 // lit))
-                    found = frames_apart(side, sides[0], pixels, lit, count, spread)
+                    found = apart("frames", side, sides[0], pixels, lit, count, spread)
                     first = first or found["seconds"]
                     print(
                         f"{f'{side}^3 {pixels}':<24}{found['voxels']:8.0f}"
@@ -198,7 +261,13 @@ def bench_scale(repeats: int, *, quick: bool = False) -> None:
                         flush=True,
                     )
 
+    bench_many(repeats, quick=quick)
+
 
 if __name__ == "__main__":
-    *case, apart = json.loads(sys.argv[1])
-    json.dump(frames(*case, spread=apart), sys.stdout)
+    measurement, *given = json.loads(sys.argv[1])
+    if measurement == "frames":
+        *given, is_spread = given
+        json.dump(frames(*given, spread=is_spread), sys.stdout)
+    else:
+        json.dump(many_objects(*given), sys.stdout)
