@@ -106,18 +106,18 @@ class _PacketDecoder:
         self._fade = None
         self._plain_pen = pixel
 
-    def _plot_row(self, voxels: "array[int]", *, again: bool = False) -> None:
-        """Write voxels in their order, and set the cursor to the last one.
+    def _plot_row(self, voxels: "array[int]", end: int, *, again: bool = False) -> None:
+        """Write voxels in their order, and set the cursor to the end.
 
         Those of a fade are counted, but not the first if it is written again.
         """
         if not self._fade:
             self._page.plot(voxels, self._pen)
-            self._cursor = voxels[-1]
+            self._cursor = end
             return
         for voxel, pixel in self._fade.pens(voxels, again=again and self._written):
             self._page.plot(array("Q", (voxel,)), pixel)
-        self._cursor = voxels[-1]
+        self._cursor = end
         self._written = True
 
     # Bounds
@@ -233,7 +233,7 @@ class _PacketDecoder:
         steps = self._device.steps[octant]
         path = b"".join([_CRUMBS[byte] for byte in raw])[:count]
         chain = array("Q", accumulate(map(steps.__getitem__, path), initial=self._cursor))
-        self._plot_row(chain, again=True)
+        self._plot_row(chain, chain[-1], again=True)
 
     # Runs
 
@@ -275,7 +275,8 @@ class _PacketDecoder:
         place = self._operands.coordinates()
         self._check_cursor()
         self._check_coordinates(place)
-        self._plot_row(line(self._grid, self._cursor, place), again=True)
+        voxels = line(self._grid, self._cursor, place)
+        self._plot_row(voxels, self._grid.index(*place), again=True)
 
     def box(self, _: int) -> None:
         place = self._operands.coordinates()
@@ -291,7 +292,7 @@ class _PacketDecoder:
         _, row, plane = self._grid.strides
         voxels = array("Q", (i + row * j + plane * k for i, j, k in zip(x, y, z, strict=True)))
         if self._fade:
-            self._plot_row(voxels)
+            self._plot_row(voxels, voxels[-1])
             return
         self._page.plot(array("Q", set(voxels)), self._pen)
         self._cursor = voxels[-1]

@@ -33,9 +33,9 @@ def fade_counts_again(patch):
 
 @mutant("7.9/fade-cursor-set", spreads=True)
 def fade_forgets_no_cursor(patch):
-    def plot_row(self, voxels, *, again=False):
+    def plot_row(self, voxels, end, *, again=False):
         self._written = self._written or (self._fade is not None and self._fade._last is not None)
-        old(self, voxels, again=again and getattr(self, "_rows", 0) > 0)
+        old(self, voxels, end, again=again and getattr(self, "_rows", 0) > 0)
         self._rows = getattr(self, "_rows", 0) + 1
 
     old = Decoder._plot_row

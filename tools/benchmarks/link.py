@@ -86,6 +86,18 @@ def of_array(name: str, array: NDArray[np.generic], pixels: str, target: float |
     return Picture(name, frame, array.size if dense else len(frame.lit()[0]), target)
 
 
+def gradients(name: str, side: int, curve: Curve, colors: Sequence[str]) -> Iterator[Picture]:
+    """Return the pictures of a curve along which colours are spread, in each format.
+
+    INDEX8 has a palette of its own.
+    """
+    sequence = vd.voxelize(curve)
+    for pixels in ("rgb888", "rgb565", "index8"):
+        frame = Frame((side, side, side), pixels, own_palette=pixels == "index8")
+        drawing = frame.draw(sequence, list(colors))
+        yield Picture(f"{name} {pixels}", frame, drawing.voxels - drawing.clipped)
+
+
 def digital_line(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the straight line between two voxels, every coordinate rounded, halves up."""
     way = end - start
@@ -217,6 +229,10 @@ def pictures(*, quick: bool) -> Iterator[Picture]:
     sequences = [s.voxels for s in vd.voxelize_many(beziers(128, 1000, 64))]
     colors = ["orange", "lime", "#0af", "red", "yellow", "magenta", "cyan", "white"]
     yield of_voxels("1000 Beziers 8 colours", 128, sequences, None, "index8", colors)
+    rainbow = ["red", "yellow", "lime", "cyan", "blue", "magenta", "red"]
+    yield from gradients("rainbow trefoil", 128, TorusKnot(2, 3, (64,) * 3, 40, 15), rainbow)
+    yield from gradients("rainbow Lissajous", 128, waves(128)[3], rainbow[:-1])
+    yield from gradients("two-colour paper", 128, paper_curve(40, 4), ["blue", "orange"])
     dots = np.random.default_rng(SEED).integers(0, 128, (2000, 3))
     yield of_voxels("2000 lone voxels", 128, [dots], None)
     for side in (64, 128):
@@ -287,25 +303,37 @@ def on_wire(payloads: Sequence[bytes]) -> int:
     return sum(len(packet.encode(packet.Data(ops=ops))) for ops in payloads or [b""])
 
 
+def features_for(frame: Frame) -> tuple[str, ...]:
+    """Return the features of version 1.0, but for ARC, that a frame may use."""
+    indexed = frame.format.value in {"index8", "mono1"}
+    features = FEATURES if indexed else tuple(name for name in FEATURES if name != "diff")
+    return (*features, "palette") if frame.has_own_palette else features
+
+
 def bench_link(repeats: int, *, quick: bool = False) -> None:
     """Print what frames cost on the wire, and how fast they are coded and framed."""
-    head = f"{'picture':<24}{'voxels':>9}{'bytes':>9}{'bit/vox':>8}{'target':>7}{'ARC':>7}"
+    head = f"{'picture':<24}{'voxels':>9}{'bytes':>9}{'bit/vox':>8}{'target':>7}"
+    head += "".join(f"{name:>7}" for name in ("ARC", "FADE", "ARC2"))
     head += "".join(f"{name:>9}" for name in ("runs", "+LZ4", "+zstd-19", "raw"))
     head += f"{'share':>7}{'code ms':>8}{'MB/s':>7}"
     print(f"bits a voxel by coding; frames a second by link\n{head}", end="")
     print("".join(f"{name:>8}" for name in RATES))
     for picture in pictures(quick=quick):
         frame = picture.frame
-        payloads = frame.payloads(PAYLOAD, FEATURES)
-        code_s = work_s(lambda frame=frame: frame.payloads(PAYLOAD, FEATURES), repeats)
+        features = features_for(frame)
+        payloads = frame.payloads(PAYLOAD, features)
+        code_s = work_s(
+            lambda frame=frame, features=features: frame.payloads(PAYLOAD, features), repeats
+        )
         ops, wire = sum(map(len, payloads)), on_wire(payloads)
         bits = ops * 8 / picture.voxels
         lit = picture.voxels if frame.format.value == "index8" else len(frame.lit()[0])
         line = f"{picture.name:<24}{picture.voxels:9d}{ops:9d}{bits:8.2f}"
         line += f"{picture.target:7.1f}" if picture.target else f"{'-':>7}"
         # Range-coded, as on a slow line; where that is longer, it is not done.
-        arc = sum(map(len, frame.payloads(PAYLOAD, (*FEATURES, "arc"))))
-        line += f"{arc * 8 / picture.voxels:7.2f}" if arc < ops else f"{'-':>7}"
+        for more in (("arc",), ("fade",), ("fade", "arc", "arc2")):
+            coded = sum(map(len, frame.payloads(PAYLOAD, (*features, *more))))
+            line += f"{coded * 8 / picture.voxels:7.2f}" if coded < ops else f"{'-':>7}"
         for size in others(picture).values():
             line += f"{'-':>9}" if size is None else f"{size * 8 / lit:9.2f}"
         line += f"{ops / wire:7.4f}{code_s * 1e3:8.2f}{ops / code_s / 1e6:7.2f}"

@@ -88,7 +88,7 @@ class Coloring(NamedTuple):
 
         """
         rgb, spread = self._rgb_of(colors, len(voxels))
-        found = self.palette.nearest(rgb) if self.palette else self.format.nearest(rgb)
+        found, spread = self._pixels_of(rgb, spread if kind is not Kind.SET else None)
         exact = np.array_equal(self.colors_of(found), rgb)
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
         inside = self.grid.inside(voxels)
@@ -125,7 +125,10 @@ class Coloring(NamedTuple):
         counts, rows = np.array(lengths), np.array(list(map(len, rgb)))
         numbers = np.arange(len(counts), dtype=np.int32)
         together = np.concatenate(rgb)
-        found = self._nearest(rgb) if self.palette else self.format.nearest(together)
+        if self.palette:
+            found, spreads = self._palette_pixels(rgb, spreads)
+        else:
+            found, spreads = self.format.nearest(together), self._blended(spreads)
         inexact = (self.colors_of(found) != together).any(axis=1)
         exact = np.ones(len(counts), dtype=np.bool_)
         exact[numbers.repeat(rows)[inexact]] = False
@@ -157,16 +160,38 @@ class Coloring(NamedTuple):
                 return colors, None
             colors = Spread(colors, length)
         rgb = blend(colors.stops, colors.count, colors.first + np.arange(length))
-        return rgb, None if self.format in _UNBLENDED else colors
+        return rgb, colors
 
-    def _nearest(self, rgb: Sequence[NDArray[np.uint8]]) -> Values:
-        """Return the pixel values of colours of objects, which get entries one after another."""
-        assert self.palette is not None  # noqa: S101 - see the caller
-        known: dict[bytes, Values] = {}
-        found = []
-        for each in rgb:
-            key = each.tobytes()
+    def _blended(self, spreads: Sequence[Spread | None]) -> tuple[Spread | None, ...]:
+        """Return the spreads of pixels without a palette of their own."""
+        return (None,) * len(spreads) if self.format in _UNBLENDED else tuple(spreads)
+
+    def _pixels_of(
+        self, rgb: NDArray[np.uint8], spread: Spread | None
+    ) -> tuple[Values, Spread | None]:
+        """Return the pixel values of colours, and the spread that they have."""
+        if self.palette is None:
+            return self.format.nearest(rgb), self._blended([spread])[0]
+        ramp = self.palette.ramp(spread.stops, spread.count) if spread else None
+        if ramp is None or spread is None:
+            return self.palette.nearest(rgb), None
+        ends = np.array([[ramp.first], [ramp.first + ramp.count - 1]], dtype=np.uint8)
+        spread = Spread(ends, spread.count, spread.first)
+        values = blend(ends, spread.count, spread.first + np.arange(len(rgb)))
+        return values[:, 0].astype(np.uint32), spread
+
+    def _palette_pixels(
+        self, rgb: Sequence[NDArray[np.uint8]], spreads: Sequence[Spread | None]
+    ) -> tuple[Values, tuple[Spread | None, ...]]:
+        """Return what objects have of a palette, whose entries they get one after another."""
+        known: dict[tuple[bytes, bytes, int], tuple[Values, Spread | None]] = {}
+        found, pixel_spreads = [], []
+        for each, spread in zip(rgb, spreads, strict=True):
+            stops = spread.stops.tobytes() if spread else b""
+            key = (each.tobytes(), stops, spread.first if spread else -1)
             if key not in known:
-                known[key] = self.palette.nearest(each)
-            found.append(known[key])
-        return np.concatenate(found)
+                known[key] = self._pixels_of(each, spread)
+            values, pixel_spread = known[key]
+            found.append(values)
+            pixel_spreads.append(pixel_spread)
+        return np.concatenate(found), tuple(pixel_spreads)

@@ -6,15 +6,39 @@ show any colours, at most 255 besides black. Others have the default palette. Mu
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.raster.array_arguments import as_array
+from voxdisplay.raster.color import interpolate_colors
 from voxdisplay.raster.pixel_format import PixelFormat, Values
 
 Colors = NDArray[np.uint8]
 
+
+@dataclass(frozen=True, eq=False)
+class Ramp:
+    """Entries of a palette that blend colours: ``count`` of them from ``first`` on.
+
+    Attributes
+    ----------
+    first, count : int
+    stops : (k, 3) uint8 array
+        The colours.
+
+    """
+
+    first: int
+    count: int
+    stops: Colors
+
+
 ENTRIES = 256
+# Fewer entries in a row do not show what is between colours.
+_SHORTEST_RAMP = 64
+_FEWEST_VOXELS = 64
 DEFAULT: Colors = PixelFormat.INDEX8.rgb(np.arange(ENTRIES))
 DEFAULT.flags.writeable = False
 
@@ -32,6 +56,8 @@ class Palette:
     Attributes
     ----------
     colors : (256, 3) uint8 array
+    ramps : list of Ramp
+        Entries that were taken for blends; RAMP sets each in few bytes.
 
     """
 
@@ -40,11 +66,16 @@ class Palette:
         self._grows = grows
         self._used = np.zeros(ENTRIES, dtype=np.bool_)
         self._used[0] = True
+        self.ramps: list[Ramp] = []
+        # What was decided for curves by their stops and voxels: the same again if drawn again.
+        self._decided: dict[tuple[bytes, int], Ramp | None] = {}
 
     def copy(self) -> Palette:
         """Return a copy, with the same entries in use."""
         twin = Palette(self.colors, grows=self._grows)
         twin._used = self._used.copy()
+        twin.ramps = list(self.ramps)
+        twin._decided = dict(self._decided)
         return twin
 
     def mark_used(self, values: NDArray[np.integer]) -> None:
@@ -73,6 +104,59 @@ class Palette:
         values[order] = self._values_of(wanted[order])
         self.mark_used(values)
         return values[back].astype(np.uint32)
+
+    def ramp(self, stops: Colors, voxels: int) -> Ramp | None:
+        """Take entries in a row for colours that are spread along a curve.
+
+        Parameters
+        ----------
+        stops : (k, 3) uint8 array
+            The colours.
+        voxels : int
+            How many voxels the curve has.
+
+        Returns
+        -------
+        Ramp or None
+            None where single entries are better: if it does not grow, if black is among the
+            colours, which is dark, or if fewer entries than voxels show all colours as they are.
+
+        """
+        if not self._grows or voxels < _FEWEST_VOXELS:
+            return None
+        key = (stops.tobytes(), voxels)
+        if key not in self._decided:
+            self._decided[key] = self._new_ramp(stops, voxels)
+        return self._decided[key]
+
+    def _new_ramp(self, stops: Colors, voxels: int) -> Ramp | None:
+        """Return the ramp of a curve that is drawn for the first time."""
+        wanted = np.unique(_packed_rgb(interpolate_colors(stops, voxels)))
+        if wanted[0] == 0:
+            return None
+        free = np.flatnonzero(~self._used)
+        if len(free) < len(wanted):
+            count = len(free)
+        elif voxels <= len(free) and 2 * len(wanted) > voxels:
+            count = voxels
+        else:
+            return None
+        for ramp in self.ramps:
+            if ramp.count >= count and np.array_equal(ramp.stops, stops):
+                return ramp
+        if not len(free):
+            return None
+        begins = np.flatnonzero(np.append(True, np.diff(free) != 1))
+        lengths = np.diff(begins, append=len(free))
+        longest = int(lengths.max())
+        if longest < (count if count == voxels else _SHORTEST_RAMP):
+            return None
+        ramp = Ramp(int(free[begins[lengths.argmax()]]), min(count, longest), stops)
+        self.ramps.append(ramp)
+        entries = slice(ramp.first, ramp.first + ramp.count)
+        self.colors[entries] = interpolate_colors(stops, ramp.count)
+        self._used[entries] = True
+        return ramp
 
     def _values_of(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the values of distinct colours, as 24-bit numbers."""
