@@ -4,7 +4,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from voxdisplay.voxelization.index_ranges import expand_ranges, insert_columns, split_blocks
+from voxdisplay.voxelization.index_ranges import (
+    distinct,
+    expand_ranges,
+    insert_columns,
+    split_blocks,
+)
 from voxdisplay.voxelization.thinning import WINDOW, find_shortcuts
 
 LENGTHS = st.lists(st.integers(1, 40), min_size=1, max_size=12)
@@ -30,6 +35,11 @@ def test_blocks_cut_where_curves_begin_or_in_long_ones(lengths: list[int], size:
         following = ends[ends > high]
         if high in starts and following.size:  # another curve would have been too much
             assert following[0] - low > size
+
+
+@given(st.lists(st.integers(-5, 5)))
+def test_distinct_numbers_are_in_order(numbers: list[int]) -> None:
+    assert distinct(np.array(numbers, dtype=np.int64)).tolist() == sorted(set(numbers))
 
 
 @given(LENGTHS)

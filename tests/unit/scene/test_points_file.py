@@ -202,3 +202,20 @@ def test_files_are_beside_the_scene(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert load_scene("scene.json").items
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     assert load_scene("-").items
+
+
+@pytest.mark.parametrize("kind", ["points", "scatter"])
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({}, "needs either the key 'points' or the key 'file'"),
+        ({"points": POINTS, "file": "data.csv"}, "needs either the key 'points' or the key"),
+        ({"points": POINTS, "gaps": "split"}, "the key 'gaps' belongs to the key 'file'"),
+    ],
+)
+def test_points_are_inline_or_in_a_file(
+    kind: str, keys: dict[str, Any], message: str, folder: Path
+) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        read_scene(json.dumps({"type": kind, **keys}), folder=folder)
+    assert caught.value.path == "$"
