@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from voxdisplay.argument_checks import duration, flag, function
 from voxdisplay.display.device_info import DeviceInfo
-from voxdisplay.display.display_operations import Progress
+from voxdisplay.display.display_operations import DisplayOperations, Progress
 from voxdisplay.display.paced_display import PacedDisplay
-from voxdisplay.display.receipt import Receipt, count_noun, describe_difference
+from voxdisplay.display.receipt import Receipt, count_noun
 from voxdisplay.errors import (
     DesyncError,
     IncompatibleDevice,
@@ -325,12 +325,16 @@ class Display(PacedDisplay):
         back = flag("back", back)
         function("progress", progress)
         with self._turn() as operations:
-            if not operations.can("read"):
-                raise IncompatibleDevice(
-                    "this display cannot read its memory back",
-                    hint="its digest still proves what it shows",
-                )
+            self._check_readable(operations)
             return operations.read_page(back=back, progress=progress)
+
+    @staticmethod
+    def _check_readable(operations: DisplayOperations) -> None:
+        if not operations.can("read"):
+            raise IncompatibleDevice(
+                "this display cannot read its memory back",
+                hint="its digest still proves what it shows",
+            )
 
     def verify(self, frame: Frame, *, progress: Progress | None = None) -> Pixels:
         """Read the front page back and compare it with a frame, voxel by voxel.
@@ -358,9 +362,11 @@ class Display(PacedDisplay):
 
         """
         self._check_frame(frame)
+        function("progress", progress)
         with self._turn() as operations:
             operations.flush()
-            page = self.read(progress=progress)
-        if differs := describe_difference(frame.array(), page):
+            self._check_readable(operations)
+            page, differs = operations.read_and_compare(frame, progress)
+        if differs:
             raise DesyncError(f"what was read back is not the frame: {differs}")
         return page

@@ -34,9 +34,11 @@ from voxdisplay.link import (
 )
 from voxdisplay.raster.pixel_format import Pixels
 from voxdisplay.wire.packet import Page
-from voxdisplay.wire.spans import decode_spans
+from voxdisplay.wire.spans import decode_runs
 
 Progress: TypeAlias = Callable[[int, int], None]
+# A page is compared by its lit voxels if no more than one of so many is lit.
+SPARSE_SHARE = 8
 
 
 class DisplayOperations:
@@ -248,13 +250,29 @@ class DisplayOperations:
 
     def read_page(self, *, back: bool = False, progress: Progress | None = None) -> Pixels:
         """Return a page of the device's memory. See `Display.read`."""
+        page, _ = self._read_lit(back=back, progress=progress)
+        return page
+
+    def read_and_compare(self, frame: Frame, progress: Progress | None) -> tuple[Pixels, str]:
+        """Return the front page, and where it differs from a frame: nowhere if that is empty."""
+        page, lit = self._read_lit(back=False, progress=progress)
+        if lit * SPARSE_SHARE <= frame.grid.voxels:
+            index, values = frame.lit()
+            pixels = page.reshape(frame.format.shape((frame.grid.voxels,)))
+            # As many lit voxels, and all of the frame's among them: there are no others.
+            if len(index) == lit and np.array_equal(pixels[index], frame.format.pixels(values)):
+                return page, ""
+        return page, describe_difference(frame.array(), page)
+
+    def _read_lit(self, *, back: bool, progress: Progress | None) -> tuple[Pixels, int]:
+        """Return a page of the device's memory, and how many of its voxels are lit."""
         connection, link, info = self._connection, self._connection.link, self._connection.info
         link.cancel_reads()  # of a call that was interrupted
         self._pages.clear()
         total = info.grid.voxels
         # Only what is lit is written to: the rest of a large page takes no memory.
         pixels = np.zeros(info.format.shape((total,)), dtype=info.format.dtype)
-        at, reconnects = 0, connection.reconnects
+        at, lit, reconnects = 0, 0, connection.reconnects
         while at < total:
             link.read(at, total - at, back=back)
             while not self._pages:
@@ -263,16 +281,16 @@ class DisplayOperations:
                 self.flush()
                 self._pages.clear()
                 pixels[:at] = 0
-                at, reconnects = 0, connection.reconnects
+                at, lit, reconnects = 0, 0, connection.reconnects
                 continue
             page = self._pages.pop()
-            values = decode_spans(page.ops, page.count, info.format)
-            lit = np.flatnonzero(values)
-            pixels[at + lit] = info.format.pixels(values[lit])
+            for start, run in decode_runs(page.ops, page.count, info.format):
+                lit += int(np.count_nonzero(run))
+                pixels[at + start : at + start + len(run)] = info.format.pixels(run)
             at += page.count
             if progress:
                 progress(at, total)
-        return pixels.reshape(info.format.shape(info.grid.array_shape))
+        return pixels.reshape(info.format.shape(info.grid.array_shape)), lit
 
     def blank(self, timeout_s: float) -> None:
         """Show a dark frame at once: a new session drops all that is queued.

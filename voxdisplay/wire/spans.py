@@ -253,22 +253,41 @@ def decode_spans(ops: bytes, count: int, format_: PixelFormat) -> Values:
         If an op is not allowed there or is truncated, or the ops do not cover ``count`` pixels.
 
     """
+    values = np.zeros(count, dtype=np.uint32)
+    for start, run in decode_runs(ops, count, format_):
+        values[start : start + len(run)] = run
+    return values
+
+
+def decode_runs(ops: bytes, count: int, format_: PixelFormat) -> list[tuple[int, Values]]:
+    """Return the runs of pixels that the ops of a PAGE write: all others are dark.
+
+    Parameters and errors are those of `decode_spans`. It costs what is written, however many voxels
+    are covered.
+
+    Returns
+    -------
+    list of (int, (n,) uint32 array)
+        The first pixel of each run, ascending, and its pixel values, of which some may be 0.
+
+    """
     reader = _PageReader(ops, count, format_)
     while reader.at < len(ops):
         reader.read_op()
     if reader.cursor != count:
         raise reader.error(f"the ops cover {reader.cursor} voxels, not {count}")
-    return reader.values
+    return reader.runs
 
 
 class _PageReader:
-    """Reader of the ops of a PAGE into an array of pixel values."""
+    """Reader of the ops of a PAGE into runs of pixel values."""
 
     def __init__(self, ops: bytes, count: int, format_: PixelFormat) -> None:
-        self.values = np.zeros(count, dtype=np.uint32)
+        self.runs: list[tuple[int, Values]] = []
         self.at = 0
         self.cursor = 0
         self._ops = ops
+        self._count = count
         self._format = format_
         self._pen = format_.full
 
@@ -300,13 +319,15 @@ class _PageReader:
         except (IndexError, ValueError) as error:
             raise self.error("a count is malformed") from error
         end = self.cursor + n
-        if end > len(self.values):
-            raise self.error(f"the ops cover more than {len(self.values)} voxels")
-        if kind == spec.OP_RUN:
-            self.values[self.cursor : end] = self._pen
+        if end > self._count:
+            raise self.error(f"the ops cover more than {self._count} voxels")
+        if kind == spec.OP_RUN and self._pen:
+            pen = np.array(self._pen, dtype=np.uint32)
+            self.runs.append((self.cursor, np.broadcast_to(pen, (n,))))
         elif kind == spec.OP_LIT:
-            self.values[self.cursor : end], behind = self._pixels(behind, n)
-            self._pen = int(self.values[end - 1])
+            run, behind = self._pixels(behind, n)
+            self.runs.append((self.cursor, run))
+            self._pen = int(run[-1])
         self.cursor, self.at = end, behind
 
     def _pixels(self, at: int, n: int) -> tuple[Values, int]:

@@ -56,6 +56,43 @@ def test_verify_says_where_the_page_differs():
         display.verify(frame)
 
 
+@pytest.mark.parametrize("format_", ["mono1", "index8", "rgb565", "rgb888"])
+@pytest.mark.parametrize(
+    ("place", "light", "message"),
+    [
+        ((1, 2, 3), False, r"1 voxels differ, the first at \(1, 2, 3\)"),
+        ((2, 2, 3), True, r"1 voxels differ, the first at \(2, 2, 3\)"),
+        (None, True, r"2 voxels differ, the first at \(1, 2, 3\)"),
+    ],
+    ids=["dark", "lit too", "moved"],
+)
+def test_verify_finds_what_is_dark_lit_or_moved(format_, place, light, message):
+    display, pipe = open_display(pixel_format=format_)
+    frame = display.frame()
+    frame.draw([(1, 2, 3), (16, 8, 4)], "white")
+    display.present(frame)
+    front = pipe.device.memory.front.stored
+    size = 3 if format_ == "rgb888" else 2 if format_ == "rgb565" else 1
+    on = (b"\1" if format_ == "mono1" else b"\xff") * size
+    for voxel in [place] if place else [(1, 2, 3), (2, 2, 3)]:
+        lit = light and voxel != (1, 2, 3)
+        index = int(display.info.grid.index_of(np.array([voxel]))[0])
+        front.exchange_run(index, on if lit else bytes(size))
+    with pytest.raises(vd.DesyncError, match=message):
+        display.verify(frame)
+
+
+def test_verify_costs_what_is_lit(monkeypatch):
+    with vd.open("sim:?size=1024x1024x1024&format=rgb888") as display:
+        frame = display.frame()
+        frame.draw(vd.Circle((500, 500, 500), 300), "red")
+        display.present(frame)
+        monkeypatch.setattr(vd.Frame, "array", lambda _: pytest.fail("a dense copy was made"))
+        page = display.verify(frame)
+        x, y, z = frame.grid.voxels_at(frame.lit()[0][:1])[0]
+        assert page[z, y, x].tolist() == [255, 0, 0]
+
+
 def test_the_text_of_a_device_cannot_steer_a_terminal():
     display, _ = open_display(name="\x1b[2Jcube\r", firmware="1\n2")
     assert display.info.name == "\N{REPLACEMENT CHARACTER}[2Jcube\N{REPLACEMENT CHARACTER}"

@@ -11,7 +11,7 @@ from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.wire.op_encoding import EncoderConfig, counted_ops
-from voxdisplay.wire.spans import decode_spans, encode_spans
+from voxdisplay.wire.spans import decode_runs, decode_spans, encode_spans
 
 FORMATS = pytest.mark.parametrize("format_", PixelFormat)
 EDGES = [1, 2, 31, 32, 33, 127, 128, 159, 160, 161, 255, 256, 257, 16415, 16416, 16417]
@@ -168,6 +168,14 @@ def test_what_the_device_packs_is_read(format_, density, room):
 )
 def test_a_page_by_hand(format_, count, ops, values):
     assert decode_spans(bytes.fromhex(ops), count, PixelFormat(format_)).tolist() == values
+
+
+def test_a_page_costs_what_it_writes():
+    # A dark start, LIT of two pixels, a PEN of 0 that is drawn, and the dark rest of 1024^3.
+    ops = "83 C1 2A 00 A1 01 07 A0 01 00 A2 9F " + "EE FF FF FF 03"
+    count = 4 + 2 + 2 + 1 + 3 + 0x3FFFFFEE + 32
+    runs = decode_runs(bytes.fromhex(ops), count, PixelFormat.INDEX8)
+    assert [(start, run.tolist()) for start, run in runs] == [(4, [42, 0]), (8, [7])]
 
 
 @pytest.mark.parametrize(
