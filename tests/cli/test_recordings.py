@@ -138,6 +138,23 @@ def test_films_of_recordings(run, recorded, tmp_path, suffix):
         assert film.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.parametrize(("fps", "pictures", "ms"), [(0.05, 4, 10_000), (100, 1, 20)])
+def test_films_keep_their_length_at_any_rate(run, tmp_path, fps, pictures, ms):
+    """A film has a picture every ten seconds at least, and sixty a second at most."""
+    np.savez(tmp_path / "a.npz", frames=np.eye(2, dtype=np.uint8).reshape(2, 1, 2, 1), fps=fps)
+    for suffix in ("html", "gif"):
+        done = run("show", "convert", tmp_path / "a.npz", "-o", tmp_path / f"a.{suffix}")
+        assert done.returncode == 0, done.stderr
+        assert f"{pictures} picture" in done.stderr
+    if pictures > 1:
+        with Image.open(tmp_path / "a.gif") as film:
+            total = 0
+            for number in range(film.n_frames):
+                film.seek(number)
+                total += film.info["duration"]
+            assert total == pictures * ms
+
+
 def has_mp4():
     return shutil.which("ffmpeg") or importlib.util.find_spec("av")
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # Pixels of all pictures of a film: what a GIF takes in memory, in bytes.
 _MAX_PIXELS: Final = 1 << 29
 _MAX_PICTURES: Final = 10_000
+_MIN_FPS: Final = 0.1  # of the page
 MAX_FPS: Final = 60.0
 """Most pictures per second, of the kinds of film."""
 FILM_SUFFIXES: Final = (".gif", ".mp4", ".html")
@@ -101,14 +102,14 @@ def film_of(
     """
     from voxdisplay.view.film import FilmJob, LazyPages  # noqa: PLC0415 - an extra
 
-    rate = fps or show.fps
+    rate = min(max(fps or show.fps, _MIN_FPS), MAX_FPS)
     count = max(1, round(show.duration * rate))
     check_film_size(count, options.size if drawn else (1, 1))
     pages: LazyPages = LazyPages(
         count, lambda number: color_page(show.frame(_number_at(show, number / rate)))
     )
     grid = show.frame(0).grid
-    return FilmJob(pages, grid, vd.PixelFormat.RGB888, options, title, min(rate, MAX_FPS))
+    return FilmJob(pages, grid, vd.PixelFormat.RGB888, options, title, rate)
 
 
 def check_film_size(pictures: float, size_px: tuple[int, int]) -> None:

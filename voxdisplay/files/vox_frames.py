@@ -21,7 +21,7 @@ from voxdisplay.files.writing import VOX_SIDE, vox_chunk, vox_palette
 _MAX_FRAMES = 1_000_000
 _MAX_KEYS = 1 << 12  # a key costs a walk through the scene graph
 _VERSION = 200
-_MAX_BYTES = 1 << 30
+_MAX_BYTES = 1 << 28  # they are held until all are known
 
 FrameVoxels = tuple[NDArray[np.integer], NDArray[np.uint8]]
 """Lit voxels, (N, 3), columns x, y, z, and their colours, (N, 3)."""
