@@ -275,20 +275,6 @@ def test_arcs_of_the_driver(vector):
     assert encode_range_coded(voxels, pens, config) == [vector.hex("ops")]
 
 
-slabs = pytest.mark.parametrize(
-    "vector", [v for v in document.vectors("ops") if v.name.startswith("slabs-")], ids=str
-)
-
-
-@slabs
-def test_slabs_as_the_driver_reads_them(vector):
-    grid, format_ = Grid(*vector.grid), PixelFormat[vector["format"]]
-    meant = {place: int.from_bytes(pixel, "little") for place, pixel in vector.voxels().items()}
-    drawn = decode_ops([vector.hex("ops")], grid, format_)
-    voxels = map(tuple, grid.voxels_at(drawn.index).tolist())
-    assert dict(zip(voxels, drawn.values.tolist(), strict=True)) == meant
-
-
 @pytest.mark.parametrize("name", ["slabs-one-box", "slabs-wide-grid", "slabs-shell"])
 def test_slabs_of_the_driver(name):
     """These vectors have the boxes that the document recommends."""

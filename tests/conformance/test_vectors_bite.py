@@ -13,7 +13,7 @@ import pytest
 SPEC_MUTATIONS = Path(__file__).parents[1] / "spec_mutations.py"
 
 # No byte on the wire depends on these: the referee compares them with the document.
-RESERVED = {"FEATURE_ARC", "FEATURE_ARC2"}
+RESERVED = {"FEATURE_SLABS", "FEATURE_ARC", "FEATURE_ARC2"}
 MADE_OF_OTHERS = {"LAYOUT_HEADER", "CRC_WIDTH", "CRC_REFIN", "CRC_REFOUT", "CRC_CHECK"}
 # The driver takes these for more voxels than a vector has: unit tests hold them.
 CHOSEN = {
@@ -46,8 +46,9 @@ TOLD_APART = {
     f"ARC_{name}" for name in ("COUNT", "LONE", "TURN", "MAIN", "HISTORY", "RUNS", "MODELS")
 }
 TOLD_APART |= {f"ARC2_{name}" for name in ("NEAR", "FADE", "DELTA", "MODELS")}
+TOLD_APART |= {f"SLABS_{name}" for name in ("FLAG", "FULL", "GROUP", "MODELS")}
 # Seen 6 times or 7, a model learns as fast; curves are longer than a vector in tests of units only.
-LONGER = {"ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN", "ARC2_MAX_DELTA"}
+LONGER = {"SLABS_ENOUGH", "ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN", "ARC2_MAX_DELTA"}
 # The document has no vector for these yet.
 AWAITED = {
     "driver": {"ARC_BEHIND"},  # of who reads

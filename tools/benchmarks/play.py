@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 import voxdisplay as vd
-from benchmarks.link import SEED
+from benchmarks.pictures import SEED
 from voxdisplay.display.plan import Line, Receiver
 from voxdisplay.display.show_plan import plan_show
 from voxdisplay.shows.binding import Playable, bind_timeline

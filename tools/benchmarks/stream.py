@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import voxdisplay as vd
-from benchmarks import link, stream_reader
+from benchmarks import stream_reader
+from benchmarks.pictures import SEED, beziers, phantom
 from benchmarks.ports import in_another_process
 from voxdisplay.display.device_info import device_info
 from voxdisplay.errors import TransportClosed
@@ -275,11 +276,11 @@ def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
         frames = []
         for turned in (False, True):
             frame = Frame((side, side, side), pixels)
-            for sequence in vd.voxelize_many(link.beziers(side, count, side / 2)):
+            for sequence in vd.voxelize_many(beziers(side, count, side / 2)):
                 frame.draw(sequence.voxels[:, ::-1] if turned else sequence.voxels, "orange")
             frames.append(frame)
         yield f"{count} Beziers, {pixels}", frames
-    head = link.phantom(side)
+    head = phantom(side)
     frames = [Frame((side, side, side), "index8") for _ in range(2)]
     frames[0].set(head)
     frames[1].set(head[:, :, ::-1])
@@ -292,7 +293,7 @@ def pictures(side: int) -> Iterator[tuple[str, list[Frame]]]:
 def field(side: int) -> NDArray[np.uint8]:
     """Return a volume without a dark voxel: slow waves, and a measurement's noise."""
     x, y, z = np.meshgrid(*(np.linspace(0, 7, side),) * 3)
-    noise = np.random.default_rng(link.SEED).normal(0, 3, x.shape)
+    noise = np.random.default_rng(SEED).normal(0, 3, x.shape)
     waves = 128 + 80 * np.sin(x) * np.cos(y) * np.sin(z + 1)
     return np.asarray((waves + noise).clip(1, 255), dtype=np.uint8)
 

@@ -23,6 +23,14 @@ SLABS = 1 << spec.FEATURE_SLABS
 SETS = ("box", "oct", "dots")
 
 
+@pytest.fixture(autouse=True)
+def _without_kernels():
+    """Use none but where a test asks for them, whatever has been drawn before."""
+    before = kernel_backend.set_enabled(False)
+    yield
+    kernel_backend.set_enabled(before)
+
+
 def shell(side, radius, thick=0.5):
     """Voxels of a sphere in a cube, as an array of 0 and 1: [z, y, x]."""
     place = np.stack(np.mgrid[:side, :side, :side]) + 0.5 - side / 2
@@ -124,15 +132,11 @@ def test_kernels_are_used_where_they_are_enabled():
     grid = Grid(64, 64, 64)
     index = np.flatnonzero(shell(64, 28))
     found = []
-    before = kernel_backend.set_enabled(False)
-    try:
-        for use in (False, True):
-            kernel_backend.set_enabled(use)
-            payloads = slabs.encode_slabs(index, 1, EncoderConfig(grid, PixelFormat.MONO1, 1024))
-            assert np.array_equal(decode_ops(payloads, grid, PixelFormat.MONO1).index, index)
-            found.append(payloads)
-    finally:
-        kernel_backend.set_enabled(before)
+    for use in (False, True):
+        kernel_backend.set_enabled(use)
+        payloads = slabs.encode_slabs(index, 1, EncoderConfig(grid, PixelFormat.MONO1, 1024))
+        assert np.array_equal(decode_ops(payloads, grid, PixelFormat.MONO1).index, index)
+        found.append(payloads)
     assert found[0] == found[1]
 
 
