@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Literal, Protocol, runtime_checkable
 
@@ -136,7 +137,12 @@ class Frame(Framebuffer):
             A spread is along a curve of which the voxels are a stretch.
 
         """
-        return self.draw_batches([[(voxels, colors)]])[0]
+        if isinstance(voxels, voxelization.VoxelSet):
+            drawing = self._add_set(voxels.voxels, colors)
+            return replace(drawing, notes=voxels.notes)
+        found = self._coloring.item(voxels.voxels, colors, Kind.CURVE, corner_rows(voxels))
+        self._raster.draw(found.item)
+        return Drawing(len(voxels), found.clipped, found.exact, voxels.undefined, voxels.jumps)
 
     def draw_all(self, items: Iterable[tuple[Curve, Color]]) -> list[Drawing]:
         """Draw many curves in order: as `draw` on each, but voxelised together, which is faster."""

@@ -74,6 +74,7 @@ class Coloring(NamedTuple):
         voxels: NDArray[np.integer],
         colors: NDArray[np.uint8] | Spread,
         kind: Kind,
+        corners: NDArray[np.int64] | None = None,
     ) -> ColoredItem:
         """Return voxels as an item; colours that a growing palette lacks get entries.
 
@@ -85,6 +86,8 @@ class Coloring(NamedTuple):
             One colour, one for each voxel, or several spread along the rows; or what is spread
             along a curve of which these are a stretch.
         kind : Kind
+        corners : (c,) int64 array, optional
+            Rows at which a straight line may end and another begin.
 
         """
         rgb, spread = self._rgb_of(colors, len(voxels))
@@ -93,6 +96,8 @@ class Coloring(NamedTuple):
         values = np.broadcast_to(found, (len(voxels),)) if len(found) != len(voxels) else found
         inside = self.grid.inside(voxels)
         at_corner = np.zeros(len(voxels), dtype=np.bool_)
+        if corners is not None:
+            at_corner[corners] = True
         # Voxels outside have meaningless indices; they are removed here.
         drawn = DrawnVoxels.of_item(self.grid.index_of(voxels), values, at_corner, kind, spread)
         clipped = len(inside) - int(np.count_nonzero(inside))

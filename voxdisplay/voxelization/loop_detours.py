@@ -8,6 +8,7 @@ This module must not know loops or events: a joint is a voxel, two lists of voxe
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import NamedTuple
 
@@ -39,6 +40,7 @@ _FIRST_WAYS = 12
 # Rows of temporary arrays, so that these stay in a core's cache.
 _ROWS = 256
 _MOST_PAIRS = 1 << 18
+_FIRST_PAIRS = 1 << 16
 
 
 class Joints(NamedTuple):
@@ -127,7 +129,7 @@ def _lattice() -> _Lattice:
     return _Lattice(offsets, near, neighbours)
 
 
-def cheapest_detours(joints: Joints, ways: int = _FIRST_WAYS) -> Detours:
+def cheapest_detours(joints: Joints, ways: int | None = None) -> Detours:
     """Return the detours that lie nearest to the curve.
 
     They have the least cost, that of `thinning`; of several, those that come first in the order of
@@ -137,12 +139,14 @@ def cheapest_detours(joints: Joints, ways: int = _FIRST_WAYS) -> Detours:
     Parameters
     ----------
     joints : Joints
-    ways : int
+    ways : int, optional
         How many ways to each side, the cheapest ones, are combined at first: the result is the
-        same for any.
+        same for any. By default all that a few joints have.
 
     """
     size = len(joints.start)
+    if ways is None:
+        ways = max(_FIRST_WAYS, math.isqrt(_FIRST_PAIRS // size))
     apart = joints.sides - joints.start[:, None]
     missing = np.arange(MAX_REPLACED) >= joints.counts[:, :, None]
     apart = np.where(missing[..., None], _AWAY, apart)
