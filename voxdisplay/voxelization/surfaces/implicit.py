@@ -100,6 +100,18 @@ def _blocks(bricks: Bricks, box: VoxelBox) -> Iterator[tuple[Ints, tuple[int, in
         yield bricks.origin[begin : begin + step], (sides[0], sides[1], sides[2])
 
 
+def _voxels(place: Ints, origin: Ints, sides: tuple[int, int, int]) -> Ints:
+    """Return the voxels, (n, 3), at indices of blocks [block, z, y, x] with given origins."""
+    row = place // sides[0]
+    plane = row // sides[1]
+    block = plane // sides[2]
+    voxel = origin[block]
+    voxel[:, 0] += place - row * sides[0]
+    voxel[:, 1] += row - plane * sides[1]
+    voxel[:, 2] += plane - block * sides[2]
+    return voxel
+
+
 class _Scan:
     """Signs at centres, block by block, and the voxels that they light."""
 
@@ -142,22 +154,23 @@ class _Scan:
         if self.solid:
             self._store(inside, origin)
             return
+        values = value.reshape(-1)
+        strides = 1, sides[0], sides[0] * sides[1]
         for axis in range(3):
-            ahead = [slice(None)] * 4
-            behind = [slice(None)] * 4
-            ahead[3 - axis], behind[3 - axis] = slice(1, None), slice(None, -1)
-            first, second = inside[tuple(behind)], inside[tuple(ahead)]
-            change = first != second
+            # Neighbours are a stride apart; pairs that wrap round to the next row are none.
+            change = np.zeros(value.shape, dtype=bool)
+            behind, ahead = [slice(None)] * 4, [slice(None)] * 4
+            behind[3 - axis], ahead[3 - axis] = slice(None, -1), slice(1, None)
+            np.not_equal(inside[tuple(behind)], inside[tuple(ahead)], out=change[tuple(behind)])
             if has_gaps:
-                change &= ~(absent[tuple(behind)] | absent[tuple(ahead)])
-            place = np.nonzero(change)
-            if place[0].size:
-                voxel = np.stack((place[3], place[2], place[1]), axis=1) + origin[place[0]]
-                ends = value[tuple(behind)][place], value[tuple(ahead)][place]
-                self._cross(voxel, axis, *ends)
-        zero = np.nonzero(value == 0)
-        if zero[0].size:
-            self._light(np.stack((zero[3], zero[2], zero[1]), axis=1) + origin[zero[0]])
+                change[tuple(behind)] &= ~(absent[tuple(behind)] | absent[tuple(ahead)])
+            place = np.flatnonzero(change)
+            if place.size:
+                ends = values[place], values[place + strides[axis]]
+                self._cross(_voxels(place, origin, sides), axis, *ends)
+        zero = np.flatnonzero(value == 0)
+        if zero.size:
+            self._light(_voxels(zero, origin, sides))
 
     def _cross(self, voxel: Ints, axis: int, first: Floats, second: Floats) -> None:
         """Light the nearer voxels of pairs, at ``voxel`` and the next along an axis."""
