@@ -31,8 +31,7 @@ class LitMask:
     def __init__(self, sides: Triple) -> None:
         self.sides = sides
         self._strides = (1, sides[0], sides[0] * sides[1])
-        size = sides[0] * sides[1] * sides[2]
-        self._mask = np.zeros(-(-size // 8) * 8, dtype=bool)
+        self._mask = np.zeros(sides[0] * sides[1] * sides[2], dtype=bool)
 
     def locate(self, axis: int, i: Ints, j: Ints, level: Ints) -> Ints:
         """Return places of voxels, all in the box: i, j along the two axes after `axis`."""
@@ -59,10 +58,7 @@ class LitMask:
 
     def index(self) -> Ints:
         """Return the scan-order indices of lit voxels, ascending."""
-        # Eight voxels at a time: most are dark.
-        words = np.flatnonzero(self._mask.view(np.uint64))
-        inner = np.flatnonzero(self._mask.reshape(-1, 8).take(words, axis=0))
-        return np.asarray((words.take(inner >> 3) << 3) + (inner & 7))
+        return np.flatnonzero(self._mask)
 
 
 class LitBricks(LitMask):
