@@ -155,15 +155,15 @@ class _Values:
             found = voxels.value(name)
             if found is not None:
                 return found
+            index = voxels.value("t") if name in self.columns else None
+            if index is not None:  # a tube about points, whose t counts them
+                return _along_points(self.columns[name], index)
         elif name == "t":
             return voxels.t
         elif name == "s":
             return np.linspace(0.0, 1.0, len(voxels))
         elif name in self.columns:
-            column = self.columns[name]
-            ring = np.append(column, column[0])  # behind the last point, the first one follows
-            index = voxelization.point_indices(voxels)
-            return np.asarray(np.interp(index, np.arange(len(ring)), ring), dtype=np.float64)
+            return _along_points(self.columns[name], voxelization.point_indices(voxels))
         if name not in {"x", "y", "z"}:
             raise CurveError(f"the voxels have no value {name!r} to be coloured by")
         if self._centers is None:
@@ -171,3 +171,9 @@ class _Values:
             inverse = self._fit.inverse() if self._fit else None
             self._centers = inverse.points(centers) if inverse else centers
         return np.asarray(self._centers[:, "xyz".index(name)])
+
+
+def _along_points(column: Floats, index: Floats) -> Floats:
+    """Return the values of points at fractional indices, (N,)."""
+    ring = np.append(column, column[0])  # behind the last point, the first one follows
+    return np.asarray(np.interp(index, np.arange(len(ring)), ring), dtype=np.float64)

@@ -394,6 +394,16 @@ class TestColoursByParameters:
         centres, shown = self.colors_of(axis | {"transform": turn}, "v")
         assert np.abs(shown - np.clip((centres[:, 0] - 3) / 10, 0, 1)).max() < 0.02
 
+    def test_a_thick_line_through_points_has_their_columns(self, tmp_path: Path) -> None:
+        (tmp_path / "p.csv").write_text("x,y,z,heat\n3,9,9,0\n13,9,9,1\n")
+        points = {"type": "points", "file": "p.csv", "thickness": 4}
+        coloring = {"map": "gray", "by": "heat", "range": [0, 1]}
+        (tmp_path / "s.json").write_text(json.dumps({"size": [17, 18, 19], "objects": [
+            points | {"color": coloring}]}))  # fmt: skip
+        frame = vd.Frame(self.SIZE)
+        frame.draw(load_scene(tmp_path / "s.json"))
+        assert np.abs(frame.array()[9, 9, 3:13, 0] / 255 - np.arange(10) / 10).max() < 0.06
+
     def test_several_colours_run_along_a_thick_curve(self) -> None:
         scene = scene_of(LINE | {"thickness": 3, "color": ["#ff0000", "#0000ff"]})
         frame = vd.Frame(self.SIZE)
