@@ -24,8 +24,8 @@ def model_number(name):
 class TracingDecoder(RangeDecoder):
     """Range decoder that notes models, range, code, bound and value of every bit."""
 
-    def __init__(self, data, cut_off):
-        super().__init__(data, cut_off)
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
         self.models = []
         type(self).trace = []
 

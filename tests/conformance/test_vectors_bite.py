@@ -29,7 +29,7 @@ CHOSEN = {
 }
 OF_THE_OTHER_SIDE = {
     "driver": {"LIMIT_MAX_SILENT", "LIMIT_MAX_OCTANT", "LIMIT_MAX_SIDE"} | CHOSEN,
-    "device": {"LIMIT_MAX_STATUS"},
+    "device": {"LIMIT_MAX_STATUS", "VERSION_MINOR"},  # a vector's device has features of 1.0
 }
 LIBRARY = {"CRC_POLY", "CRC_INIT", "CRC_XOROUT"}  # zlib has its own, and the vectors hold zlib
 STRUCTS = {f"LAYOUT_{name}" for name in ("HELLO", "INFO", "ACK", "READ", "PAGE", "ERROR")}
@@ -64,14 +64,14 @@ AWAITED = {
     ],
 )
 def test_a_literal_that_is_wrong_by_one_fails_some_vector(side, spec, excused):
+    excused = excused | RESERVED | MADE_OF_OTHERS | BEHAVIOUR | CARRIER | TOLD_APART | LONGER
+    excused |= OF_THE_OTHER_SIDE[side]
     done = subprocess.run(
-        [sys.executable, SPEC_MUTATIONS, spec],
+        [sys.executable, SPEC_MUTATIONS, spec, *sorted(excused)],
         capture_output=True,
         text=True,
         check=False,
         timeout=600,
     )
     assert done.returncode == 0, done.stderr
-    excused = excused | RESERVED | MADE_OF_OTHERS | BEHAVIOUR | CARRIER | TOLD_APART | LONGER
-    excused |= OF_THE_OTHER_SIDE[side]
-    assert set(done.stdout.split()) - excused <= AWAITED[side]
+    assert set(done.stdout.split()) <= AWAITED[side]

@@ -281,6 +281,7 @@ def emulator() -> Iterator[Callable[[Grid, str], EmulatorOnTerminal]]:
             size = ",".join(map(str, grid))
             command = [sys.executable, "-m", "firmware_sim", "--refresh", "0"]
             command += ["--size", size, "--format", pixel_format]
+            command += ["--features", ",".join(sorted(all_features(pixel_format))).lower()]
             process = subprocess.Popen(
                 command,
                 stdout=subprocess.PIPE,

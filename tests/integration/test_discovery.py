@@ -120,7 +120,7 @@ def test_probe_for_a_script(there, capsys):
     assert [port["port"] for port in ports] == there
     assert [port["answers"] for port in ports] == [True, True, False, False]
     assert ports[1]["device"] == {
-        "name": "cube", "size": [17, 9, 5], "format": "index8", "protocol": "1.0",
+        "name": "cube", "size": [17, 9, 5], "format": "index8", "protocol": "1.1",
         "firmware": "7.2", "serial": "A1",
     }  # fmt: skip
     assert "does not exist" in ports[3]["trouble"]
