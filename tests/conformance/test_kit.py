@@ -17,7 +17,7 @@ from firmware_sim import crc
 from firmware_sim.packet_error import PacketError
 from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.announced_device import FEATURES, AnnouncedDevice
-from voxdisplay.conformance.catalogue import HANDSHAKE
+from voxdisplay.conformance.catalogue import HANDSHAKE, SECTIONS
 from voxdisplay.conformance.device_bugs import DEVICE_BUGS
 from voxdisplay.conformance.dialogue import NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
@@ -64,7 +64,8 @@ def by_verdict(report, verdict):
 
 def explain(report):
     return "\n".join(
-        f"{result.check.id}: must be {result.must}, was {result.came}, likely {result.likely}"
+        f"{result.check.id}: must be {result.expected}, was {result.actual}, "
+        f"likely {result.likely_cause}"
         for result in report.results
         if result.verdict is Verdict.BROKEN
     )
@@ -364,7 +365,8 @@ def test_an_interrupted_examination_puts_the_picture_back():
 
 def test_checks_have_names_of_their_own():
     assert len({check.id for check in CHECKS}) == len(CHECKS)
-    assert all(check.requirement and check.section for check in CHECKS)
+    assert all(check.requirement for check in CHECKS)
+    assert {check.section for check in CHECKS} <= SECTIONS.keys()
 
 
 def test_choosing():

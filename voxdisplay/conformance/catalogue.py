@@ -83,6 +83,8 @@ SECTIONS = {
     "7.6": "the palette",
     "7.7": "range-coded chains",
     "7.8": "the grid's edges",
+    "7.9": "fades",
+    "7.10": "more range-coded chains",
     "7.11": "range-coded slabs",
     "8": "the digest",
     "9": "ACK",
