@@ -162,6 +162,8 @@ class Device(Protocol):
 def hold_dialogue(lines: Iterable[tuple[str, str]], device: Device) -> None:
     """Send what the host sends in a dialogue; assert that the device answers as the document."""
     answers: list[bytes] = []
+    lines = tuple(lines)
+    format_ = dict(lines)["format"]
     for key, text in lines:
         if key in {"host", "raw", "tick"}:
             assert answers == [], "the device answered more than the document"
@@ -175,4 +177,46 @@ def hold_dialogue(lines: Iterable[tuple[str, str]], device: Device) -> None:
             meant = hex_bytes(text.removesuffix("*"))
             got = answers.pop(0)
             assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
+        elif key == "page":
+            fields, pixels = map(hex_bytes, text.split("="))
+            got = answers.pop(0)
+            assert got[: len(fields)].hex(" ") == fields.hex(" ")
+            drawn = page_pixels(got[len(fields) :], int.from_bytes(fields[8:], "little"), format_)
+            assert drawn.hex(" ") == pixels.hex(" ")
     assert answers == []
+
+
+def page_pixels(ops: bytes, count: int, format_: str) -> bytes:
+    """Return what the ops of a PAGE draw: each pixel with all its bytes, MONO1 with one.
+
+    Raises
+    ------
+    AssertionError
+        If they do not cover exactly ``count`` voxels, or are others than section 10 allows.
+    """
+    mono = format_ == "MONO1"
+    size = pixel_bytes()[literals()[f"FORMAT_{format_}"]]
+    pen, at, out = b"\1" if mono else b"\xff" * size, 0, b""
+    while at < len(ops) and ops[at]:
+        op = ops[at]
+        at += 1
+        if op == 1:
+            pen, at = ops[at : at + size], at + size
+            continue
+        number, shift, more = (op & 31) + 1, 0, op & 31 == 31
+        while more:
+            number += (ops[at] & 127) << shift
+            more, shift, at = ops[at] > 127, shift + 7, at + 1
+        assert op >> 5 in {4, 5, 6}
+        if op >> 5 == 4:
+            out += bytes(size * number)
+        elif op >> 5 == 5:
+            out += pen * number
+        else:
+            width = -(-number // 8) if mono else size * number
+            run, at = ops[at : at + width], at + width
+            out += bytes(run[i // 8] >> i % 8 & 1 for i in range(number)) if mono else run
+            pen = out[-size:]
+    assert not any(ops[at:])
+    assert len(out) == size * count
+    return out
