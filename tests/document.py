@@ -177,6 +177,8 @@ def hold_dialogue(lines: Iterable[tuple[str, str]], device: Device) -> None:
             meant = hex_bytes(text.removesuffix("*"))
             got = answers.pop(0)
             assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
+            if got[0] >> 4 == literals()["TYPE_ERROR"]:
+                got[8:].decode()  # its text is UTF-8
         elif key == "page":
             fields, pixels = map(hex_bytes, text.split("="))
             got = answers.pop(0)

@@ -109,6 +109,51 @@ def features_of(vector, otherwise=None):
     return frozenset(name.lower() for name in names)
 
 
+def device_of_dialogue(vector):
+    """The device that a ``dialogue`` vector describes."""
+    facts = dict(vector.lines)
+    return VectorDevice(
+        vector.grid,
+        facts["format"],
+        boot=int(facts["boot"]),
+        max_payload=int(facts["max_payload"]),
+        rx_buffer=int(facts["rx_buffer"]),
+        refresh=int(facts["refresh"]),
+        features=features_of(vector, {"READ", "DIGEST"}),
+        name=facts["name"].strip('"'),
+        firmware=facts["firmware"].strip('"'),
+        serial=facts["serial"].strip('"'),
+    )
+
+
+def hold_ops(vector):
+    """Assert that the device draws what an ``ops`` vector says."""
+    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
+    device.open_session()
+    answers = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
+    assert [state_of(answer) for answer in answers] == ["ACK SHOWN"]
+    assert device.lit_voxels() == vector.voxels()
+    assert int.from_bytes(answers[0][16:20], "little") == vector.integer("digest")
+
+
+def hold_refused(vector):
+    """Assert that the device refuses what a ``refused`` vector says, and ends the session."""
+    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
+    device.open_session()
+    (answer,) = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
+    assert answer[0] == 0xB0
+    assert answer[3] == getattr(spec, f"CODE_{vector['code']}")
+    assert int.from_bytes(answer[6:8], "little") == vector.integer("offset")
+    assert device.lit_voxels() == {}
+    (after,) = device.send(bytes((0x40, 9, 0)))
+    assert after[3] == spec.CODE_NO_SESSION
+
+
+def hold_dialogue(vector):
+    """Assert that the device answers as a ``dialogue`` vector says."""
+    document.hold_dialogue(vector.lines, device_of_dialogue(vector))
+
+
 def flags_of(text, group):
     """Read flags as the document writes them: ``CLEAR|COMMIT``, or ``-``."""
     names = [] if text == "-" else text.split("|")

@@ -73,14 +73,14 @@ def children_reversed(patch):
 
     table = [[children(level, mask) for mask in range(256)] for level in range(5)]
     table[1][0] = table[1][255]
-    patch.setattr(shapes, "_CHILDREN", table)
+    patch.setattr(shapes, "_children_by_mask", table.__getitem__)
 
 
 @mutant("7.4/levels", "7.4/full-nodes", "7.8/bricks-outside", "11/order-of-op")
 def full_node_is_empty(patch):
-    table = [list(row) for row in shapes._CHILDREN]
+    table = [list(shapes._children_by_mask(level)) for level in range(5)]
     table[1][0] = ()
-    patch.setattr(shapes, "_CHILDREN", table)
+    patch.setattr(shapes, "_children_by_mask", table.__getitem__)
     patch.setattr(shapes, "_ROWS", [[] for _ in shapes._ROWS])
 
 

@@ -6,7 +6,14 @@ import document
 import numpy as np
 import pytest
 from drawing import decode_plainly
-from vector_device import VectorDevice, features_of, flags_of, state_of
+from vector_device import (
+    VectorDevice,
+    features_of,
+    flags_of,
+    hold_dialogue,
+    hold_ops,
+    hold_refused,
+)
 
 from voxdisplay.errors import RemoteProtocolError
 from voxdisplay.raster.grid import Grid
@@ -107,12 +114,7 @@ def test_packets_of_the_device(vector):
 
 @each("ops")
 def test_ops_on_the_device(vector):
-    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
-    device.open_session()
-    answers = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
-    assert [state_of(answer) for answer in answers] == ["ACK SHOWN"]
-    assert device.lit_voxels() == vector.voxels()
-    assert int.from_bytes(answers[0][16:20], "little") == vector.integer("digest")
+    hold_ops(vector)
 
 
 @each("ops")
@@ -166,33 +168,12 @@ def test_ops_by_a_plain_reading(vector):
 
 @each("refused")
 def test_refused_ops(vector):
-    device = VectorDevice(vector.grid, vector["format"], features=features_of(vector))
-    device.open_session()
-    (answer,) = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
-    assert answer[0] == 0xB0
-    assert answer[3] == getattr(spec, f"CODE_{vector['code']}")
-    assert int.from_bytes(answer[6:8], "little") == vector.integer("offset")
-    assert device.lit_voxels() == {}
-    (after,) = device.send(bytes((0x40, 9, 0)))
-    assert after[3] == spec.CODE_NO_SESSION
+    hold_refused(vector)
 
 
 @each("dialogue")
 def test_dialogues_with_the_device(vector):
-    facts = dict(vector.lines)
-    device = VectorDevice(
-        vector.grid,
-        facts["format"],
-        boot=int(facts["boot"]),
-        max_payload=int(facts["max_payload"]),
-        rx_buffer=int(facts["rx_buffer"]),
-        refresh=int(facts["refresh"]),
-        features=features_of(vector, {"READ", "DIGEST"}),
-        name=facts["name"].strip('"'),
-        firmware=facts["firmware"].strip('"'),
-        serial=facts["serial"].strip('"'),
-    )
-    document.hold_dialogue(vector.lines, device)
+    hold_dialogue(vector)
 
 
 @each("ops")
