@@ -14,7 +14,7 @@ SCHEMA: Final = _PACKAGE / "scene.schema.json"
 
 
 def protocol_path(name: str = "protocol.md") -> Path:
-    """Return the path of protocol.md, or of recording.md.
+    """Return the path of protocol.md, or of recording.md or vectors.json.
 
     A wheel installs it in the package; in a checkout it lies beside the package.
 
@@ -42,6 +42,7 @@ def _existing(*places: Path) -> Path:
       voxdisplay protocol
       less "$(voxdisplay protocol)"
       less "$(voxdisplay protocol --recording)"
+      jq .vectors "$(voxdisplay protocol --vectors)"
     """
 )
 @click.option(
@@ -49,9 +50,13 @@ def _existing(*places: Path) -> Path:
     is_flag=True,
     help="Of recording.md instead, the description of recordings (.vxs).",
 )
-def protocol(*, recording: bool) -> None:
+@click.option("--vectors", is_flag=True, help="Of its vectors as JSON instead.")
+def protocol(*, recording: bool, vectors: bool) -> None:
     """Print the path of protocol.md, the description of the wire for whoever builds a device."""
-    print_stdout(str(protocol_path("recording.md" if recording else "protocol.md")))
+    if recording and vectors:
+        raise click.UsageError("--recording and --vectors are two files; give one of them")
+    name = "recording.md" if recording else "vectors.json" if vectors else "protocol.md"
+    print_stdout(str(protocol_path(name)))
 
 
 @click.command(
