@@ -13,6 +13,7 @@ from broken_devices import (  # noqa: F401 - each registers its own
     noise,
     ops,
     packets,
+    planted,
     range_coded_chains,
     range_coded_slabs,
     reads,

@@ -10,6 +10,7 @@ is meant to be read by whoever has built a device and sees a check fail::
     packets, ops          packets and ops as bytes, valid or not
     announced_device      what a device announces in INFO
     response_reader       parsing and well-formedness rules of responses
+    credit_limit          what the device has granted, across all checks
     reference_decoder, reference_page, range_coded_chains
                           section 7 and 8 in their simplest form: what ops must draw
     device_bugs           decoders that each misread one rule, to name the likely cause

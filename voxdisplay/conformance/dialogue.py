@@ -27,6 +27,7 @@ _HELLO_INTERVAL_S = 0.25
 _MAX_RESPONSES = 10_000
 _MAX_LOG_ENTRIES = 2_000
 _BITS_PER_BYTE = 10  # on a serial line
+_HURRY_FACTOR, _HURRIED_S = 4, 0.05
 _LOGGED_BYTES = 48  # of each packet, in a transcript
 
 
@@ -106,6 +107,10 @@ class Dialogue:
         Packets sent and received since the check began.
     clock : callable
         See above.
+    timeout_count : int
+        Number of responses that were waited for in vain.
+    is_hurried : bool
+        True if responses are given up soon, see `response_timeout_s`.
     """
 
     def __init__(
@@ -121,6 +126,8 @@ class Dialogue:
         self.clock = clock
         self.rng = random.Random(seed)
         self._seed = seed
+        self.timeout_count = 0
+        self.is_hurried = False
         self.reader = ResponseReader()
         self.session = 0
         self.seq = self.frame = 0
@@ -131,6 +138,7 @@ class Dialogue:
         self._timeout_s, self._opening_s, self._baud = timeout_s, opening_s, baud
         self._received: deque[Response] = deque()
         self._unanswered_bytes = 0
+        self._written_s = self._slowest_s = 0.0
         self._tags: Iterator[int] = iter(())
 
     def start_check(self, name: str) -> None:
@@ -153,6 +161,8 @@ class Dialogue:
 
     def _write(self, stream: bytes) -> None:
         self._unanswered_bytes += len(stream)
+        self._written_s = self.clock()
+        self.reader.credit_limit.note_sent(stream)
         try:
             self._pipe.write(stream, self.response_timeout_s)
         except TransportTimeout as error:
@@ -160,9 +170,16 @@ class Dialogue:
 
     @property
     def response_timeout_s(self) -> float:
-        """Seconds to wait for a response: limit, two ticks, time on the line."""
+        """Seconds to wait for a response: limit, two ticks, time on the line.
+
+        With a device that has failed several checks by silence, the limit is a multiple of its
+        slowest response so far: silence in all the other checks must not take minutes.
+        """
         line_s = self._unanswered_bytes * _BITS_PER_BYTE / self._baud
-        return self._timeout_s + 2 * self.device.period_s + line_s
+        limit_s = self._timeout_s
+        if self.is_hurried:
+            limit_s = min(limit_s, max(_HURRY_FACTOR * self._slowest_s, _HURRIED_S))
+        return limit_s + 2 * self.device.period_s + line_s
 
     def receive(self, until_s: float) -> Response | None:
         """Return the next response; None if none comes before a deadline of `clock`."""
@@ -179,6 +196,7 @@ class Dialogue:
         """Read what comes within a time, at least what has come; return whether anything did."""
         data = self._pipe.read(max(timeout_s, 0.0))
         for response in self.reader.feed(data):
+            self._slowest_s = max(self._slowest_s, self.clock() - self._written_s)
             self._log(sent=False, data=response.body, text=str(response))
             self._received.append(response)
         return bool(data)
@@ -189,6 +207,7 @@ class Dialogue:
         for _ in range(_MAX_RESPONSES):
             answer = self.receive(until_s)
             if answer is None:
+                self.timeout_count += 1
                 return
             yield answer
         raise NoResponse("a device sends responses only", f"{_MAX_RESPONSES} packets in a row")
@@ -273,7 +292,10 @@ class Dialogue:
                 self.state = answer
                 return before
             before.append(answer)
-        raise NoResponse("a response to STATUS", f"only {before[-1]}" if before else "nothing")
+        raise NoResponse(
+            f"a response to STATUS with its tag {tag}, in `last` of an ACK or `seq` of an ERROR",
+            f"only {before[-1]}" if before else "nothing",
+        )
 
     def send_and_poll(self, *bodies: bytes) -> list[Response]:
         """Send packets and a STATUS; return the responses to the packets."""

@@ -30,9 +30,12 @@ class Probe(Dialogue):
     ----------
     front : Page or None
         The page that must be on display; None if it is not known.
+    silent_failures : int
+        Number of checks that were broken while a response was waited for in vain.
     """
 
     front: Page | None = None
+    silent_failures = 0
 
     def start_check(self, name: str) -> None:
         """See `Dialogue.start_check`."""
@@ -112,6 +115,7 @@ class Probe(Dialogue):
             self.poll_status()
             if self.state.kind == spec.TYPE_ACK and _is_shown(self.state, frame):
                 return self.state
+        self.timeout_count += 1
         raise Violation(
             f"frame {frame} is on display",
             str(self.state),
@@ -139,6 +143,16 @@ class Probe(Dialogue):
             return
         base = Page() if clear else before
         self._raise_mismatch(ack, must, before, base, payloads or [], pixels)
+
+    def require_readback(self, must: Page) -> None:
+        """Require that a page is on display by readback, where READ is announced.
+
+        A digest alone does not show a page that was changed without it.
+        """
+        if self.device.has("READ"):
+            pixels = self.read_page()
+            if pixels != must.pixels:
+                self._raise_mismatch(self.state, must, Page(), Page(), [], pixels)
 
     def _raise_mismatch(
         self,
@@ -168,7 +182,12 @@ class Probe(Dialogue):
             return page.pixels == pixels
 
         suspects = self._pages_by_cause(must, before, base, payloads)
-        likely = _join_causes(why for why, page in suspects if is_shown(page))
+        causes = (why for why, page in suspects if is_shown(page))
+        pen = None if pixels is None else self._surviving_pen(must, pixels)
+        why_pen = [device_bugs.PenNotReset.__doc__ or ""]
+        likely = _join_causes(
+            itertools.chain(why_pen if pen else (), causes, why_pen if pen == 0 else ())
+        )
         if pixels is None:
             raise Violation(f"digest {right:08X}h", f"{ack.digest:08X}h", likely)
         differ = sorted(
@@ -181,15 +200,26 @@ class Probe(Dialogue):
             likely,
         )
 
+    def _surviving_pen(self, must: Page, pixels: dict[int, int]) -> int | None:
+        """Return the pixel that all full pixels, and no others, became; None if there is none."""
+        full = {i for i, value in must.pixels.items() if value == self.device.full_pixel}
+        others = {*must.pixels, *pixels} - full
+        pens = {pixels.get(i, 0) for i in full}
+        same_others = all(pixels.get(i) == must.pixels.get(i) for i in others)
+        return pens.pop() if len(pens) == 1 and same_others else None
+
     def _pages_by_cause(
         self, must: Page, before: Page, base: Page, payloads: list[bytes]
     ) -> Iterator[tuple[str, Page]]:
-        yield from device_bugs.pages_by_bug(self.device, base, payloads)
+        if payloads:
+            yield from device_bugs.pages_by_bug(self.device, base, payloads)
         yield from device_bugs.pages_by_scan_order(self.device, must)
         for start, why in (
             (before, "CLEAR does not make the back page dark"),
             (Page(), "without CLEAR a frame starts as a copy of the front page: here it was dark"),
         ):
+            if not payloads:
+                break
             page = start.copy()
             decoder = ReferenceDecoder(self.device, page)
             for payload in payloads:
@@ -261,8 +291,8 @@ class PageOpsDecoder(ReferenceDecoder):
 
 
 def _join_causes(reasons: Iterable[str]) -> str:
-    """Join the first three distinct causes."""
-    return ", or: ".join(itertools.islice(dict.fromkeys(reasons), 3))
+    """Join the first four distinct causes."""
+    return ", or: ".join(itertools.islice(dict.fromkeys(reasons), 4))
 
 
 def _is_shown(ack: Response, frame: int) -> bool:

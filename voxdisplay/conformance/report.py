@@ -14,6 +14,7 @@ from voxdisplay.conformance.run import Report, Result, Verdict
 from voxdisplay.printable_text import printable
 
 _LAST_LINES = 8  # of a transcript, unless all is shown
+_LAST_ERRORS = 3  # received in a check: they are shown, whatever was waited for
 
 
 def report_lines(report: Report, *, transcripts: bool) -> Iterator[str]:
@@ -69,6 +70,9 @@ def violation_lines(result: Result, *, transcript: bool) -> Iterator[str]:
         yield printable(f"  sent:    {str(result.last_sent).removeprefix('-> ')}")
     yield printable(f"  must be: {result.expected}")
     yield printable(f"  was:     {result.actual}")
+    for error in result.errors[-_LAST_ERRORS:]:
+        if error not in result.actual:
+            yield printable(f"  came:    {error}")
     if result.likely_cause:
         yield printable(f"  likely:  {result.likely_cause}")
     if transcript:
@@ -125,6 +129,7 @@ def _result_json(result: Result) -> dict[str, Any]:
         "must": result.expected or None,
         "was": result.actual or None,
         "likely": result.likely_cause or None,
+        "errors": result.errors if is_broken else None,
         "reason": result.reason or None,
         "transcript": [
             {"sent": line.sent, "hex": line.data.hex(" ").upper(), "text": line.text}

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.announced_device import AnnouncedDevice
+from voxdisplay.conformance.credit_limit import CreditLimit
 from voxdisplay.conformance.packets import Response
 from voxdisplay.wire import spec
 
@@ -31,12 +32,15 @@ class ResponseReader:
         Number of bytes received.
     segment_count : int
         Number of segments received that could be packets, damaged ones included.
+    credit_limit : CreditLimit
+        To be told what is sent.
     """
 
     def __init__(self) -> None:
         self.device: AnnouncedDevice | None = None
         self.violations: dict[str, list[str]] = {}
         self.byte_count = self.segment_count = 0
+        self.credit_limit = CreditLimit()
         self._segment = bytearray()
 
     def feed(self, come: bytes) -> Iterator[Response]:
@@ -69,6 +73,8 @@ class ResponseReader:
             self._record("whole", f"{_hex(inner)} has no type of a device, or is too short for it")
             return None
         self._check_response(answer)
+        if less := self.credit_limit.check(answer):
+            self._record("credit", less)
         return answer
 
     def _check_response(self, answer: Response) -> None:

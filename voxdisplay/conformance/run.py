@@ -22,6 +22,7 @@ from voxdisplay.wire import spec
 
 _T = TypeVar("_T")
 _MAX_SILENT_CHECKS = 3  # in a row; then the device is given up
+_HURRY_AFTER = 3  # checks broken by silence; then less time is given
 
 
 class Verdict(enum.Enum):
@@ -56,6 +57,13 @@ class Result:
     likely_cause: str = ""
     reason: str = ""
     log: tuple[LogEntry, ...] = ()
+
+    @property
+    def errors(self) -> list[str]:
+        """ERRORs received in the check, in words, each once."""
+        kind = spec.TYPE_ERROR
+        received = (line for line in self.log if not line.sent and line.data[0] >> 4 == kind)
+        return list(dict.fromkeys(line.text for line in received))
 
     @property
     def last_sent(self) -> LogEntry | None:
@@ -238,6 +246,7 @@ def _run_check(probe: Probe, check: Check) -> Result:
         return Result(check, Verdict.NOT_APPLICABLE, reason=obstacle)
     probe.start_check(check.id)
     result = Result(check, Verdict.HOLDS)
+    timeouts = probe.timeout_count
     try:
         probe.open_session()
         check.run(probe)
@@ -248,6 +257,9 @@ def _run_check(probe: Probe, check: Check) -> Result:
     except NoSuchFieldError as field:
         result = _violation(probe, check, Violation("a response of another type", str(field)))
     made = tuple(probe.log)
+    if result.verdict is Verdict.BROKEN and probe.timeout_count > timeouts:
+        probe.silent_failures += 1
+        probe.is_hurried = probe.silent_failures >= _HURRY_AFTER
     try:
         probe.open_session()
     except NoResponse as silent:

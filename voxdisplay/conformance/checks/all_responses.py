@@ -5,6 +5,7 @@ from __future__ import annotations
 from voxdisplay.conformance import packets
 from voxdisplay.conformance.catalogue import check
 from voxdisplay.conformance.checks.readback import show_incompressible
+from voxdisplay.conformance.packets import CLEAR, COMMIT, data, status
 from voxdisplay.conformance.probe import Probe
 
 
@@ -66,6 +67,17 @@ def answers_received(probe: Probe) -> None:
 @check("9", "answers-pending", "if refresh is 0, no frame is ever pending")
 def answers_pending(probe: Probe) -> None:
     require_no_violation(probe, "pending", "no PENDING if refresh is 0")
+
+
+@check("9.2", "answers-credit", "no ACK takes back what was granted, in whatever check")
+def answers_credit(probe: Probe) -> None:
+    probe.send_and_poll(data(0, 0, b"", CLEAR | COMMIT), data(1, 1), data(2, 1), status(1))
+    require_no_violation(
+        probe,
+        "credit",
+        "a limit, the end of the packet named by `last` plus `credit`, that never moves backwards",
+        "credit counts from the end of that packet, whatever of it has arrived or waits for a tick",
+    )
 
 
 @check("8", "answers-digest", "without the feature DIGEST the digest of an ACK is 0")

@@ -180,5 +180,10 @@ def overrun(probe: Probe) -> None:
     )
     grown = (probe.state.damaged - damaged) % 65536
     probe.require(
-        grown <= len(errors), "what was cut counts as one damaged segment for each OVERRUN", grown
+        grown == len(errors),
+        f"{len(errors)} more in `damaged`: each loss counts as one damaged segment",
+        grown,
     )
+    for error in errors:
+        behind = [*responses[responses.index(error) + 1 :], probe.state]
+        probe.require_ack(behind[0], "the ACK for the damage comes right behind the ERROR")

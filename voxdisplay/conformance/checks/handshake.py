@@ -105,7 +105,9 @@ def front_page_stays(probe: Probe) -> None:
     probe.require_ack(
         probe.state, "SHOWN is clear until the session's first swap", shown=0, frame=0
     )
-    probe.require_displayed(probe.state, probe.front or Page())
+    must = probe.front or Page()
+    probe.require_displayed(probe.state, must)
+    probe.require_readback(must)
 
 
 @check("5", "filling-dropped", "HELLO drops a frame that is not on display", readable_display)

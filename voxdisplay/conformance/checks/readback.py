@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from voxdisplay.conformance import ops, packets
-from voxdisplay.conformance.catalogue import check, feature, min_voxels, without_feature
+from voxdisplay.conformance.catalogue import (
+    check,
+    feature,
+    min_voxels,
+    refresh_tick,
+    without_feature,
+)
 from voxdisplay.conformance.checks.packet_types import require_session_open
-from voxdisplay.conformance.packets import BACK, body, read
+from voxdisplay.conformance.checks.pending_swap import index_of_swap
+from voxdisplay.conformance.packets import BACK, CLEAR, COMMIT, body, data, read
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 READ = feature("READ")
+_ATTEMPTS = 8
 
 
 def show_test_picture(probe: Probe) -> None:
@@ -131,6 +139,31 @@ def back_page(probe: Probe) -> None:
     probe.require(got == {1: device.full_pixel}, "the back page with voxel 1 lit", got)
     got, _ = probe.read_range(0, 2)
     probe.require(got == {0: device.full_pixel}, "the front page with voxel 0 lit", got)
+
+
+@check(
+    "10",
+    "back-page-pending",
+    "while a frame is pending, BACK reads that frame",
+    READ,
+    refresh_tick,
+    min_voxels(2),
+)
+def back_page_pending(probe: Probe) -> None:
+    device = probe.device
+    probe.show(ops.single_voxel(device, 0))
+    for frame in range(1, 1 + _ATTEMPTS):
+        packet = data(frame, frame, ops.single_voxel(device, 1), CLEAR | COMMIT)
+        responses = probe.send_and_poll(packet, read(0, 2, 7, BACK))
+        pages = [at for at, answer in enumerate(responses) if answer.kind == spec.TYPE_PAGE]
+        probe.require(bool(pages), "PAGE", responses[-1] if responses else "nothing")
+        is_pending = pages[0] < index_of_swap(responses, frame)
+        probe.await_shown(frame, [*responses, probe.state])
+        if is_pending:  # otherwise the tick was faster
+            got = probe.decode_page(responses[pages[0]], 0, 2)
+            must = {1: device.full_pixel} if responses[pages[0]].count == 2 else {}
+            probe.require(got == must, "the pending frame, with voxel 1 lit", got)
+            return
 
 
 @check("10", "dense-page", "a range that does not fit one PAGE is covered in part", READ)
