@@ -11,6 +11,7 @@ from dataclasses import replace
 import broken_devices
 import document
 import pytest
+from broken_devices.mutant import Device, around
 from virtual_time_device import VirtualTimeDevice
 
 from firmware_sim import crc
@@ -22,6 +23,7 @@ from voxdisplay.conformance.device_bugs import DEVICE_BUGS
 from voxdisplay.conformance.dialogue import NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
+from voxdisplay.conformance.report import as_json, violation_lines
 from voxdisplay.conformance.run import Verdict, run_checks, select_checks
 from voxdisplay.conformance.saved_page import SavedPage
 from voxdisplay.errors import TransportClosed
@@ -199,6 +201,50 @@ def test_a_fault_is_found_nowhere_else(fault, monkeypatch):
     random_ones = {"7/random-ops", "11/random-ops", "12/mutated", "12/noise"}
     assert set(fault.fails) <= broken
     assert fault.spreads or broken - random_ones <= set(fault.fails), explain(report)
+
+
+def test_a_device_that_fails_by_silence_costs_less_than_a_minute(monkeypatch):
+    monkeypatch.setattr(Device, "_status", lambda *_: None)
+    port = emulated_port(refresh=50_000)
+    report = examined(port)
+    assert len(by_verdict(report, Verdict.BROKEN)) > 150
+    assert not by_verdict(report, Verdict.NOT_RUN)
+    assert port.clock() < 60  # virtual seconds
+
+
+def test_a_status_without_response_is_named_by_its_tag(monkeypatch):
+    monkeypatch.setattr(Device, "_status", lambda *_: None)
+    report = examined(emulated_port(), ["7/pen"])
+    (result,) = report.results
+    (tag,) = (line.data[1] for line in result.log if line.sent and line.data[0] == 0x40)
+    assert f"its tag {tag}," in result.expected
+
+
+def test_errors_are_shown_whatever_was_waited_for(monkeypatch):
+    def data(old, self, session, packet, flags, seq, frame):
+        if seq == 1:
+            raise PacketError(spec.CODE_PADDING, 3, "something is on")
+        old(self, session, packet, flags, seq, frame)
+
+    around(monkeypatch, Device, "_data", data)
+    report = examined(emulated_port(refresh=0), ["6/out-of-order-next"])
+    (result,) = report.results
+    assert len(result.errors) == 2  # that one, and one of STATUS behind it
+    assert "PADDING" in result.errors[0]
+    shown = "\n".join(violation_lines(result, transcript=False))
+    assert "something is on" in shown
+    assert "NO_SESSION" in shown
+    assert result.errors == as_json("port", report)["checks"][0]["errors"]
+
+
+@pytest.mark.parametrize("checks", ["6", "9.1"])
+def test_a_pen_that_survives_is_told_from_swapped_axes(checks, monkeypatch):
+    (fault,) = (each for each in broken_devices.MUTANTS if each.name == "pen-not-reset")
+    fault.make(monkeypatch)
+    report = examined(emulated_port(), [checks])
+    causes = [result.likely_cause for result in report.results if result.likely_cause]
+    assert any("pen is not reset" in cause for cause in causes)
+    assert not any("axes" in cause for cause in causes)
 
 
 def test_every_check_finds_a_fault():
