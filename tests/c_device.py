@@ -123,6 +123,30 @@ class ScriptedDevice:
         assert self.process.wait(10) == 0
 
 
+def device_of(vector: document.Vector) -> ScriptedDevice:
+    """Return the device that a vector describes."""
+    facts = dict(vector.lines)
+    pixel_format = vector["format"].lower()
+    if "features" in facts:
+        features = frozenset(facts["features"].lower().split("|"))
+    elif vector.kind == "dialogue":
+        features = frozenset({"read", "digest"})
+    else:
+        features = all_features(pixel_format)
+    program = build(
+        vector.grid,
+        pixel_format,
+        features,
+        max_payload=int(facts.get("max_payload", 1024)),
+        ring=int(facts.get("rx_buffer", 16384)),
+    )
+    identity = {
+        key: facts[key].strip('"') for key in ("name", "firmware", "serial") if key in facts
+    }
+    refresh = int(facts.get("refresh", 0)) / 1000
+    return ScriptedDevice(program, refresh=refresh, boot=facts.get("boot", 1), **identity)
+
+
 class TerminalDevice:
     """The device on its own pseudo-terminal, with its own clock."""
 

@@ -175,12 +175,14 @@ def hold_dialogue(lines: Iterable[tuple[str, str]], device: Device) -> None:
             answers = device.tick()
         elif key == "device":
             meant = hex_bytes(text.removesuffix("*"))
+            assert answers, "the device did not answer"
             got = answers.pop(0)
             assert (got[: len(meant)] if text.endswith("*") else got).hex(" ") == meant.hex(" ")
             if got[0] >> 4 == literals()["TYPE_ERROR"]:
                 got[8:].decode()  # its text is UTF-8
         elif key == "page":
             fields, pixels = map(hex_bytes, text.split("="))
+            assert answers, "the device did not answer"
             got = answers.pop(0)
             assert got[: len(fields)].hex(" ") == fields.hex(" ")
             drawn = page_pixels(got[len(fields) :], int.from_bytes(fields[8:], "little"), format_)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import c_device
 import document
 import pytest
-from c_device import HELLO, ScriptedDevice, all_features, build
+from c_device import HELLO, ScriptedDevice, all_features, build, device_of
 
 pytestmark = pytest.mark.skipif(c_device.COMPILER is None, reason="no C compiler (cc)")
 
@@ -21,29 +21,6 @@ def of_version_1_0(vector: document.Vector) -> bool:
     """Return whether a device has no feature of a later version: the reference device has none."""
     wanted = dict(vector.lines).get("features", "").split("|")
     return all(LITERALS[f"FEATURE_{name}"] < 9 for name in wanted if name)
-
-
-def device_of(vector: document.Vector) -> ScriptedDevice:
-    facts = dict(vector.lines)
-    pixel_format = vector["format"].lower()
-    if "features" in facts:
-        features = frozenset(facts["features"].lower().split("|"))
-    elif vector.kind == "dialogue":
-        features = frozenset({"read", "digest"})
-    else:
-        features = all_features(pixel_format)
-    program = build(
-        vector.grid,
-        pixel_format,
-        features,
-        max_payload=int(facts.get("max_payload", 1024)),
-        ring=int(facts.get("rx_buffer", 16384)),
-    )
-    identity = {
-        key: facts[key].strip('"') for key in ("name", "firmware", "serial") if key in facts
-    }
-    refresh = int(facts.get("refresh", 0)) / 1000
-    return ScriptedDevice(program, refresh=refresh, boot=facts.get("boot", 1), **identity)
 
 
 @each("ops")
