@@ -160,6 +160,7 @@ def duplicates_unanswered(patch):
 
 
 @mutant(
+    "9.1/duplicate-while-pending",
     "9.1/window-edges",
     "9.1/duplicate-answered",
     "9.1/duplicate-unseen",
@@ -199,7 +200,9 @@ def window_ends_at_255(patch):
     around(patch, Session, "_ahead", ahead)
 
 
-@mutant("9.2/returned", "9.2/not-withdrawn", likely="not what is left of a total")
+@mutant(
+    "9.2/answers-credit", "9.2/returned", "9.2/not-withdrawn", likely="not what is left of a total"
+)
 def credit_never_returned(patch):
     def change(self, flags, seq, frame, values):
         self.spent = getattr(self, "spent", 0) + 20
@@ -214,7 +217,7 @@ def credit_of_twice_the_ring(patch):
     del patch
 
 
-@mutant("9.2/not-withdrawn", likely="whatever of it has arrived")
+@mutant("9.2/answers-credit", "9.2/not-withdrawn", likely="whatever of it has arrived")
 def credit_of_what_is_free(patch):
     def take(old, self, data, at):
         self.left = len(data)
@@ -243,7 +246,7 @@ def _idle(patch, lapse):
     around(patch, DeviceOnLine, "receive", receive)
 
 
-@mutant("9.2/does-not-lapse", likely="must not expire")
+@mutant("9.2/answers-credit", "9.2/does-not-lapse", likely="must not expire")
 def credit_lapses(patch):
     _idle(patch, lambda self: setattr(self, "lapsed", 20))
 

@@ -101,7 +101,13 @@ def pending_not_said(patch):
     patch.setattr(device.spec, "ACK_FLAG_PENDING", 0)
 
 
-@mutant("6/next-waits", "6/waits-unchecked", "6/all-waits", "9.2/room-is-there")
+@mutant(
+    "9.1/duplicate-while-pending",
+    "6/next-waits",
+    "6/waits-unchecked",
+    "6/all-waits",
+    "9.2/room-is-there",
+)
 def next_does_not_wait(patch):
     patch.setattr(Session, "must_wait", lambda *_: False)
 

@@ -18,6 +18,7 @@ def restarts_on_long_noise(patch):
 
 
 @mutant(
+    "10/back-page-pending",
     "9.1/nothing-of-the-refused",
     "9.2/returned",
     "9.2/not-withdrawn",

@@ -59,6 +59,7 @@ def cobs_overrun_forgiven(patch):
 
 
 @mutant(
+    "11/overrun",
     "3/shortest-damage",
     "3/cobs-overrun",
     "3/bit-errors",
@@ -112,6 +113,8 @@ def answers_in_short_groups(patch):
 
 
 @mutant(
+    "5/front-page-stays",
+    "10/back-page-pending",
     "10/whole-page",
     "10/ranges",
     "10/page-fields",
@@ -149,7 +152,7 @@ def reserved_types_silent(patch):
     around(patch, Device, "_process", answer)
 
 
-@mutant("4/data-flags", "11/order-of-packet")
+@mutant("6/waits-unchecked", "4/data-flags", "11/order-of-packet")
 def reserved_data_flags_taken(patch):
     patch.setattr(device, "_DATA_FLAGS", 15)
 

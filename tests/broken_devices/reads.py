@@ -14,7 +14,7 @@ def _read(patch, change):
     around(patch, Device, "_read", read)
 
 
-@mutant("10/ranges", "10/back-page", likely="off by")
+@mutant("10/back-page-pending", "10/ranges", "10/back-page", likely="off by")
 def read_off_by_one(patch):
     old = device.encode_page
 
@@ -41,7 +41,7 @@ def page_without_its_tag(patch):
     around(patch, Device, "_send", _send)
 
 
-@mutant("10/back-page")
+@mutant("10/back-page-pending", "10/back-page")
 def back_reads_the_front(patch):
     old = device.encode_page
     patch.setattr(device, "encode_page", old)

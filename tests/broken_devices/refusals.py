@@ -15,6 +15,10 @@ def _refused(patch, change):
 
 
 @mutant(
+    "7.11/slabs-cut",
+    "7.11/slabs-too-many-bytes",
+    "7.11/slabs-too-many-cells",
+    "7.11/slabs-off-the-grid",
     "7.10/arc2-fade-refused",
     "7.10/arc2-outside",
     "7.10/arc2-refused",
