@@ -22,7 +22,6 @@ HIDDEN = {
     "page-too-long": "how much of a READ a PAGE covers is the device's choice",
     "page-count-of-the-read": "how much of a READ a PAGE covers is the device's choice",
     "arc-runs-without-end": "takes a straight piece of more than 255 steps",
-    "slabs-go-on-from-the-box-before": "takes two boxes with as many bits",
 }
 
 
