@@ -1,4 +1,4 @@
-"""Parsing of colours: CSS names, ``#rgb``, ``#rrggbb``, triples of 0 to 255, and lists of these.
+"""Parsing of colours: CSS names and functions, ``#rrggbb``, triples of 0 to 255, lists of these.
 
 Must not know displays or curves.
 """
@@ -26,6 +26,11 @@ _KINDS: Final = "a CSS name, '#rrggbb', (r, g, b) of 0 to 255, or a list of thes
 def parse_color(text: str) -> tuple[int, int, int]:
     """Return red, green and blue, each 0 to 255, of a colour's text, in capitals or not.
 
+    Parameters
+    ----------
+    text : str
+        A name of CSS, ``#rgb``, ``#rrggbb``, ``rgb(255 136 0)`` or ``hsl(32deg 100% 50%)``.
+
     Raises
     ------
     ValueError
@@ -36,6 +41,11 @@ def parse_color(text: str) -> tuple[int, int, int]:
     digits = NAMED.get(name)
     if digits is None and (match := re.fullmatch(r"#((?:[0-9a-f]{3}){1,2})", name)):
         digits = match.group(1)
+    if digits is None and "(" in name:
+        from voxdisplay.raster.css_functions import parse_color_function  # noqa: PLC0415 - rare
+
+        if (found := parse_color_function(name)) is not None:
+            return found
     if digits is None:
         near = did_you_mean(name, NAMED) or "write a CSS colour name, #rgb or #rrggbb"
         raise ValueError(f"unknown colour {reprlib.repr(text)}: {near}")

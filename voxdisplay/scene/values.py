@@ -115,7 +115,8 @@ OneColor = Annotated[
     str | _Channel | Annotated[list[_Channel], Meta(min_length=3, max_length=3)],
     Meta(
         title="Colour",
-        description="#rgb, #rrggbb, a CSS colour name or [red, green, blue], 0 to 255.",
+        description="#rgb, #rrggbb, a CSS colour name, rgb(), hsl() or [red, green, blue], 0 to "
+        "255.",
         extra={"expected": "a colour"},
     ),
 ]
@@ -159,8 +160,9 @@ Color = Annotated[
     str | Annotated[list[OneColor], Meta(min_length=1)] | ColorMap | None,
     Meta(
         title="Colour",
-        description="#rgb, #rrggbb, a CSS colour name or [red, green, blue], 0 to 255; or a list "
-        "of colours, spread along a curve or from the lowest to the highest voxel of a body. Three "
+        description="#rgb, #rrggbb, a CSS colour name, rgb(), hsl() or [red, green, blue], 0 to "
+        "255; or a list of colours, spread along a curve or from the lowest to the highest voxel "
+        "of a body. Three "
         "whole numbers are one colour. A list of as many colours as the object has points (types "
         'points and scatter) colours those points. Or colours by a value: {"map": "viridis", '
         '"by": "z"}. When left out, white, or what the file of the object has.',

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import colorsys
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,66 @@ def test_css_has_148_names_and_each_is_a_color() -> None:
 @pytest.mark.parametrize("text", ["#", "#1", "#12", "#1234", "#12345", "#1234567", "#ggg", "", "0"])
 def test_what_is_no_color(text: str) -> None:
     with pytest.raises(ValueError, match=r"unknown colour .*CSS colour name, #rgb or #rrggbb"):
+        parse_color(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "color"),
+    [
+        ("rgb(255, 136, 0)", (255, 136, 0)),
+        ("RGB(255 136 0)", (255, 136, 0)),
+        (" rgb( 100%  53.333%  0% ) ", (255, 136, 0)),
+        ("rgb(300 -5 127.5)", (255, 0, 128)),
+        ("rgb(50% 128 none)", (128, 128, 0)),
+        ("rgb(1e2 .5 +0.4)", (100, 1, 0)),
+        ("rgba(1, 2, 3, 1)", (1, 2, 3)),
+        ("rgb(1 2 3 / 100%)", (1, 2, 3)),
+        ("hsl(32, 100%, 50%)", (255, 136, 0)),
+        ("hsl(0 100% 50%)", (255, 0, 0)),
+        ("hsl(120deg 100% 25%)", (0, 128, 0)),
+        ("hsl(0.5turn 100 50)", (0, 255, 255)),
+        ("hsl(-120 100% 50%)", (0, 0, 255)),
+        ("hsl(200grad 100% 50%)", (0, 255, 255)),
+        ("hsl(3.14159265rad 100% 50%)", (0, 255, 255)),
+        ("hsl(39 100% 50% / 1)", (255, 166, 0)),
+        ("hsla(720, 0%, 50%, 100%)", (128, 128, 128)),
+        ("hsl(none 200% 150%)", (255, 255, 255)),
+        ("hsl(270 50% 40%)", (102, 51, 153)),
+    ],
+)
+def test_functions_are_those_of_css(text: str, color: tuple[int, int, int]) -> None:
+    assert parse_color(text) == color
+
+
+def test_hsl_is_colorsys_on_a_grid() -> None:
+    for hue in range(0, 360, 15):
+        for saturation in range(0, 101, 20):
+            for lightness in range(0, 101, 20):
+                found = parse_color(f"hsl({hue} {saturation}% {lightness}%)")
+                wanted = colorsys.hls_to_rgb(hue / 360, lightness / 100, saturation / 100)
+                assert all(
+                    abs(each - 255 * share) <= 0.5 + 1e-6
+                    for each, share in zip(found, wanted, strict=True)
+                )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "rgb()", "rgb(1 2)", "rgb(1 2 3 4)", "rgb(1, 2, 3, 4, 5)", "rgb(1, 2%, 3)", "rgb(1,2 3)",
+        "rgb(1 2 3", "rgb(1deg 2 3)", "rgb(a b c)", "rgb(1. 2 3)", "rgb(none, 2, 3)",
+        "rgb(1 2 3 / 1 / 1)", "rgb(1e999 2 3)", "rgb(1 2 3 / 1px)", "rgb(" + "1" * 300 + " 2 3)",
+        "rgb(1 2 3) 4", "hsl(1, 2, 3)", "hsl(1% 2% 3%)", "hsl(1px 2% 3%)", "hsl(1 2deg 3%)",
+    ],
+)  # fmt: skip
+def test_wrong_functions_show_the_right_form(text: str) -> None:
+    with pytest.raises(ValueError, match=r"the colour function (rgb|hsl)\(\) is written like"):
+        parse_color(text)
+
+
+@pytest.mark.parametrize("text", ["rgb(1 2 3 / 0.5)", "hsla(1, 2%, 3%, 50%)"])
+def test_voxels_are_not_transparent(text: str) -> None:
+    with pytest.raises(ValueError, match="leave the colour's alpha out"):
         parse_color(text)
 
 
