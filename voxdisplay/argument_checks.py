@@ -70,6 +70,14 @@ def positive(name: str, value: Any) -> float:
     return result
 
 
+def distances(name: str, value: Any) -> tuple[float, float, float]:
+    """Return three numbers above 0, for x, y and z; raise `TypeError` or `ValueError` otherwise."""
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise wrong_kind(name, "three distances [x, y, z]", value)
+    x, y, z = (positive(name, each) for each in value)
+    return x, y, z
+
+
 def duration(name: str, value: Any) -> float:
     """Return a finite number of seconds, 0 or more; raise `TypeError` or `ValueError` otherwise."""
     seconds = number(name, value)

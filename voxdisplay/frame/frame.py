@@ -138,7 +138,7 @@ class Frame(Framebuffer):
 
         """
         if isinstance(voxels, voxelization.VoxelSet):
-            drawing = self._add_set(voxels.voxels, colors)
+            drawing = self._add_set(voxels.voxels, self._shades(voxels, colors))
             return replace(drawing, notes=voxels.notes)
         found = self._coloring.item(voxels.voxels, colors, Kind.CURVE, corner_rows(voxels))
         self._raster.draw(found.item)
@@ -191,10 +191,30 @@ class Frame(Framebuffer):
         items, drawings = [], []
         for voxel_set, colors in sets:
             voxels = voxel_set.voxels
-            found = self._coloring.item(voxels, colors, Kind.SET)
+            found = self._coloring.item(voxels, self._shades(voxel_set, colors), Kind.SET)
             items.append(found.item)
             drawings.append(Drawing(len(voxels), found.clipped, found.exact, notes=voxel_set.notes))
         return items, drawings
+
+    def _shades(
+        self, voxel_set: voxelization.VoxelSet, colors: NDArray[np.uint8] | Spread
+    ) -> NDArray[np.uint8] | Spread:
+        """Return the colours of a volume dithered, if the display's profile wants that."""
+        if self._output is None or not self._output.dithers or self._palette is not None:
+            return colors
+        count = len(voxel_set)
+        if (
+            voxel_set.kind != "volume"
+            or isinstance(colors, Spread)
+            or len(colors) not in {1, count}
+        ):
+            return colors
+        from voxdisplay.raster.dither import can_dither, dithered, ranks_at  # noqa: PLC0415
+
+        if not count or not can_dither(self.format):
+            return colors
+        ranks = ranks_at(voxel_set.voxels)
+        return dithered(np.broadcast_to(colors, (count, 3)), ranks, self.format)
 
     def _sequences(
         self, sequences: list[tuple[voxelization.Sequence, NDArray[np.uint8] | Spread]]

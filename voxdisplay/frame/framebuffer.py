@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from itertools import chain
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,18 @@ from voxdisplay.wire.digest import palette_digest, raster_digest
 from voxdisplay.wire.op_encoding import EncoderConfig
 from voxdisplay.wire.palette_ops import changed_color_blocks
 from voxdisplay.wire.raster_encoding import encode_raster
+
+if TYPE_CHECKING:
+    from voxdisplay.frame.output_transform import OutputTransform
+    from voxdisplay.raster.pixel_map import PixelMap
+
+
+class _Sent(NamedTuple):
+    """What a display's memory holds for a picture, whose lit voxels were those; and a note."""
+
+    lit: PixelMap
+    memory: Framebuffer
+    note: str
 
 
 class Framebuffer:
@@ -56,6 +68,15 @@ class Framebuffer:
         own_palette = flag("own_palette", own_palette)
         if self.format is PixelFormat.INDEX8 and (own_palette or palette is not None):
             self._palette = Palette(palette, grows=palette is None)
+        self._output: OutputTransform | None = None
+        self._sent: _Sent | None = None
+
+    @classmethod
+    def _of_raster(cls, raster: SparseRaster, palette: Palette | None) -> Self:
+        """Return the picture of a raster, with a palette of its own or none."""
+        found = cls(raster.grid, raster.format)
+        found._raster, found._palette = raster, palette  # as of `copy`
+        return found
 
     def __repr__(self) -> str:
         lit = len(self.lit()[0])
@@ -90,6 +111,59 @@ class Framebuffer:
 
     def __copy__(self) -> Self:
         return self.copy()
+
+    # -- the display's memory
+
+    @property
+    def output(self) -> OutputTransform | None:
+        """What lies between the picture and the display's memory; None if they are the same."""
+        return self._output
+
+    def with_output(self, output: OutputTransform | None) -> Self:
+        """Return the same picture for a display that stands, or is lit, otherwise.
+
+        Parameters
+        ----------
+        output : OutputTransform or None
+
+        """
+        if output is not None:
+            from voxdisplay.frame.output_transform import OutputTransform  # noqa: PLC0415
+
+            instance("output", output, OutputTransform, "an OutputTransform or None")
+        twin = self.copy()
+        twin._output, twin._sent = output, None  # noqa: SLF001 - of its own kind
+        return twin
+
+    @property
+    def pitch(self) -> tuple[float, float, float]:
+        """Distances of voxels along x, y and z, in any unit."""
+        return (1.0, 1.0, 1.0) if self._output is None else self._output.pitch
+
+    @property
+    def memory(self) -> Framebuffer:
+        """The picture as the display's memory holds it; it must not be changed."""
+        return self if self._output is None else self._to_send(self._output).memory
+
+    def readback(self) -> Pixels:
+        """Return what a display reads back that shows the frame, [z, y, x], as its user sees it.
+
+        That is `array`, unless the display dims its light.
+        """
+        page = self.memory.array()
+        return page if self._output is None else self._output.to_user(page)
+
+    @property
+    def output_note(self) -> str:
+        """What the display's current limit has done to the picture; empty if nothing."""
+        return "" if self._output is None else self._to_send(self._output).note
+
+    def _to_send(self, output: OutputTransform) -> _Sent:
+        lit = self._raster.lit  # another one after each change
+        if self._sent is None or self._sent.lit is not lit:
+            raster, palette, note = output.memory(self._raster, self._palette)
+            self._sent = _Sent(lit, Framebuffer._of_raster(raster, palette), note)
+        return self._sent
 
     def set(self, array: NDArray[np.generic]) -> None:
         """Replace the picture by an array. The palette stays as it is.
@@ -187,6 +261,8 @@ class Framebuffer:
 
     def digest(self) -> int:
         """Return the digest that a display reports when it shows this frame (section 8)."""
+        if self._output is not None:
+            return self.memory.digest()
         found = raster_digest(self._raster)
         if self._palette and len(entries := self._palette.entries_differing(DEFAULT)):
             found += palette_digest(self.grid.voxels, entries, self._palette.colors[entries])
@@ -221,6 +297,9 @@ class Framebuffer:
             save are skipped.
 
         """
+        if self._output is not None:
+            yield from self.memory.iter_payloads(max_payload, features, bytes_per_s)
+            return
         config = self._encoder_config(max_payload, features, bytes_per_s)
         first = changed_color_blocks(self._palette, DEFAULT, config)
         yield from encode_raster(self._raster, config, first)
@@ -238,8 +317,10 @@ class Framebuffer:
             As of `payloads`.
 
         """
-        config = self._encoder_config(max_payload, features)
         self._check_comparable(base)
+        if self._output is not None or base._output is not None:
+            return self.memory.difference(base.memory, max_payload, features)
+        config = self._encoder_config(max_payload, features)
         old = base._palette.colors if base._palette else DEFAULT
         first = changed_color_blocks(self._palette, old, config)
         return encode_difference(self._raster, base._raster, config, first)

@@ -101,6 +101,11 @@ class SparseRaster:
         return self._drawn.pixels
 
     @property
+    def visible(self) -> DrawnVoxels | None:
+        """Visible voxels, dark ones included, of what was drawn; None without any."""
+        return self._drawn.visible
+
+    @property
     def ordered(self) -> DrawnVoxels | None:
         """Visible voxels, dark ones included, of items that may have an order; None without any."""
         drawn = self._drawn.visible

@@ -6,12 +6,12 @@ frames.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from voxdisplay.argument_checks import flag, number, wrong_kind
+from voxdisplay.argument_checks import choice, flag, number, wrong_kind
 from voxdisplay.raster.area_means import Placement, area_means, nearest_samples
 from voxdisplay.raster.array_arguments import as_array, is_array_like
 from voxdisplay.raster.color import Color
@@ -41,6 +41,7 @@ def volume_pixels(
     spacing: tuple[float, float, float] = (1, 1, 1),
     format: PixelFormat | str = "rgb888",  # noqa: A002 - the word of the wire
     labels: bool = False,
+    dither: Literal["none", "ordered"] = "none",
 ) -> Pixels:
     """Return the pixels of a volume, for `Frame.set`.
 
@@ -65,6 +66,10 @@ def volume_pixels(
         That of the display.
     labels : bool
         Whether values are numbers of parts, which have no mean: each voxel takes the nearest.
+    dither : {"none", "ordered"}
+        ``"ordered"`` shows mono1, index8 and rgb565 displays with more shades than they have, by
+        voxels of their nearest ones in a fixed pattern; ``threshold`` is then ``low`` for mono1,
+        too. Pixels of index8 are those of the default palette.
 
     Returns
     -------
@@ -95,11 +100,19 @@ def volume_pixels(
         raise ValueError("spacing: without a grid the samples are the voxels; name the grid")
     if chosen is None:
         chosen = label_window(values) if flag("labels", labels) else default_window(values)
-    if least is None and kind is PixelFormat.MONO1:
+    choice("dither", dither, ("none", "ordered"))
+    dithers = dither == "ordered" and kind is not PixelFormat.RGB888
+    if least is None and kind is PixelFormat.MONO1 and not dithers:
         least = (chosen.low + chosen.high) / 2
     entries, lit = map_entries(values, chosen, least)
     if present is not None:
         lit &= present
+    if dithers:
+        from voxdisplay.raster.dither import dithered_pixels  # noqa: PLC0415 - few want it
+
+        shown: Pixels = dithered_pixels(entries, colors, kind)
+        shown[~lit] = 0
+        return shown
     pixels = kind.pixels(kind.nearest(colors))
     if kind is PixelFormat.MONO1:
         pixels[:] = 1
