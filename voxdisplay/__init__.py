@@ -86,6 +86,7 @@ Errors.
     SceneError          A scene file is wrong: where, and what.
     CurveError          A curve cannot be evaluated or drawn.
     BodyError           A body cannot be evaluated or drawn.
+    ProfileError        A display profile is missing, or wrong.
     RecordingError      A recording is damaged, or cannot be written.
     DesyncError         The display shows something else, after recovery was tried.
     MissingExtra        An optional library is not installed.
@@ -147,6 +148,7 @@ if TYPE_CHECKING:
         LocalProtocolError,
         MissingExtra,
         OpenError,
+        ProfileError,
         ProtocolError,
         RecordingError,
         RemoteProtocolError,
@@ -207,6 +209,7 @@ if TYPE_CHECKING:
         "Points",
         "Polygon",
         "Polyline",
+        "ProfileError",
         "ProtocolError",
         "Receipt",
         "Recording",
@@ -302,6 +305,7 @@ _MODULES = {
         "LocalProtocolError",
         "MissingExtra",
         "OpenError",
+        "ProfileError",
         "ProtocolError",
         "RecordingError",
         "RemoteProtocolError",

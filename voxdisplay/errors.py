@@ -15,6 +15,7 @@
     |- SceneError               the scene is wrong: .path and what; also a ValueError
     |- CurveError               a curve cannot be evaluated or drawn; also a ValueError
     |- BodyError                a body cannot be evaluated or drawn; also a ValueError
+    |- ProfileError             a display profile is missing, or wrong; also a ValueError
     |- RecordingError           a recording is damaged, or of another kind; also a ValueError
     |- DesyncError              the device's digest still differs from ours after recovery
     `- MissingExtra             an optional library is not installed; also an ImportError
@@ -207,6 +208,10 @@ class CurveError(VoxDisplayError, ValueError):
 
 class BodyError(VoxDisplayError, ValueError):
     """A surface, solid, mesh or volume cannot be evaluated or drawn."""
+
+
+class ProfileError(VoxDisplayError, ValueError):
+    """A display profile is missing, or wrong: which file, and which key."""
 
 
 class RecordingError(VoxDisplayError, ValueError):

@@ -60,12 +60,13 @@ CALLS = {
     "read_scene": {"data": SCENE, "folder": None},
     "volume_pixels": {"array": np.ones((3, 5, 7)), "window": (0, 1), "threshold": 0.5,
                       "map": "magma", "grid": (3, 5, 7), "spacing": (1, 1, 2),
-                      "format": "rgb888", "labels": False},
+                      "format": "rgb888", "labels": False, "dither": "none"},
     "voxelize": {"curve": WRONG["curve"], "method": "grid-plane", "variant": 3, "tangent": None,
                  "pitch": None, "reach": None, "certified": False, "clip": None},
     "voxelize_many": {"curves": [WRONG["curve"]], "method": "march", "variant": 3},
     "open": {"port": "sim:?size=8x8x8", "baud": 115200, "timeout_s": 1.0, "reconnect_s": 0.0,
-             "no_reset": False, "note": None, "capture": None},
+             "display": {"axes": "x,-z,y", "brightness": 0.5}, "no_reset": False, "note": None,
+             "capture": None},
     "BodyError": {"message": "what", "hint": "do"},
     "CurveError": {"message": "what", "axis": "x", "hint": "do"},
     "DesyncError": {"message": "what", "hint": "do"},
@@ -76,6 +77,7 @@ CALLS = {
     "OpenError": {"message": "what", "port": "/dev/x", "hint": "do"},
     "ProtocolError": {"message": "what", "hint": "do"},
     "RemoteProtocolError": {"message": "what", "section": "7", "offset": 3, "raw": b""},
+    "ProfileError": {"message": "what", "hint": "do"},
     "RecordingError": {"message": "what", "hint": "do"},
     "SceneError": {"message": "what", "path": "$.x", "hint": "do"},
     "TransportClosed": {"message": "what", "hint": "do"},
@@ -93,6 +95,11 @@ CALLS = {
 RECORDS = {"Body", "Curve", "DeviceInfo", "Display", "Drawing", "Grid", "PixelFormat", "PlayReport",
            "Receipt", "Recording", "Report", "Scene", "Sequence", "VoxelSet"}  # fmt: skip
 CALLS["Segment"] = dict(zip(inspect.signature(vd.Segment).parameters, POINTS, strict=False))
+
+# Keys of a profile, each of which may be of a wrong kind.
+PROFILE = {"port": "sim:?size=3x5x7", "axes": ["x", "z", "y"], "pitch_mm": [1, 1, 2],
+           "brightness": 0.5, "limit": {"amps": 1, "ma_per_channel": 20}, "dither": "ordered",
+           "fit": "none"}  # fmt: skip
 
 
 def test_every_public_name_is_called():
@@ -125,6 +132,17 @@ def test_functions_and_classes(name):
             assert isinstance(repr(result), str)
 
 
+def test_keys_of_a_profile():
+    for what, keys in itertools.chain(
+        replaced(PROFILE),
+        ((f"serial = {kind}", {"serial": wrong}) for kind, wrong in WRONG.items()),
+        ((f"limit.{what}", {"limit": limit}) for what, limit in replaced(PROFILE["limit"])),
+    ):
+        display = call(f"open(display: {what})", vd.open, {"display": keys})
+        if display is not None:
+            display.close()
+
+
 def drawn_frame():
     frame = vd.Frame((3, 5, 7), "rgb888")
     frame.draw([(1, 2, 3), (1, 3, 4)], "red")
@@ -139,9 +157,10 @@ METHODS = {
     "Frame.payloads": {"max_payload": 64, "features": ()},
     "Frame.difference": {"base": vd.Frame((3, 5, 7)), "max_payload": 64, "features": ()},
     "Frame.changed_indices": {"base": vd.Frame((3, 5, 7))},
+    "Frame.with_output": {"output": None},
     "Grid.parse": {"text": "3x5x7"},
     "Grid.of": {"sides": (3, 5, 7)},
-    "Scene.fitted": {"grid": (3, 5, 7), "mode": "contain"},
+    "Scene.fitted": {"grid": (3, 5, 7), "mode": "contain", "pitch": (1, 1, 2)},
     "Scene.draw_on": {"frame": vd.Frame((3, 5, 7)), "fit": "contain"},
 }
 

@@ -73,6 +73,7 @@ ERRORS = {
     "LocalProtocolError": vd.LocalProtocolError("what"),
     "MissingExtra": vd.MissingExtra("what", hint="do"),
     "OpenError": vd.OpenError("what", port="/dev/x", hint="do"),
+    "ProfileError": vd.ProfileError("what", hint="do"),
     "RecordingError": vd.RecordingError("what", hint="do"),
     "RemoteProtocolError": vd.RemoteProtocolError("what", section="7", offset=3, raw=b"\0"),
     "SceneError": vd.SceneError("what", path="$.x", hint="do"),

@@ -151,9 +151,11 @@ def test_push_imports_nothing_heavy(tmp_path):
     heavy = {"PIL", "scipy", "numba", "jsonschema", "usb", "websockets", "trimesh", "nibabel"}
     heavy |= {"nrrd", "pydicom", "uharfbuzz", "cmap", "dask", "asyncio", "multiprocessing"}
     assert not heavy & {name.split(".")[0] for name in loaded}
+    assert "tomllib" not in loaded
     assert "numpy.ma" not in loaded, "it takes as long to import as a small scene to draw"
     needless = re.compile(
         r"voxdisplay\.(view|files|conformance|annotation|shows|bodies|voxelization\.surfaces)\."
+        r"|voxdisplay\.(display\.profile|raster\.(orientation|light|dither)|frame\.output)"
     )
     allowed = {"voxdisplay.bodies.body", "voxdisplay.files.suffixes", "voxdisplay.shows.show"}
     assert not {name for name in loaded if needless.match(name)} - allowed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import os
 import time
-from collections.abc import Callable
-from typing import Any, Final, Literal, TextIO
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final, Literal, TextIO
 
 from voxdisplay.argument_checks import duration, flag, function, whole_number, wrong_kind
 from voxdisplay.display.baud import DEFAULT_BAUD, open_at_rate
@@ -15,6 +15,9 @@ from voxdisplay.display.display import Display
 from voxdisplay.display.reconnect import Reconnector, open_when_available
 from voxdisplay.display.shared_display import TIMEOUT_S
 from voxdisplay.transport import Transport
+
+if TYPE_CHECKING:
+    from voxdisplay.display.profile import DisplayProfile
 
 DEFAULT_PORT: Final = "sim:"
 PORT_VARIABLE: Final = "VOXDISPLAY_PORT"
@@ -25,6 +28,7 @@ _MAX_BAUD = 2**32 - 1  # as of --baud; a system may take less
 def open(  # noqa: A001 - as the built-in: vd.open(port)
     port: str | os.PathLike[str] | Transport | None = None,
     *,
+    display: str | os.PathLike[str] | Mapping[str, Any] | DisplayProfile | None = None,
     baud: int | Literal["auto"] = DEFAULT_BAUD,
     timeout_s: float = TIMEOUT_S,
     reconnect_s: float = 0.0,
@@ -40,7 +44,12 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     port : str, path or Transport, optional
         ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, an entry of a
         list of ports, or an open pipe, which is closed with the display. By default what the
-        environment variable VOXDISPLAY_PORT names, else ``sim:``, the built-in emulator.
+        profile of ``display`` names, else what the environment variable VOXDISPLAY_PORT names, else
+        ``sim:``, the built-in emulator.
+    display : str, path or mapping, optional
+        Profile of the display: how it stands, and what it can show. The name of a file in the
+        user's folder of profiles, a path that ends in ``.toml``, or its keys, such as
+        ``{"axes": "x,-z,y", "brightness": 0.6}``. Its ``fit`` is for commands.
     baud : int or "auto"
         Bits per second of a serial line; ``"auto"`` for the fastest common one at which the device
         answers: see `voxdisplay.display.baud`.
@@ -68,9 +77,15 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     TransportTimeout
         If nothing behind it answers HELLO.
     IncompatibleDevice
-        If the device speaks another protocol major, or has an unknown pixel format.
+        If the device speaks another protocol major, has an unknown pixel format, or another serial
+        number than the profile.
+    ProfileError
+        If the profile is not there, or wrong.
 
     """
+    profile = _profile_of(display)
+    if profile is not None and port is None:
+        port = profile.port
     opened = _as_port(port)
     if not (isinstance(baud, str) and baud == "auto"):
         whole_number("baud", baud, 1, _MAX_BAUD)
@@ -109,8 +124,18 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
             raise
 
     if reconnect_s and isinstance(opened, str):
-        return open_when_available(attempt, reconnect_s, note_or_not)
-    return attempt()
+        found = open_when_available(attempt, reconnect_s, note_or_not)
+    else:
+        found = attempt()
+    return found if profile is None else profile.applied(found, note_or_not)
+
+
+def _profile_of(display: Any) -> DisplayProfile | None:
+    if display is None:
+        return None
+    from voxdisplay.display.profile_files import as_profile  # noqa: PLC0415 - few have one
+
+    return as_profile(display)
 
 
 def _ignore(text: str) -> None:

@@ -12,7 +12,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, TextIO, TypeAlias
 
-from voxdisplay.display.device_info import DeviceInfo, check_compatible, device_info
+from voxdisplay.display.device_info import (
+    DeviceInfo,
+    check_compatible,
+    check_serial,
+    device_info,
+)
 from voxdisplay.display.handshake import closed_before_info, closed_meanwhile, random_session
 from voxdisplay.display.reconnect import Reconnector
 from voxdisplay.errors import IncompatibleDevice, TransportClosed, TransportError, TransportTimeout
@@ -60,8 +65,12 @@ class Connection:
     reconnects : int
         How often the device was gone and has come back.
     closed : bool
+    serial : str or None
+        Serial number without which a device that comes back is another.
 
     """
+
+    serial: str | None = None
 
     def __init__(
         self,
@@ -205,6 +214,7 @@ class Connection:
         try:
             now = device_info(opened.info)
             check_compatible(self.info, now)
+            check_serial(now, self.serial)
         except IncompatibleDevice:
             self.close()
             raise

@@ -113,6 +113,17 @@ def check_compatible(before: DeviceInfo, now: DeviceInfo) -> None:
         raise IncompatibleDevice("the device came back with less room for a packet")
 
 
+def check_serial(info: DeviceInfo, wanted: str | None) -> None:
+    """Raise `IncompatibleDevice` if a device has not the serial number that is wanted, if any."""
+    if wanted is None or wanted == info.serial:
+        return
+    has = f"has the serial number {info.serial!r}" if info.serial else "has no serial number"
+    raise IncompatibleDevice(
+        f"this device {has}, the display's profile wants {wanted!r}",
+        hint="plug in the other one, name another port, or take serial out of the profile",
+    )
+
+
 def device_error(error: Error) -> DeviceError:
     """Return the error for an ERROR packet."""
     name = _CODES.get(error.code, "an unknown code")

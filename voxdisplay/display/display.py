@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.argument_checks import duration, flag, function
-from voxdisplay.display.device_info import DeviceInfo
+from voxdisplay.display.device_info import DeviceInfo, check_serial
 from voxdisplay.display.display_operations import DisplayOperations, Progress
 from voxdisplay.display.paced_display import PacedDisplay
 from voxdisplay.display.receipt import Receipt, count_noun
@@ -31,6 +32,7 @@ __all__ = ["Display", "Receipt"]
 if TYPE_CHECKING:
     from voxdisplay.display.player import Late, Pacing, Player
     from voxdisplay.frame import Fit
+    from voxdisplay.frame.output_transform import OutputTransform
     from voxdisplay.shows.binding import Playable
     from voxdisplay.shows.play_report import PlayReport
 
@@ -58,6 +60,11 @@ class Display(PacedDisplay):
 
     """
 
+    # Of a display with a profile: see `set_output`.
+    _output: OutputTransform | None = None
+    _user_info: tuple[DeviceInfo, DeviceInfo] | None = None
+    _limited = False  # it was noted that the current limit dims a picture
+
     def __repr__(self) -> str:
         """Return it in one line: ``<Display sim: 128x128x128 rgb888, 3 frames shown>``."""
         info, shown = self.info, count_noun(self._operations.queue.frames, "frame")
@@ -75,13 +82,42 @@ class Display(PacedDisplay):
 
     @property
     def info(self) -> DeviceInfo:
-        """Properties that the device has announced."""
-        return self._connection.info
+        """Properties that the device has announced; the grid is as its user sees it."""
+        announced = self._connection.info
+        if self._output is None:
+            return announced
+        if self._user_info is None or self._user_info[0] is not announced:
+            grid = self._output.user_grid(announced.grid)
+            self._user_info = announced, replace(announced, grid=grid)
+        return self._user_info[1]
 
     @property
     def counters(self) -> LinkCounters:
         """Counters of the link."""
         return self._connection.link.counters
+
+    def set_output(self, output: OutputTransform | None, *, serial: str | None = None) -> None:
+        """Set how the display stands, and what light it may give, as of its profile.
+
+        From now on frames, pages and coordinates are those of its user.
+
+        Parameters
+        ----------
+        output : OutputTransform or None
+            None: as its memory is.
+        serial : str, optional
+            Serial number that the device must have, now and when it comes back.
+
+        Raises
+        ------
+        IncompatibleDevice
+            If it has another.
+
+        """
+        with self._turn():
+            check_serial(self._connection.info, serial)
+            self._connection.serial = serial
+            self._output, self._user_info, self._limited = output, None, False
 
     # -- frames
 
@@ -118,7 +154,8 @@ class Display(PacedDisplay):
                 "this display has no palette that could be set",
                 hint="leave the palette out: colours become the nearest of its own",
             )
-        return Frame(self.info.grid, self.info.format, palette=palette, own_palette=own)
+        frame = Frame(self.info.grid, self.info.format, palette=palette, own_palette=own)
+        return frame if self._output is None else frame.with_output(self._output)
 
     @overload
     def present(
@@ -171,13 +208,28 @@ class Display(PacedDisplay):
         wait = flag("wait", wait)
         function("progress", progress)
         with self._turn() as operations:
-            self._check_frame(frame)
+            frame = self._to_show(frame)
             if not wait:
                 operations.queue.replace_pending(frame)
                 operations.send_encoded()
                 return None
             operations.flush()
             return operations.show(frame, progress)
+
+    def _to_show(self, frame: Frame) -> Frame:
+        """Return a frame for how this display stands; note what its current limit does."""
+        self._check_frame(frame)
+        if frame.output is not self._output:
+            frame = frame.with_output(self._output)
+        if self._output is not None and frame.output_note:
+            self._note_limit(frame.output_note)
+        return frame
+
+    def _note_limit(self, text: str) -> None:
+        """Note, once, what the current limit does."""
+        if not self._limited and self._note is not None:
+            self._note(text)
+        self._limited = True
 
     def _check_frame(self, frame: Frame) -> None:
         if not isinstance(frame, Frame):
@@ -276,8 +328,8 @@ class Display(PacedDisplay):
         from voxdisplay.display.play_show import play_show  # noqa: PLC0415 - push needs none of it
 
         return play_show(
-            show, self.frame(), self._turn, self._check_frame, self._clock, speed=speed,
-            start=start, until=until, loop=loop, pacing=clock, late=late, fit=fit,
+            show, self.frame(), self._turn, self._to_show, self._clock, self._note_limit,
+            speed=speed, start=start, until=until, loop=loop, pacing=clock, late=late, fit=fit,
             observer=observer,
         )  # fmt: skip
 
@@ -285,7 +337,8 @@ class Display(PacedDisplay):
         """Make the display dark."""
         with self._turn() as operations:
             operations.flush()
-            return operations.show(Frame(self.info.grid, self.info.format), None)
+            blank = Frame(self.info.grid, self.info.format)
+            return operations.show(self._to_show(blank), None)
 
     # -- questions
 
@@ -326,7 +379,8 @@ class Display(PacedDisplay):
         function("progress", progress)
         with self._turn() as operations:
             self._check_readable(operations)
-            return operations.read_page(back=back, progress=progress)
+            page = operations.read_page(back=back, progress=progress)
+        return page if self._output is None else self._output.to_user(page)
 
     @staticmethod
     def _check_readable(operations: DisplayOperations) -> None:
@@ -361,7 +415,7 @@ class Display(PacedDisplay):
             If the device cannot read.
 
         """
-        self._check_frame(frame)
+        frame = self._to_show(frame)
         function("progress", progress)
         with self._turn() as operations:
             operations.flush()
@@ -369,4 +423,4 @@ class Display(PacedDisplay):
             page, differs = operations.read_and_compare(frame, progress)
         if differs:
             raise DesyncError(f"what was read back is not the frame: {differs}")
-        return page
+        return page if self._output is None else self._output.to_user(page)

@@ -199,7 +199,7 @@ class DisplayOperations:
         expected = frame.digest()
         fault = describe_wrong_digest(digest, expected)
         if self.can("read"):
-            differs = describe_difference(frame.array(), self.read_page())
+            differs = self._difference(frame, self.read_page())
             fault += f"; {differs or 'but its memory reads back as it was meant'}"
         ticket = self.queue.enqueue(frame)
         again = self.wait_until_shown(ticket)
@@ -232,7 +232,15 @@ class DisplayOperations:
             )
         link = self._connection.link
         picture = link.displayed
-        blank.set(self.read_page())
+        page = self.read_page()
+        if blank.output is not None:
+            if blank.output.dims:
+                raise IncompatibleDevice(
+                    "it is not known what is on display, and its memory holds dimmed light",
+                    hint="present a whole frame first: display.frame() without keep",
+                )
+            page = blank.output.to_user(page)
+        blank.set(page)
         # A palette cannot be read back; without it the frame is no base for a difference.
         if picture == link.displayed and not self.can("palette"):
             self.queue.set_displayed(blank.copy(), picture)
@@ -254,15 +262,21 @@ class DisplayOperations:
         return page
 
     def read_and_compare(self, frame: Frame, progress: Progress | None) -> tuple[Pixels, str]:
-        """Return the front page, and where it differs from a frame: nowhere if that is empty."""
+        """Return the front page, as memory holds it, and where it differs from a frame, or ""."""
         page, lit = self._read_lit(back=False, progress=progress)
         if lit * SPARSE_SHARE <= frame.grid.voxels:
-            index, values = frame.lit()
+            index, values = frame.memory.lit()
             pixels = page.reshape(frame.format.shape((frame.grid.voxels,)))
             # As many lit voxels, and all of the frame's among them: there are no others.
             if len(index) == lit and np.array_equal(pixels[index], frame.format.pixels(values)):
                 return page, ""
-        return page, describe_difference(frame.array(), page)
+        return page, self._difference(frame, page)
+
+    @staticmethod
+    def _difference(frame: Frame, page: Pixels) -> str:
+        """Return where a page of the memory differs from a frame, in the frame's coordinates."""
+        seen = page if frame.output is None else frame.output.to_user(page)
+        return describe_difference(frame.readback(), seen)
 
     def _read_lit(self, *, back: bool, progress: Progress | None) -> tuple[Pixels, int]:
         """Return a page of the device's memory, and how many of its voxels are lit."""

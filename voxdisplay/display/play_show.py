@@ -20,8 +20,9 @@ def play_show(
     show: Playable,
     blank: Frame,
     turn: Turn,
-    check_frame: Callable[[Frame], None],
+    check_frame: Callable[[Frame], Frame],
     clock: Clock,
+    note: Callable[[str], None],
     *,
     speed: float,
     start: float,
@@ -41,9 +42,11 @@ def play_show(
     turn : callable
         As of `Player`.
     check_frame : callable
-        Raises if a frame is not of the display's kind.
+        Returns a frame for how the display stands; raises if it is not of the display's kind.
     clock : callable
         Returns seconds.
+    note : callable
+        Called with what a current limit has done to a frame.
     pacing : {"device", "host"}
         ``clock`` of `Display.play`.
 
@@ -64,7 +67,7 @@ def play_show(
     if timeline.slot_at(start_s) is None:
         raise ValueError(f"start: the show ends at {timeline.duration_s:g} s")
     shows = [segment.show for segment in timeline.segments]
-    source = FrameSource(shows, check=check_frame, clock=clock)
+    source = FrameSource(shows, check=check_frame, clock=clock, note=note)
     try:
         player = Player(
             turn, clock, timeline, source, start_s=start_s, speed=speed, pacing=pacing, late=late,

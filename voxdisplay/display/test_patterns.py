@@ -81,6 +81,16 @@ def pattern_frames(
             yield PatternFrame(paint.all(), "")
 
 
+def arrow_frame(
+    axis: int,
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002 - as above
+    brightness: float,
+) -> Frame:
+    """Return an arrow along an axis, 0 to 2, of the memory, in the colour of that axis."""
+    return _Painter(grid, format, brightness).arrow(axis)
+
+
 def axes_with_ticks(grid: Grid) -> str:
     """Return the axes, letters of ``"xyz"``, that have room for ticks in the pattern ``"axes"``."""
     return "".join(
@@ -127,6 +137,22 @@ class _Painter:
             tick[:, axis] = self._grid[axis] - 1 - 2 * number
             tick[:, across] = 1 + np.arange(len(tick))
             yield tick
+
+    def arrow(self, axis: int) -> Frame:
+        """Return an arrow in the middle: a line, with a pyramid whose tip is at the far end."""
+        frame = Frame(self._grid, self._format)
+        side = self._grid[axis]
+        head = max(1, side // 3)
+        for at in range(side):
+            wide = max(0, side - 1 - at) if at >= side - 1 - head else 0
+            ranges = [
+                np.arange(max(0, across // 2 - wide), min(across, across // 2 + wide + 1))
+                for across in self._grid
+            ]
+            ranges[axis] = np.array([at])
+            slab = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
+            frame.draw(slab, self._dimmed(AXIS_COLORS[axis]))
+        return frame
 
     def corners(self) -> Frame:
         frame = Frame(self._grid, self._format)

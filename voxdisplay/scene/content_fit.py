@@ -44,7 +44,10 @@ class Content(Protocol):
 
 
 def content_placement(
-    moments: Iterable[Content], size: Grid, grid: Grid
+    moments: Iterable[Content],
+    size: Grid,
+    grid: Grid,
+    pitch: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> tuple[Placement | None, str | None]:
     """Return the map that makes what is there fill a grid, and a note on it.
 
@@ -55,11 +58,14 @@ def content_placement(
     size : Grid
         What bodies without an end are clipped to.
     grid : Grid
+    pitch : (px, py, pz)
+        Distances of the grid's voxels, in any unit.
 
     Returns
     -------
     placement : Placement or None
-        Uniform; what is there is centred. None if there is nothing, or no voxel would change.
+        Uniform in space; what is there is centred. None if there is nothing, or no voxel would
+        change.
     note : str or None
 
     """
@@ -67,7 +73,7 @@ def content_placement(
     guess = _joined([_rough_box(item, size) for scene in scenes for item in scene.items])
     if guess is None:
         return None, "nothing to fit: the scene shows nothing"
-    placement = _onto(guess, grid, margin=1)
+    placement = _onto(guess, grid, margin=1, pitch=pitch)
     for _ in range(_ROUNDS):
         found = _joined([_voxel_box(scene.placed(placement, grid), grid) for scene in scenes])
         if found is None:
@@ -113,12 +119,19 @@ def _joined(boxes: Iterable[Box | None]) -> Box | None:
     return np.min([low for low, _ in found], axis=0), np.max([high for _, high in found], axis=0)
 
 
-def _onto(box: Box, grid: Grid, margin: int = 0) -> Placement:
-    """Return the uniform map of a box into the middle of a grid."""
+def _onto(
+    box: Box,
+    grid: Grid,
+    margin: int = 0,
+    pitch: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> Placement:
+    """Return the map of a box into the middle of a grid, uniform in space."""
     low, high = box
     room = np.array(grid, dtype=np.float64)
     extent = np.maximum(high - low, 1e-9)
-    scale = float((np.maximum(room - 2 * margin, 1.0) / extent).min())
+    steps = np.array(pitch) / min(pitch)
+    scale = float((np.maximum(room - 2 * margin, 1.0) * steps / extent).min())
     if not np.isfinite(scale) or extent.max() <= 1e-9:
         scale = 1.0
-    return Placement.scaling(scale, room / 2 - scale * (low + high) / 2)
+    factors = scale / steps
+    return Placement(np.diag(factors), room / 2 - factors * (low + high) / 2)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from voxdisplay.argument_checks import choice, instance, whole_number
+from voxdisplay.argument_checks import choice, distances, instance, whole_number
 from voxdisplay.frame import FITS, Drawing, Fit, Frame
 from voxdisplay.raster.grid import Grid
 from voxdisplay.scene.content_fit import content_placement
@@ -23,6 +23,8 @@ from voxdisplay.scene.voxelized_items import draw_items, draw_still, shown_voxel
 
 if TYPE_CHECKING:
     from voxdisplay.voxelization import Sequence, VoxelSet
+
+Pitch: TypeAlias = tuple[float, float, float]
 
 DEFAULT_FPS = 30.0
 
@@ -104,7 +106,7 @@ class Scene:
 
         """
         instance("frame", frame, Frame, "a frame")
-        fitted, _ = self.fitted(frame.grid, fit)
+        fitted, _ = self.fitted(frame.grid, fit, frame.pitch)
         return Drawing.sum(fitted.draw_each(frame))
 
     def draw_each(self, frame: Frame) -> list[Drawing]:
@@ -121,7 +123,9 @@ class Scene:
         self.draw_on(frame)
         return frame._repr_png_()
 
-    def fitted(self, grid: Grid, mode: Fit = "contain") -> tuple[Scene, str | None]:
+    def fitted(
+        self, grid: Grid, mode: Fit = "contain", pitch: Pitch = (1.0, 1.0, 1.0)
+    ) -> tuple[Scene, str | None]:
         """Fit the scene to a display's grid.
 
         Parameters
@@ -132,6 +136,9 @@ class Scene:
             ``"contain"`` scales a scene that was composed for another grid by the same factor in
             x, y and z, so that all of it is shown, and centres it. ``"content"`` does so with what
             there is in it, so that this fills the grid. ``"none"`` keeps the numbers.
+        pitch : (px, py, pz)
+            Distances of the display's voxels along x, y and z, in any unit. Where they differ, the
+            factors differ as 1 / px, 1 / py and 1 / pz, so that what is round stays round.
 
         Returns
         -------
@@ -141,16 +148,21 @@ class Scene:
             One line that says what was changed.
 
         """
-        placement, note = self.placement_for(Grid.of(grid), mode)
+        placement, note = self.placement_for(Grid.of(grid), mode, pitch)
         if placement is None:
             return self, note
         return self.placed(placement, Grid.of(grid)), note
 
-    def placement_for(self, grid: Grid, mode: Fit) -> tuple[Placement | None, str | None]:
+    def placement_for(
+        self, grid: Grid, mode: Fit, pitch: Pitch = (1.0, 1.0, 1.0)
+    ) -> tuple[Placement | None, str | None]:
         """Return the map by which the scene is fitted, and a note on it: see `fitted`."""
         choice("fit", mode, FITS)
+        pitch = distances("pitch", pitch)
         if mode == "content":
-            return content_placement(self._moments(), self.size or DEFAULT_SIZE, grid)
+            return content_placement(self._moments(), self.size or DEFAULT_SIZE, grid, pitch)
+        if mode == "contain" and len(set(pitch)) > 1:
+            return _contained(self.size or grid, grid, pitch)
         if mode == "none" or self.size is None or self.size == grid:
             return None, None
         size, room = np.array(self.size, dtype=np.float64), np.array(grid, dtype=np.float64)
@@ -219,5 +231,18 @@ class Scene:
 
         """
         instance("blank", blank, Frame, "a frame")
-        fitted, _ = self.fitted(blank.grid, fit)
+        fitted, _ = self.fitted(blank.grid, fit, blank.pitch)
         return SceneShow(fitted, blank)
+
+
+def _contained(size: Grid, grid: Grid, pitch: Pitch) -> tuple[Placement, str]:
+    """Return the map of a scene to a display whose voxels are no cubes, and a note on it."""
+    sides, room = np.array(size, dtype=np.float64), np.array(grid, dtype=np.float64)
+    steps = np.array(pitch) / min(pitch)
+    factors = float((room * steps / sides).min()) / steps
+    named = ", ".join(f"{factor:.3g}" for factor in factors)
+    note = (
+        f"scene of {size} scaled by {named} along x, y, z to {grid}, whose voxels are "
+        f"{' x '.join(f'{each:g}' for each in pitch)} mm"
+    )
+    return Placement(np.diag(factors), (room - factors * sides) / 2), note

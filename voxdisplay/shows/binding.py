@@ -65,6 +65,15 @@ def bind_show(playable: Show | ShowSource | Drawable, blank: Frame, fit: Fit) ->
     fit : {"contain", "none", "content"}
 
     """
+    show = _bind(playable, blank, fit)
+    if blank.output is None:
+        return show
+    from voxdisplay.shows.oriented_show import OrientedShow  # noqa: PLC0415 - few displays need it
+
+    return OrientedShow(show, blank.output)
+
+
+def _bind(playable: Show | ShowSource | Drawable, blank: Frame, fit: Fit) -> Show:
     if isinstance(playable, ShowSource):
         return playable.show_on(blank, fit=fit)
     if isinstance(playable, Show):

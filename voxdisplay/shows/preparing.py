@@ -32,9 +32,11 @@ class FrameSource:
     shows : sequence of Show
         By the segments of a timeline.
     check : callable
-        Raises if a frame is not of the display's kind.
+        Returns a frame for how the display stands; raises if it is not of the display's kind.
     clock : callable
         Returns seconds.
+    note : callable
+        Called with what a current limit has done to a frame of another process.
 
     """
 
@@ -42,10 +44,11 @@ class FrameSource:
         self,
         shows: Sequence[Show],
         *,
-        check: Callable[[Frame], None] = lambda _frame: None,
+        check: Callable[[Frame], Frame] = lambda frame: frame,
         clock: Callable[[], float] = time.perf_counter,
+        note: Callable[[str], None] = lambda _text: None,
     ) -> None:
-        self._check, self._clock = check, clock
+        self._check, self._clock, self._note = check, clock, note
         self._shows = tuple(shows)
         self._may_use_worker = True
         self._worker: WorkerProcess | None = None
@@ -127,8 +130,7 @@ class FrameSource:
                 # Another object for each time: which one is displayed is told by identity.
                 return EncodedFrame(encoded.payloads, encoded.digest)
         frame = show.frame(slot.number)
-        self._check(frame)
-        return frame.copy()
+        return self._check(frame).copy()
 
     def _collect(self) -> None:
         """Take what the other process has prepared, or failed to."""
@@ -137,6 +139,8 @@ class FrameSource:
             return
         for ordinal, encoded, seconds in worker.results():
             self._unanswered.discard(ordinal)
+            if encoded.note:
+                self._note(encoded.note)
             if slot := self._requested.pop(ordinal, None):
                 self._ready[ordinal] = slot, encoded
                 self._seconds.append(seconds)

@@ -73,11 +73,14 @@ class EncodedFrame:
         Ops, one packet each.
     digest : int
         That which a display reports when it shows the frame (protocol.md, section 8).
+    note : str
+        What a current limit has done to it; empty if nothing.
 
     """
 
     payloads: tuple[bytes, ...]
     digest: int
+    note: str = ""
 
 
 @runtime_checkable

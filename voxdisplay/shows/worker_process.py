@@ -160,7 +160,8 @@ def encode_frame(frame: Frame, encoding: Encoding) -> EncodedFrame:
     """Return a frame as payloads and digest."""
     max_payload, features, bytes_per_s = encoding
     coded = frame.iter_payloads(max_payload, features, bytes_per_s)
-    return EncodedFrame(tuple(payload for some in coded for payload in some), frame.digest())
+    payloads = tuple(payload for some in coded for payload in some)
+    return EncodedFrame(payloads, frame.digest(), frame.output_note)
 
 
 def main() -> None:

@@ -117,3 +117,18 @@ def test_what_the_pattern_cannot_tell_is_not_claimed():
     assert [f.correct for f in test_patterns.compare_axes(meant, meant, "xyz")] == [None] * 3
     thin = page("axes", Grid(4, 1, 4))
     assert [f.correct for f in test_patterns.compare_axes(thin, thin, "xyz")] == [True, None, True]
+
+
+@pytest.mark.parametrize("grid", [Grid(3, 5, 7), Grid(16, 9, 12)])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("format_", list(PixelFormat))
+def test_an_arrow_is_a_line_with_a_pyramid_at_its_far_end(grid, axis, format_):
+    frame = test_patterns.arrow_frame(axis, grid, format_, 1.0)
+    index, _ = frame.lit()
+    along = np.bincount(grid.voxels_at(index)[:, axis], minlength=grid[axis])
+    head = max(1, grid[axis] // 3)
+    assert (along[: grid[axis] - 1 - head] == 1).all()
+    assert along[-1] == 1
+    assert along[-2] == 9
+    widths = along[grid[axis] - 1 - head :]
+    assert (np.diff(widths) <= 0).all()

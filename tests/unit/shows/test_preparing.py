@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 import voxdisplay as vd
+from voxdisplay.frame.output_transform import OutputTransform
+from voxdisplay.raster.light import CurrentLimit
 from voxdisplay.shows import preparing
 from voxdisplay.shows.preparing import PREFETCH, FrameSource
 from voxdisplay.shows.show import EncodedFrame
 from voxdisplay.shows.timeline import Slot
+from voxdisplay.shows.worker_process import encode_frame
 
 ENCODING = (1024, (), 1e6)
 
@@ -29,17 +32,18 @@ class Worker:
     def __init__(self):
         self.ready, self.ended = True, False
         self.asked, self._answered = [], []
+        self.notes = []
 
     def request(self, key, show, number, encoding):
         assert (show, encoding) == (0, ENCODING)
         assert key == number
         self.asked.append(key)
 
-    def answer(self):
+    def answer(self, note=""):
         """Answer the oldest request."""
         key = self.asked[len(self._done)]
         self._done.append(key)
-        self._answered.append((key, EncodedFrame((b"",), key), 0.01))
+        self._answered.append((key, EncodedFrame((b"",), key, note), 0.01))
         return key
 
     @property
@@ -64,7 +68,7 @@ def source(monkeypatch):
     worker = Worker()
     monkeypatch.setattr(preparing, "_WORKER_SHARE", 0.0)
     monkeypatch.setattr(preparing.WorkerProcess, "start", lambda _shows: worker)
-    source = FrameSource([Dots()])
+    source = FrameSource([Dots()], note=worker.notes.append)
     for ordinal in range(6):
         request(source, ordinal)
     assert source.uses_worker
@@ -126,3 +130,21 @@ def test_when_the_process_has_ended_frames_are_prepared_here(source):
     request(source, 53)
     assert source.newest(49, 53)[0].ordinal == 53
     assert not source.uses_worker
+
+
+def test_what_a_limit_did_to_frames_of_the_process_is_noted(source):
+    source, worker = source
+    request(source, 20)
+    worker.answer(note="dimmed")
+    source.pending(-1)
+    assert worker.notes == ["dimmed"]
+
+
+def test_a_frame_that_is_encoded_says_what_a_limit_did():
+    frame = vd.Frame((3, 5, 7))
+    frame.draw([[0, 1, 2]], "white")
+    assert encode_frame(frame, ENCODING).note == ""
+    limited = frame.with_output(OutputTransform(limit=CurrentLimit(0.03, 20)))
+    encoded = encode_frame(limited, ENCODING)
+    assert encoded.note.startswith("this picture takes 0.06 A, the limit is 0.03 A: shown with 50")
+    assert encoded.digest == limited.digest() != frame.digest()
