@@ -1,5 +1,7 @@
 """Hostile values for every option and argument of every command: errors or results, no fault."""
 
+import io
+
 import click
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ WORKING = {
     "test-pattern": PORT,
     "clear": PORT,
     "ports": [],
+    "displays": [],
     "info": PORT,
     "read": [*PORT, "-o", "page.npy"],
     "view": ["scene.json", "--no-open"],
@@ -54,6 +57,8 @@ def here(tmp_path, monkeypatch):
     np.save(tmp_path / "volume.npy", np.arange(105.0).reshape(7, 5, 3))
     (tmp_path / "capture.jsonl").write_text('{"voxdisplay_capture": 1, "port": "x"}\n')
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO()))
     monkeypatch.delenv("VOXDISPLAY_PORT", raising=False)
     monkeypatch.setattr("voxdisplay.view.live.run.run", lambda *_: None)
     for name in ("_BUDGET_S", "_RAW_BUDGET_S", "_NOISE_BUDGET_S"):

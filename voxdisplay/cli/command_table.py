@@ -36,6 +36,9 @@ COMMANDS: Final[dict[str, dict[str, TableEntry]]] = {
     },
     "Examine a display": {
         "ports": TableEntry("ports", "ports", "List serial ports and displays on USB."),
+        "displays": TableEntry(
+            "displays", "displays", "List the profiles that --display NAME takes."
+        ),
         "info": TableEntry(
             "device_commands", "info", "Print size, format and features of a display."
         ),

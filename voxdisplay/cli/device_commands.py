@@ -9,6 +9,7 @@ import click
 
 from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
 from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout
+from voxdisplay.cli.profile_options import standing_options
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     """
 )
 @port_options
+@standing_options
 @quiet_option
 @json_option
 def info(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
@@ -56,6 +58,7 @@ def info(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> No
     """
 )
 @port_options
+@standing_options
 @quiet_option
 @json_option
 def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> None:
@@ -84,6 +87,7 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
     """
 )
 @port_options
+@standing_options
 @click.option(
     "-o",
     "--output",

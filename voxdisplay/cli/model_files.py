@@ -90,14 +90,21 @@ class ModelFile:
     color: str | None
     size: None = None
 
-    def fitted(self, grid: vd.Grid, mode: Fit) -> tuple[vd.Scene, str | None]:
+    def fitted(
+        self, grid: vd.Grid, mode: Fit, pitch: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ) -> tuple[vd.Scene, str | None]:
         """Return a scene of the model, fitted to a grid, and a note: see `Scene.fitted`."""
-        from voxdisplay.files.loading import fitted  # noqa: PLC0415 - help starts fast
+        import numpy as np  # noqa: PLC0415 - help starts fast
+
+        from voxdisplay.files.loading import fitted  # noqa: PLC0415
         from voxdisplay.scene import Scene  # noqa: PLC0415
         from voxdisplay.scene.builder import read_colors  # noqa: PLC0415
         from voxdisplay.scene.item import SceneItem  # noqa: PLC0415
 
         body, note = self.loaded.body, None
+        if mode != "none" and len(set(pitch)) > 1:
+            stretch = min(pitch) / np.array(pitch)
+            body = body.transformed(np.diag(stretch), np.zeros(3))
         if mode != "none":
             margin = [min(_MARGIN, (side - 1) / 2) for side in grid]
             room = [side - free for side, free in zip(grid, margin, strict=True)]

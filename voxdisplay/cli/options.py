@@ -19,6 +19,7 @@ from voxdisplay.cli.param_types import (
     SizeType,
     seconds_type,
 )
+from voxdisplay.cli.profile_options import current_profile, profile_fit, profile_port
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -151,6 +152,7 @@ fit_option = click.option(
     "--fit",
     type=click.Choice(["contain", "none", "content"]),
     default="contain",
+    callback=profile_fit,
     help="contain: scale a scene that was composed for another size, and centre it. none: keep its "
     "numbers and clip. content: scale what is there so that it fills the display.  "
     "[default: contain]",
@@ -211,12 +213,20 @@ def open_display(
     *,
     reconnect_s: float = 0.0,
     capture: TextIO | None = None,
+    as_memory: bool = False,
 ) -> Display:
-    """Open what ``--port`` names, or the emulator, which is noted on stderr."""
+    """Open what ``--port`` or the profile names, or the emulator, which is noted on stderr.
+
+    With ``as_memory``, pictures are not turned, whatever the profile says.
+    """
     import voxdisplay as vd  # noqa: PLC0415 - see above
 
+    profile = current_profile()
+    if profile and as_memory:
+        profile = profile.upright()
     return vd.open(
-        default_port(port),
+        default_port(profile_port(port, profile)),
+        display=profile,
         baud=baud,
         timeout_s=timeout_s,
         reconnect_s=reconnect_s,

@@ -23,6 +23,7 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import is_quiet, note, plural, print_json, print_stdout
 from voxdisplay.cli.param_types import RangeType, seconds_type
+from voxdisplay.cli.profile_options import picture_options
 
 if TYPE_CHECKING:
     from voxdisplay.cli.signals import OnExit
@@ -50,6 +51,7 @@ _KEYS: Final = {
 )
 @click.argument("shows", metavar="SHOW...", type=click.Path(), nargs=-1, required=True)
 @port_options
+@picture_options
 @fit_option
 @click.option("--loop", is_flag=True, help="Begin again at the end, until q or Ctrl-C.")
 @click.option(
@@ -122,7 +124,7 @@ def play(
     loaded = _load(shows)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
     with close_on_exit(display, on_exit), open_keyboard() as keyboard, _progress() as progress:
-        _note_fits(loaded, display.info, fit)
+        _note_fits(loaded, display.frame(), fit)
 
         def observe(player: Player) -> None:
             for key in keyboard.pressed():
@@ -165,9 +167,9 @@ def _load(paths: tuple[str, ...]) -> Playable:
     return loaded[0] if len(loaded) == 1 else ShowSequence(tuple(loaded))
 
 
-def _note_fits(loaded: Playable, info: vd.DeviceInfo, fit: Fit) -> None:
+def _note_fits(loaded: Playable, blank: vd.Frame, fit: Fit) -> None:
     """Note how shows that were made for other displays are changed, each way once."""
-    remarks = (_fit_remark(each, info, fit) for each in _single_shows(loaded))
+    remarks = (_fit_remark(each, blank, fit) for each in _single_shows(loaded))
     for remark in dict.fromkeys(remarks):
         if remark:
             note(remark)
@@ -188,13 +190,15 @@ def _single_shows(loaded: Any) -> Iterator[Any]:
         yield loaded
 
 
-def _fit_remark(show: Any, info: vd.DeviceInfo, fit: Fit) -> str | None:
+def _fit_remark(show: Any, blank: vd.Frame, fit: Fit) -> str | None:
     if isinstance(show, vd.Scene):  # to fit contents, all of a scene would be measured
-        return show.placement_for(info.grid, fit)[1] if fit != "content" else None
+        if fit == "content":
+            return None
+        return show.placement_for(blank.grid, fit, blank.pitch)[1]
     if not hasattr(show, "pixel_format"):
         return None
     made_for = f"{show.grid} {show.pixel_format.value}"
-    here = f"{info.grid} {info.format.value}"
+    here = f"{blank.grid} {blank.format.value}"
     if made_for == here:
         return None
     return f"recorded for {made_for}; decoded, and encoded again for {here}"

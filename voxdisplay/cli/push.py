@@ -29,6 +29,7 @@ from voxdisplay.cli.output import (
     print_stdout,
     progress_bar,
 )
+from voxdisplay.cli.profile_options import picture_options
 
 if TYPE_CHECKING:
     from voxdisplay.cli.signals import OnExit
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 )
 @scene_argument()
 @port_options
+@picture_options
 @fit_option
 @model_options
 @click.option("--verify", is_flag=True, help="Read the page back and compare it voxel by voxel.")
@@ -88,8 +90,8 @@ def push(
     loaded = load_shown(scene, model)
     display = open_display(port, baud, timeout_s, reconnect_s=reconnect_s, capture=capture)
     with close_on_exit(display, on_exit):
-        fitted = fit_scene(loaded, display.info.grid, fit)
         frame = display.frame()
+        fitted = fit_scene(loaded, frame.grid, fit, frame.pitch)
         if fitted.duration:
             note("this scene moves: its beginning is shown; voxdisplay play shows all of it")
         draw_scene(fitted, frame)
@@ -127,7 +129,7 @@ def push(
             print_stdout(_summary(display, receipt, verify=verify))
         # After the summary: the picture is shown, whether or not its image can be written.
         if preview and page is not None:
-            save_page_image(preview, page, display.info, frame.palette)
+            save_page_image(preview, page, display.info, frame.memory.palette)
         if not as_json:
             print_thumbnail(display, frame, page, baud)
 

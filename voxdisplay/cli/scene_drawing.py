@@ -97,9 +97,14 @@ def load_fitted_scene(
     return fit_scene(scene, grid, fit), grid
 
 
-def fit_scene(scene: vd.Scene | ModelFile, grid: vd.Grid, fit: Fit) -> vd.Scene:
-    """Fit a scene to a grid, and note the change."""
-    fitted, remark = scene.fitted(grid, fit)
+def fit_scene(
+    scene: vd.Scene | ModelFile,
+    grid: vd.Grid,
+    fit: Fit,
+    pitch: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> vd.Scene:
+    """Fit a scene to a grid of voxels of a pitch, and note the change."""
+    fitted, remark = scene.fitted(grid, fit, pitch)
     if remark:
         note(remark)
     return fitted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -10,6 +11,7 @@ import voxdisplay as vd
 from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
 from voxdisplay.cli.output import device_json, note, print_json, print_stdout, progress_bar
 from voxdisplay.cli.param_types import RangeType
+from voxdisplay.cli.profile_options import standing_options
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -43,6 +45,7 @@ _ONE_COLOR_LEGENDS: Final = {
     """,
 )
 @port_options
+@standing_options
 @click.option(
     "--pattern",
     "name",
@@ -63,6 +66,12 @@ _ONE_COLOR_LEGENDS: Final = {
     help="Read the page back and report for each axis whether it is right, mirrored or swapped in "
     "the display's memory. Exit code 1 if one is not right.",
 )
+@click.option(
+    "--ask",
+    metavar="NAME",
+    help="Show three arrows, ask where they point, and write the answers to a profile for "
+    "--display NAME.",
+)
 @quiet_option
 @json_option
 def test_pattern(
@@ -73,6 +82,7 @@ def test_pattern(
     name: str,
     brightness: float | None,
     check: bool,
+    ask: str | None,
     as_json: bool,
 ) -> None:
     """Show a pattern by which the axes of a display can be told apart.
@@ -84,6 +94,9 @@ def test_pattern(
     from voxdisplay.display.test_patterns import BRIGHTNESS  # noqa: PLC0415
 
     share = BRIGHTNESS[name] if brightness is None else brightness / 100
+    if ask is not None:
+        _ask(ask, port, baud, timeout_s, share)
+        return
     with open_display(port, baud, timeout_s) as display:
         check_result = _CheckResult()
         page = _show(display, name, share, check_result if check else None)
@@ -107,6 +120,22 @@ def test_pattern(
                 print_thumbnail(display, page[0], page[1], baud)
     if check and not check_result.right:
         raise click.exceptions.Exit(1)
+
+
+def _ask(name: str, port: str | None, baud: Baud, timeout_s: float, share: float) -> None:
+    """Ask how a display stands, and write that to a profile."""
+    from voxdisplay.cli.ask_orientation import (  # noqa: PLC0415 - help starts fast
+        ask_axes,
+        prepare_profile,
+        write_profile,
+    )
+
+    path, keys = prepare_profile(name)
+    port = keys.get("port") if port is None else port
+    with open_display(port, baud, timeout_s, as_memory=True) as display:
+        axes = ask_axes(display, share)
+        display.clear()
+        write_profile(path, keys, port, display.info.serial, axes)
 
 
 def legend(name: str, grid: vd.Grid, *, one_color: bool) -> str:
@@ -137,7 +166,7 @@ class _CheckResult:
         """Compare one more page. A wrong finding is not replaced by a right one."""
         from voxdisplay.display.test_patterns import compare_axes  # noqa: PLC0415
 
-        meant = step.frame.array()
+        meant = step.frame.readback()
         differs = meant != page
         self.differing_voxels += int((differs.any(axis=-1) if differs.ndim == 4 else differs).sum())
         for finding in compare_axes(meant, page, step.axes):
@@ -195,9 +224,10 @@ def _show(
 
     info = display.info
     total = sum(info.grid) if name == "plane" else 1
-    last = None
+    output, last = display.frame().output, None
     with progress_bar("showing") as progress:
-        for number, step in enumerate(pattern_frames(name, info.grid, info.format, share)):
+        for number, pattern in enumerate(pattern_frames(name, info.grid, info.format, share)):
+            step = replace(pattern, frame=pattern.frame.with_output(output))
             page = None
             try:
                 display.present(step.frame)

@@ -64,7 +64,7 @@ def print_thumbnail(display: vd.Display, frame: vd.Frame, page: Pixels | None, b
         page = display.read()
     caption = "what was sent, not read back" if page is None else "read back from the display"
     shown = PixelMap(*frame.lit()) if page is None else page
-    lit = lit_voxels(shown, info.grid, info.format, frame.palette)
+    lit = lit_voxels(shown, info.grid, info.format, frame.memory.palette)
     for line in half_blocks(lit, info.grid, columns, rows, full=has_true_color()):
         print_drawing(line)
     print_stderr(caption)

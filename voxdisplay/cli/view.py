@@ -22,6 +22,7 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import note, print_stdout
 from voxdisplay.cli.param_types import AddressType, OriginType
+from voxdisplay.cli.profile_options import standing_options
 
 if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 )
 @scene_argument(required=False)
 @port_options
+@standing_options
 @click.option(
     "--listen",
     type=AddressType(),
@@ -190,9 +192,10 @@ class _ReadbackDisplay:
         """See `Display.read`. A palette cannot be read; the digest identifies the default one."""
         page = self._display.read()
         if self._palette_unknown:
-            meant = vd.Frame(self._display.info.grid, vd.PixelFormat.INDEX8)
+            meant = self._display.frame()
             meant.set(page)
-            if self.digest() != meant.digest():
+            dims = meant.output is not None and meant.output.dims
+            if not dims and self.digest() != meant.digest():
                 self._palette_unknown = False
                 note(
                     "this picture has a palette, which cannot be read back: colours are not its own"
