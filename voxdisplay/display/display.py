@@ -147,7 +147,13 @@ class Display(PacedDisplay):
                 raise ValueError("a frame that keeps what is on display keeps its palette, too")
             with self._turn() as operations:
                 operations.flush()
-                return operations.displayed_frame(self.frame()).copy()
+                found = operations.displayed_frame(self.frame())
+                if found.output is not self._output:
+                    raise IncompatibleDevice(
+                        "what is on display was shown before it was set how the display stands",
+                        hint="present a whole frame first: display.frame() without keep",
+                    )
+                return found.copy()
         own = "palette" in self.info.features
         if palette is not None and not own:
             raise IncompatibleDevice(

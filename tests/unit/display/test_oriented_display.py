@@ -13,6 +13,7 @@ import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from voxdisplay.display.device_info import check_serial
+from voxdisplay.frame.output_transform import OutputTransform
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.orientation import Orientation
 
@@ -258,3 +259,15 @@ def test_what_differs_is_said_in_the_users_coordinates():
     other.draw([[x, 0, z]], "white")
     with pytest.raises(vd.DesyncError, match=rf"\({x}, 0, {z}\)"):
         display.verify(other)
+
+
+def test_what_was_shown_before_it_was_turned_is_not_kept():
+    with vd.open(port_of("x,y,z")) as display:
+        frame = draw(display.frame())
+        display.present(frame)
+        display.set_output(OutputTransform(Orientation.of("x,y,-z")))
+        with pytest.raises(vd.IncompatibleDevice, match="before it was set how the display stands"):
+            display.frame(keep=True)
+        display.present(frame)
+        assert display.frame(keep=True) == frame
+        np.testing.assert_array_equal(display.verify(frame), frame.array())
