@@ -76,7 +76,8 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
                 }
             )
         else:
-            print_stdout(f"{display.port}  dark")
+            unproved = "" if display.answers else " was sent, not proved: nothing answers there"
+            print_stdout(f"{display.port}  dark{unproved}")
 
 
 @click.command(

@@ -51,7 +51,9 @@ port_option = click.option(
     metavar="PORT",
     shell_complete=complete_port,
     help="sim: | /dev/ttyUSB0 | COM3 | usb: | usb:VID:PID[:SERIAL] | tcp://host:port | "
-    "a pyserial URL.  [default: $VOXDISPLAY_PORT, else sim:, the built-in emulator]",
+    "a pyserial URL | artnet:, sacn:, ddp:, opc:, wled://host?size=16x16x16 | "
+    "adalight:DEVICE?size=8x8x8 (LED cubes, unproved).  "
+    "[default: $VOXDISPLAY_PORT, else sim:, the built-in emulator]",
 )
 
 

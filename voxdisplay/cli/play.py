@@ -150,7 +150,7 @@ def play(
     if as_json:
         print_json(report.as_json())
     else:
-        print_stdout(_summary(report))
+        print_stdout(_summary(report, answers=display.answers))
 
 
 def _load(paths: tuple[str, ...]) -> Playable:
@@ -244,10 +244,11 @@ def _progress() -> Iterator[Callable[[Player], None]]:
         stream.flush()
 
 
-def _summary(report: PlayReport) -> str:
+def _summary(report: PlayReport, *, answers: bool) -> str:
     late, gap = report.late_ms, report.gap_ms
+    done = "shown" if answers else "sent"
     shown = (
-        f"{plural(report.shown, 'frame')} of {report.frames} shown in {report.seconds:.1f} s: "
+        f"{plural(report.shown, 'frame')} of {report.frames} {done} in {report.seconds:.1f} s: "
         f"{report.fps:.1f} fps, {plural(report.dropped, 'frame')} dropped, "
         f"{plural(report.wire_bytes, 'byte')}"
     )
@@ -261,4 +262,6 @@ def _summary(report: PlayReport) -> str:
             f"{plural(report.wrong, 'frame')} shown wrongly, after which the display was right "
             f"again {plural(report.repaired, 'time')}"
         )
+    if not answers:
+        lines.append("not proved: nothing answers on this port")
     return "\n".join(lines)

@@ -78,7 +78,8 @@ def push(
 ) -> None:
     """Show SCENE, a JSON file or - for stdin, on a display.
 
-    Waits until the device has shown it and its digest agrees.
+    Waits until the device has shown it and its digest agrees. An LED cube on artnet:, sacn:, ddp:,
+    opc:, wled: or adalight: answers nothing: what was sent to it is not proved.
     """
     from voxdisplay.cli.image_output import save_page_image  # noqa: PLC0415 - help starts fast
     from voxdisplay.cli.scene_drawing import draw_scene, fit_scene  # noqa: PLC0415
@@ -140,10 +141,13 @@ def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
     device = f"{info.name or 'a display'} {info.firmware}".strip()
     cost = f"{plural(receipt.packets, 'packet')}, {plural(receipt.wire_bytes, 'byte')}"
     elapsed = f"{receipt.elapsed_s * 1000:.1f} ms"
+    shown = "shown" if display.answers else "sent"
     lines = [
         f"{display.port}  {device}, {info.grid} {info.format.value}, protocol {info.protocol}",
-        f"{plural(receipt.voxels, 'voxel')} shown: {cost}, {elapsed}{again}",
+        f"{plural(receipt.voxels, 'voxel')} {shown}: {cost}, {elapsed}{again}",
     ]
+    if not display.answers:
+        lines.append("not proved: nothing answers on this port")
     if receipt.digest is not None:
         lines.append(f"proved: the display's digest {receipt.digest:08x} is the frame's")
     if verify:

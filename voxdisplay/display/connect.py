@@ -14,6 +14,7 @@ from voxdisplay.display.connection import Clock
 from voxdisplay.display.display import Display
 from voxdisplay.display.reconnect import Reconnector, open_when_available
 from voxdisplay.display.shared_display import TIMEOUT_S
+from voxdisplay.display.sink_ports import SinkPortSettings, sink_opener
 from voxdisplay.transport import Transport
 
 if TYPE_CHECKING:
@@ -43,9 +44,10 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     ----------
     port : str, path or Transport, optional
         ``sim:``, ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:port``, a URL of pyserial, an entry of a
-        list of ports, or an open pipe, which is closed with the display. By default what the
-        profile of ``display`` names, else what the environment variable VOXDISPLAY_PORT names, else
-        ``sim:``, the built-in emulator.
+        list of ports, or an open pipe, which is closed with the display; or an LED cube behind a
+        lighting protocol, such as ``artnet://host?size=16x16x16``, on which nothing answers:
+        docs/led-hardware.md lists them. By default what the profile of ``display`` names, else what
+        the environment variable VOXDISPLAY_PORT names, else ``sim:``, the built-in emulator.
     display : str, path or mapping, optional
         Profile of the display: how it stands, and what it can show. The name of a file in the
         user's folder of profiles, a path that ends in ``.toml``, or its keys, such as
@@ -69,6 +71,12 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
         Receives all bytes to and from the device, with times: see `voxdisplay.transport.capture`.
     clock : callable
         Returns seconds, on any monotonic clock.
+
+    Returns
+    -------
+    Display
+        For an LED cube a `voxdisplay.display.sink_display.SinkDisplay`: its `Display.answers` is
+        False.
 
     Raises
     ------
@@ -99,7 +107,7 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     if capture is not None and (binary or not callable(getattr(capture, "write", None))):
         raise wrong_kind("capture", "a text file or None", capture)
 
-    def attempt() -> Display:
+    def attempt_device() -> Display:
         if isinstance(opened, str):
             transport = open_at_rate(opened, baud, timeout_s, note_or_not, reset=not no_reset)
         else:
@@ -123,6 +131,9 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
             transport.close()
             raise
 
+    keys = None if profile is None else profile.sink
+    settings = SinkPortSettings(timeout_s, baud, not no_reset, note, capture, clock, keys)
+    attempt = sink_opener(opened, settings) or attempt_device
     if reconnect_s and isinstance(opened, str):
         found = open_when_available(attempt, reconnect_s, note_or_not)
     else:

@@ -60,6 +60,9 @@ class Display(PacedDisplay):
 
     """
 
+    answers = True
+    """False if nothing answers on its port: then no receipt is a proof, and nothing can be read."""
+
     # Of a display with a profile: see `set_output`.
     _output: OutputTransform | None = None
     _user_info: tuple[DeviceInfo, DeviceInfo] | None = None

@@ -45,6 +45,8 @@ class DisplayProfile:
     limit : CurrentLimit or None
     dither : {"none", "ordered"}
     fit : {"contain", "none", "content"} or None
+    sink : mapping
+        Settings of an LED cube, besides those of its port's name.
 
     """
 
@@ -57,6 +59,7 @@ class DisplayProfile:
     limit: CurrentLimit | None = None
     dither: str = "none"
     fit: Fit | None = None
+    sink: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     @property
     def output(self) -> OutputTransform | None:
@@ -93,6 +96,8 @@ class DisplayProfile:
             note(f"axes {self.axes} mirror what the memory holds: no rotation leads there")
         if self.brightness != 1 and display.info.format is PixelFormat.MONO1:
             note("brightness does nothing: a mono1 display has one light only")
+        if self.sink and display.answers:
+            note("the profile's sink does nothing: what answers on this port wires its own voxels")
         return display
 
 
@@ -158,6 +163,12 @@ def _brightness(value: Any) -> float:
     return share
 
 
+def _sink(value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise wrong_kind("sink", 'a table {size = [16, 16, 16], wiring = "serpentine"}', value)
+    return dict(value)
+
+
 def _limit(value: Any) -> CurrentLimit:
     if not isinstance(value, Mapping):
         raise wrong_kind("limit", "a table {amps = 8.0, ma_per_channel = 20}", value)
@@ -190,4 +201,5 @@ _READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "limit": _limit,
     "dither": _one_of("dither", DITHERS),
     "fit": _one_of("fit", FITS),
+    "sink": _sink,
 }

@@ -19,6 +19,7 @@ __all__ = ["Transport", "open_transport"]
 
 _GROUP = "voxdisplay.transport"
 _USB_GROUP = "voxdisplay.usb"
+_SINK_GROUP = "voxdisplay.sink"  # known here for an error alone
 
 
 def open_transport(port: str, *, baud: int = 115200, reset: bool = True) -> Transport:
@@ -59,6 +60,12 @@ def open_transport(port: str, *, baud: int = 115200, reset: bool = True) -> Tran
         from voxdisplay.transport.plugin import open_usb, opener_of  # noqa: PLC0415
 
         return open_usb(port, opener_of(entry))
+    if kind and entry_points(group=_SINK_GROUP, name=kind):
+        raise OpenError(
+            f"{port} is an LED cube, on which nothing answers: there is no line to measure",
+            port=port,
+            hint="push, play, clear and test-pattern send to it",
+        )
     if not port.strip():
         raise OpenError("no port was named", port=port, hint="try sim: for the built-in emulator")
     from voxdisplay.transport.serial import SerialTransport  # noqa: PLC0415

@@ -15,10 +15,10 @@ from voxdisplay.transport.base import Transport
 from voxdisplay.transport.library_errors import LIBRARY_ERRORS, message_of
 
 
-def opener_of(entry: EntryPoint) -> Callable[[str], Any]:
-    """Return a function that loads an entry point and opens a port by it."""
+def opener_of(entry: EntryPoint) -> Callable[..., Any]:
+    """Return a function that loads an entry point and opens a port by it, with what options."""
 
-    def opener(port: str) -> Any:
+    def opener(port: str, **options: Any) -> Any:
         try:
             function = entry.load()
         except Exception as error:  # a damaged package may raise anything while it is imported
@@ -27,7 +27,7 @@ def opener_of(entry: EntryPoint) -> Callable[[str], Any]:
                 port=port,
                 hint="reinstall the package that this kind of port comes from",
             ) from error
-        return function(port)
+        return function(port, **options)
 
     return opener
 
@@ -36,12 +36,13 @@ def open_usb(port: str, opener: Callable[[str], Any]) -> Transport:
     """Open a display on a USB that an entry point of the group ``voxdisplay.usb`` knows."""
     from voxdisplay.transport.usb import UsbTransport  # noqa: PLC0415 - loads pyusb
 
-    return UsbTransport(port, backend=_call_opener(port, opener))
+    return UsbTransport(port, backend=call_opener(port, opener))
 
 
-def _call_opener(port: str, opener: Callable[[str], Any]) -> Any:
+def call_opener(port: str, opener: Callable[..., Any], **options: Any) -> Any:
+    """Open a port by the function of an entry point; raise its errors as `OpenError`."""
     try:
-        return opener(port)
+        return opener(port, **options)
     except OpenError:
         raise
     except ValueError as error:
@@ -55,7 +56,7 @@ class PluginTransport:
 
     def __init__(self, port: str, opener: Callable[[str], Any]) -> None:
         self.port = port
-        self._pipe = _call_opener(port, opener)
+        self._pipe = call_opener(port, opener)
 
     @property
     def pipe(self) -> Any:

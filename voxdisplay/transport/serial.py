@@ -197,6 +197,13 @@ class SerialTransport:
         self.discard_output()  # a tty would wait half a minute for a device that takes nothing
         close_port(self._serial)
 
+    def drain(self, timeout_s: float) -> None:
+        """Wait until the system has put all bytes on the line, where it tells, at most so long."""
+        deadline_s = time.monotonic() + timeout_s
+        with contextlib.suppress(*LIBRARY_ERRORS):
+            while self._serial.out_waiting and time.monotonic() < deadline_s:
+                time.sleep(_POLL_S)
+
     def discard_output(self) -> None:
         """Drop the bytes that the system has not put on the line yet, where it can."""
         if isinstance(self._serial, serial.Serial):
