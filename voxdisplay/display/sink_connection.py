@@ -63,6 +63,7 @@ class SinkConnection:
     """
 
     reconnects = 0
+    serial: str | None = None
 
     def __init__(self, sink: Sink) -> None:
         self.port = sink.port

@@ -12,7 +12,9 @@ from voxdisplay.display import display, paced_display, play_show, player, shared
 from voxdisplay.display.sink_connection import SinkConnection
 from voxdisplay.display.sink_display import SinkDisplay
 from voxdisplay.display.sink_operations import SinkOperations, SinkQueue
+from voxdisplay.frame.output_transform import OutputTransform
 from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.orientation import Orientation
 from voxdisplay.shows.show import EncodedFrame
 
 GRID = Grid(3, 5, 7)
@@ -277,3 +279,21 @@ def test_to_a_player_there_are_no_ticks(clock, sink):
     assert queue.backlog == 0
     assert queue.line_is_free
     assert queue.repeat(3, vd.Frame(GRID)) == 3
+
+
+def test_a_cube_that_stands_otherwise_is_sent_its_memory(shown, sink):
+    shown.set_output(OutputTransform(Orientation.of("z,-x,y"), brightness=0.5))
+    assert shown.info.grid == (7, 3, 5)
+    frame = lit(shown.frame(), 6, 0, 1, color="white")
+    shown.present(frame)
+    (picture,) = sink.pictures
+    assert picture.shape == (7, 5, 3, 3)
+    # The user's x is the memory's z, y its x backwards, z its y.
+    assert np.argwhere(picture.any(axis=-1)).tolist() == [[6, 1, 2]]
+    assert picture[6, 1, 2].tolist() == [188] * 3
+    assert shown.frame(keep=True) == frame
+
+
+def test_a_cube_has_no_serial_number(shown):
+    with pytest.raises(vd.IncompatibleDevice, match="no serial number"):
+        shown.set_output(None, serial="A1")
