@@ -154,7 +154,7 @@ def test_push_imports_nothing_heavy(tmp_path):
     assert "tomllib" not in loaded
     assert "numpy.ma" not in loaded, "it takes as long to import as a small scene to draw"
     needless = re.compile(
-        r"voxdisplay\.(view|files|conformance|annotation|shows|bodies|voxelization\.surfaces)\."
+        r"voxdisplay\.(view|files|conformance|annotation|shows|sinks|bodies|voxelization\.surfaces)\."
         r"|voxdisplay\.(display\.profile|raster\.(orientation|light|dither)|frame\.output)"
     )
     allowed = {"voxdisplay.bodies.body", "voxdisplay.files.suffixes", "voxdisplay.shows.show"}
