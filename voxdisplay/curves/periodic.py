@@ -148,7 +148,7 @@ class TorusKnot(Curve):
 
     @property
     def min_length(self) -> float:
-        """Lower bound of the length in max norm: |P'| is at least that along either circle."""
+        """Lower bound of the length in max norm: the speed is at least that along either circle."""
         longest = max(abs(self._p) * self._major, abs(self._q) * self._minor)
         return math.tau * longest / math.sqrt(3)
 
