@@ -12,7 +12,7 @@ source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_templates"]
 templates_path = ["_templates"]
 default_role = "code"  # docstrings mark names by single backticks
-nitpicky = False
+smartquotes = False  # keys and messages are quoted as they are
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4

@@ -15,11 +15,11 @@ from pathlib import Path
 from documentation.staging import ROOT, stage
 
 
-def build(output: Path, sources: Path) -> int:
+def build(output: Path, sources: Path, *, draft: bool) -> int:
     """Stage the sources in a folder and build HTML from them; return an exit code."""
     from sphinx.cmd.build import build_main  # noqa: PLC0415 - an extra
 
-    stage(sources)
+    stage(sources, draft=draft)
     return build_main(["-W", "--keep-going", "-q", "-E", "-b", "html", str(sources), str(output)])
 
 
@@ -29,13 +29,15 @@ def main() -> int:
     parser.add_argument(
         "folder", nargs="?", type=Path, default=ROOT / "build" / "docs", help="[build/docs]"
     )
-    output: Path = parser.parse_args().folder.resolve()
+    parser.add_argument("--draft", action="store_true", help="films of few pictures: half the time")
+    options = parser.parse_args()
+    output: Path = options.folder.resolve()
     if output.exists() and any(output.iterdir()):
         if not (output / "searchindex.js").exists():
             parser.error(f"{output} is not empty and holds no documentation: name another folder")
         shutil.rmtree(output)
     with tempfile.TemporaryDirectory() as sources:
-        code = build(output, Path(sources))
+        code = build(output, Path(sources), draft=options.draft)
     if not code:
         print(output / "index.html")
     return code

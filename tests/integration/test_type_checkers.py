@@ -1,18 +1,15 @@
-"""Reports of type checkers on users' code: the README's examples, and calls that must fail."""
+"""Reports of type checkers on users' code: the documents' examples, and calls that must fail."""
 
 import json
-import re
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from doc_blocks import python_blocks
 
-README = Path(__file__).parents[2] / "README.md"
-EXAMPLES = re.findall(
-    r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
-)
+EXAMPLES = python_blocks()
 
 # Beside the examples: public names with the types that users rely on, and one mistake a line.
 USES = """\
@@ -61,8 +58,8 @@ vd.open(3)
 def sources(tmp_path_factory):
     folder = tmp_path_factory.mktemp("user")
     assert EXAMPLES
-    for number, example in enumerate(EXAMPLES):
-        folder.joinpath(f"example_{number}.py").write_text(example, encoding="utf-8")
+    for name, example in EXAMPLES:
+        folder.joinpath(f"{name}.py").write_text(example, encoding="utf-8")
     folder.joinpath("uses.py").write_text(USES, encoding="utf-8")
     folder.joinpath("mistakes.py").write_text(MISTAKES, encoding="utf-8")
     return folder

@@ -1,8 +1,8 @@
 """What takes the place of a marker in a page: pictures, scenes beside them, keys, names.
 
 Markers are ``picture FILE [OPTIONS]`` (drawn by ``voxdisplay preview``), ``scene FILE [OPTIONS]``
-(its source beside its picture), ``types curve|body|group``, ``common keys`` and ``names``. A file is
-an example, or one that a page shows below ``<!-- file: NAME -->``.
+(its source beside its picture), ``types curve|body|group``, ``common keys`` and ``names``. A file
+is an example, or one that a page shows below ``<!-- file: NAME -->``.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ class Inserter:
     ----------
     folder : Path
         Of the staged sources; pictures are drawn into it.
+    draft : bool
+        Whether films may be of a few pictures.
 
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, draft: bool) -> None:
         self._folder = folder
+        self._draft = draft
         self._unseen = {path.name for path in folder.glob("examples/*.json")}
         self._undrawn = {path.stem for path in folder.glob("objects/*.json")}
 
@@ -60,13 +63,13 @@ class Inserter:
             raise SystemExit(f"no page shows {sorted(self._unseen | self._undrawn)}")
 
     def _picture(self, name: str, *options: str) -> str:
-        shown = draw(self._folder / name, options)
+        shown = draw(self._folder / name, options, draft=self._draft)
         return f":::{{container}} shown\n![{Path(name).stem}]({shown})\n:::"
 
     def _pair(self, name: str, *options: str) -> str:
         source = (self._folder / name).read_text(encoding="utf-8").rstrip()
         source = re.sub(r'^ *"\$schema": .*,\n', "", source, flags=re.MULTILINE)
-        shown = draw(self._folder / name, options)
+        shown = draw(self._folder / name, options, draft=self._draft)
         return (
             f"::::{{container}} pair\n```json\n{source}\n```\n\n![{Path(name).stem}]({shown})\n::::"
         )

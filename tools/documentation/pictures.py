@@ -8,13 +8,14 @@ from pathlib import Path
 import voxdisplay as vd
 from voxdisplay.cli.preview import preview
 
-# A film of at most so many pictures, at a rate that browsers keep.
-_PICTURES = 40
+# Most pictures of a film, and pictures per second; a draft has films that are quickly drawn.
+_PICTURES, _FPS = 120, 12
+_DRAFT_PICTURES = 8
 _FILM = ["--pixels", "360x270"]
 _STILL = ["--pixels", "640x480"]
 
 
-def draw(scene: Path, options: Sequence[str] = ()) -> str:
+def draw(scene: Path, options: Sequence[str] = (), *, draft: bool = False) -> str:
     """Draw a scene, or the film of one that moves; return the picture's path in the sources."""
     sources = scene.parent if scene.parent.name not in {"examples", "objects"} else scene.parents[1]
     loaded = vd.load_scene(scene)
@@ -26,7 +27,8 @@ def draw(scene: Path, options: Sequence[str] = ()) -> str:
     if not target.exists():
         shape = list(_STILL)
         if moves:
-            fps = min(20, max(1, int(_PICTURES / loaded.duration)))
+            most = _DRAFT_PICTURES if draft else _PICTURES
+            fps = min(_FPS, max(1, int(most / loaded.duration)))
             shape = [*_FILM, "--fps", str(fps)]
         preview.main([str(scene), "-q", "-o", str(target), *shape, *options], standalone_mode=False)
     return f"/pictures/{target.name}"

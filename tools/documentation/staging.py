@@ -28,14 +28,14 @@ _MARKER = re.compile(r"^<!-- insert: (.+?) -->$", re.MULTILINE)
 _FENCE = re.compile(r"^```(?:vector|trace|mermaid)\b.*$", re.MULTILINE)
 
 
-def stage(folder: Path) -> None:
-    """Write all sources of the documentation into an empty folder."""
+def stage(folder: Path, *, draft: bool = False) -> None:
+    """Write all sources of the documentation into an empty folder; a draft has short films."""
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
     shutil.copytree(ROOT / "examples", folder / "examples")
     shutil.copy(ROOT / "examples" / "head.npz", folder / "objects")  # named by a scene there
     pages = {ROOT / "docs" / path.name: path.name for path in folder.glob("*.md")}
     pages |= {ROOT / source: name for source, name in OUTSIDE.items()}
-    inserter = Inserter(folder)
+    inserter = Inserter(folder, draft=draft)
     for source, name in pages.items():
         text = source.read_text(encoding="utf-8")
         text = _FENCE.sub("```", text)
