@@ -51,6 +51,8 @@ class VoxDisplayError(Exception):
     hint : str, optional
         What to do about it. Shown after the message.
 
+    Notes
+    -----
     Both are made printable: ports, devices and libraries are quoted in them.
 
     """

@@ -58,6 +58,8 @@ class Frame(Framebuffer):
         For index8 without `palette`: colours that the default palette lacks get free entries, as
         long as there are any, and are shown exactly.
 
+    Notes
+    -----
     Only displays with the feature ``palette`` show another palette than the default one.
 
     """
