@@ -75,5 +75,7 @@ class Inserter:
         )
 
     def _type(self, name: str) -> str:
-        self._undrawn.discard(name)
+        if name not in self._undrawn:
+            raise SystemExit(f"docs/objects/{name}.json is missing: every type has a scene there")
+        self._undrawn.remove(name)
         return f"### {name}\n\n{own_keys(name)}\n\n{self._pair(f'objects/{name}.json')}\n"

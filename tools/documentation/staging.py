@@ -12,6 +12,7 @@ import shutil
 from pathlib import Path
 
 from documentation.markers import Inserter
+from documentation.rooms import draw_rooms
 
 ROOT = Path(__file__).resolve().parents[2]
 # Documents from elsewhere in the repository, and the names of their pages.
@@ -24,8 +25,9 @@ OUTSIDE = {
 }
 _LINK = re.compile(r"\[([^\]\n]+)\]\((?!https?:|#)([^)#\s]+)(#[^)\s]*)?\)")
 _MARKER = re.compile(r"^<!-- insert: (.+?) -->$", re.MULTILINE)
-# Fences whose words are no name of a highlighter: vectors, traces, drawings.
-_FENCE = re.compile(r"^```(?:vector|trace|mermaid)\b.*$", re.MULTILINE)
+# Fences whose words are no name of a highlighter: vectors and traces.
+_FENCE = re.compile(r"^```(?:vector|trace)\b.*$", re.MULTILINE)
+_CHART = re.compile(r"^```mermaid\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def stage(folder: Path, *, draft: bool = False) -> None:
@@ -40,6 +42,7 @@ def stage(folder: Path, *, draft: bool = False) -> None:
         text = source.read_text(encoding="utf-8")
         text = _FENCE.sub("```", text)
         text = _LINK.sub(lambda link, source=source: _relinked(link, source, pages), text)
+        text = _CHART.sub(lambda chart: draw_rooms(chart[1], folder / "rooms.svg"), text)
         inserter.save_files(text)
         text = _MARKER.sub(lambda marker: inserter.insert(marker[1]), text)
         (folder / name).write_text(text, encoding="utf-8")
