@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from browser import NEEDED
 
 import voxdisplay as vd
 from voxdisplay.scene.objects import TYPES
@@ -108,6 +109,31 @@ def test_search_needs_no_server(site):
     assert 'src="searchindex.js"' in search
     options = (site / "_static/documentation_options.js").read_text(encoding="utf-8")
     assert "SHOW_SEARCH_SUMMARY: false" in options
+
+
+@NEEDED
+def test_search_finds_pages_in_a_browser(site, tab):
+    page = tab((site / "search.html").as_uri() + "?q=helix")
+    page.wait("document.querySelectorAll('ul.search li').length > 2")
+    found = page.run("[...document.querySelectorAll('ul.search a')].map(a => a.textContent)")
+    assert "Helix" in found
+
+
+@NEEDED
+def test_pages_fit_a_telephone(site, tab):
+    page = tab((site / "index.html").as_uri())
+    page.size(390, 844, mobile=True)
+    for path in [*sorted(site.glob("*.html")), site / "api/voxdisplay.Frame.html"]:
+        page.go(path.as_uri())
+        page.wait("document.readyState == 'complete'")
+        assert page.run("document.documentElement.scrollWidth") <= 390, path.name
+
+
+def test_the_rooms_are_drawn(site):
+    drawing = (site / "_images/rooms.svg").read_text(encoding="utf-8")
+    chart = (ROOT / "docs/architecture.md").read_text(encoding="utf-8").split("```mermaid")[1]
+    rooms = re.findall(r"^ +(\w+)\[", chart.split("```")[0], re.MULTILINE)
+    assert sorted(re.findall(r'class="n"[^>]*>(\w+)<', drawing)) == sorted(rooms)
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):
