@@ -13,8 +13,8 @@ from doc_blocks import CONTRACTS, DOCUMENTS, ROOT, blocks_of, python_blocks
 import voxdisplay as vd
 from voxdisplay.cli.command_table import ENTRIES
 
-# Languages of blocks that hold nothing to run: output, drawings, directives of Sphinx.
-SHOWN = {"text", "mermaid", "{toctree}"}
+# Languages of blocks that hold nothing to run: output, settings, drawings, directives of Sphinx.
+SHOWN = {"text", "toml", "mermaid", "{toctree}"}
 # Figures of one run.
 TIME = re.compile(r"\d+\.\d (m?s)\b")
 
