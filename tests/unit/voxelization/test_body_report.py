@@ -5,10 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import voxdisplay as vd
-from voxdisplay.cli.voxelize import voxelize
+from voxdisplay.cli import main
 from voxdisplay.voxelization.flood_fill import count_enclosed
 from voxdisplay.voxelization.measure_mesh import mesh_cover, mesh_distances, mesh_tunnels
 from voxdisplay.voxelization.smallest_cover import MAX_LINES, smallest_cover
@@ -138,26 +137,31 @@ def test_points_and_empty_sets_have_no_distances():
     assert (empty.voxels, empty.e_max, empty.tunnels, empty.enclosed) == (0, None, 0, 0)
 
 
-def test_the_command_prints_the_figures(tmp_path):
+def test_the_command_prints_the_figures(tmp_path, capsys):
     scene = tmp_path / "scene.json"
+
+    def voxelize(*options):
+        assert main(["voxelize", str(scene), "--json", *options]) == 0
+        said = capsys.readouterr()
+        (facts,) = json.loads(said.out)["objects"]
+        return facts, said.err
+
     scene.write_text('{"size": [20, 20, 20], "objects": [{"type": "sphere", "center": [10, 10, 10],'
                      ' "radius": 7}]}')  # fmt: skip
-    run = CliRunner().invoke(voxelize, [str(scene), "--json"])
-    (facts,) = json.loads(run.stdout)["objects"]
+    facts, _ = voxelize()
     assert (facts["kind"], facts["tunnels"]) == ("surface", 0)
     assert 0 < facts["e_av"] < facts["e_max"] <= 0.5
     assert facts["enclosed"] > 0
     assert facts["certified"] is False
-    run = CliRunner().invoke(voxelize, [str(scene), "--json", "--certified"])
-    assert json.loads(run.stdout)["objects"][0]["certified"] is True
-    assert "certified" not in run.stderr
+    facts, said = voxelize("--certified")
+    assert facts["certified"] is True
+    assert "certified" not in said
     scene.write_text('{"type": "height_field", "z": "5 + 9*exp(-900*((x - 4.3)**2 + y**2))", '
                      '"x": [0, 9], "y": [-5, 5]}')  # fmt: skip
-    run = CliRunner().invoke(voxelize, [str(scene), "--json", "--certified"])
-    (facts,) = json.loads(run.stdout)["objects"]
+    facts, said = voxelize("--certified")
     assert facts["certified"] is False
     assert "not proven" in facts["notes"][0]
-    assert "object 0 (height_field) is not certified: not proven: " in run.stderr
+    assert "object 0 (height_field) is not certified: not proven: " in said
     assert dataclasses.is_dataclass(vd.voxelize(BOX).report)
 
 
