@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from voxdisplay.cli.options import json_option
+from voxdisplay.cli.options import json_option, quiet_option
 from voxdisplay.cli.output import note, print_json, print_stdout
 
 
@@ -19,6 +19,7 @@ from voxdisplay.cli.output import note, print_json, print_stdout
     """
 )
 @json_option
+@quiet_option
 def displays(*, as_json: bool) -> None:
     """List the profiles that --display NAME takes: TOML files in your folder of profiles."""
     from voxdisplay.display.profile_files import (  # noqa: PLC0415 - help starts without numpy
