@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from voxdisplay.shows.derived_show import DerivedShow
+
 if TYPE_CHECKING:
     from voxdisplay.frame import Frame
     from voxdisplay.frame.output_transform import OutputTransform
     from voxdisplay.shows.show import Show
 
 
-class OrientedShow:
+class OrientedShow(DerivedShow):
     """A show whose frames have what lies between a picture and a display's memory.
 
     Parameters
@@ -26,27 +28,8 @@ class OrientedShow:
     """
 
     def __init__(self, show: Show, output: OutputTransform) -> None:
-        self._show, self._output = show, output
-
-    @property
-    def duration(self) -> float:
-        """As of the show."""
-        return self._show.duration
-
-    @property
-    def fps(self) -> float:
-        """As of the show."""
-        return self._show.fps
-
-    @property
-    def loop(self) -> bool:
-        """As of the show."""
-        return self._show.loop
-
-    @property
-    def frame_count(self) -> int:
-        """As of the show."""
-        return self._show.frame_count
+        super().__init__(show)
+        self._output = output
 
     def frame(self, number: int) -> Frame:
         """Return a frame of the display: as `Show.frame`."""

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from voxdisplay.shows.derived_show import DerivedShow
+
 if TYPE_CHECKING:
     from voxdisplay.frame import Frame
     from voxdisplay.shows.show import Show
 
 
-class ConvertedShow:
+class ConvertedShow(DerivedShow):
     """A show whose frames are drawn on frames of another kind.
 
     Voxels are placed by their centres. They are never enlarged, which would leave gaps.
@@ -34,29 +36,9 @@ class ConvertedShow:
     def __init__(
         self, show: Show, blank: Frame, fit: Literal["contain", "none", "content"] = "contain"
     ) -> None:
-        self._show = show
+        super().__init__(show)
         self._blank = blank
         self._fit = fit
-
-    @property
-    def duration(self) -> float:
-        """As of the show."""
-        return self._show.duration
-
-    @property
-    def fps(self) -> float:
-        """As of the show."""
-        return self._show.fps
-
-    @property
-    def loop(self) -> bool:
-        """As of the show."""
-        return self._show.loop
-
-    @property
-    def frame_count(self) -> int:
-        """As of the show."""
-        return self._show.frame_count
 
     def frame(self, number: int) -> Frame:
         """Return a frame of the display: as `Show.frame`."""
