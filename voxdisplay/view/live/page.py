@@ -1,7 +1,8 @@
 """The page for browsers and its content security policy, which allows only what it needs.
 
-The page is one file, ``page.html``, without a build step and without third-party parts. Served by
-`server` it receives frames from there; in a file of `voxdisplay.view.html_export` it contains them.
+The page is plain HTML, CSS and JavaScript in ``browser/``, without a build step and without
+third-party parts; here its files are put into one. Served by `server` it receives frames from
+there; in a file of `voxdisplay.view.html_export` it contains them.
 """
 
 from __future__ import annotations
@@ -12,11 +13,25 @@ import hashlib
 import re
 from importlib.resources import files
 
+_LINKED = re.compile(
+    r'<link rel="(?P<style>stylesheet)" href="(?P<css>[a-z]+\.css)">'
+    r'|<script src="(?P<js>[a-z]+\.js)"></script>'
+)
+
 
 @functools.cache
 def page_html() -> str:
-    """Return the page."""
-    return files(__package__).joinpath("page.html").read_text(encoding="utf-8")
+    """Return the page: ``page.html`` with the files that it links in the place of the links."""
+    return _LINKED.sub(_inlined, _read("page.html"))
+
+
+def _inlined(link: re.Match[str]) -> str:
+    tag = "style" if link["style"] else "script"
+    return f"<{tag}>\n{_read(link['css'] or link['js'])}</{tag}>"
+
+
+def _read(name: str) -> str:
+    return files(__package__).joinpath("browser", name).read_text(encoding="utf-8")
 
 
 @functools.cache
@@ -32,8 +47,8 @@ def content_security_policy(connect: str = "'none'") -> str:
     return "; ".join(
         (
             "default-src 'none'",
-            f"script-src {_hash('script')}",
-            f"style-src {_hash('style')}",
+            f"script-src {_hashes('script')}",
+            f"style-src {_hashes('style')}",
             "img-src data:",
             f"connect-src {connect}",
             "base-uri 'none'",
@@ -42,8 +57,8 @@ def content_security_policy(connect: str = "'none'") -> str:
     )
 
 
-def _hash(tag: str) -> str:
-    """Return the hash source of the page's inline script or style."""
-    match = re.search(rf"<{tag}>(.*?)</{tag}>", page_html(), re.DOTALL)
-    assert match  # noqa: S101 - it has one of each
-    return f"'sha256-{base64.b64encode(hashlib.sha256(match[1].encode()).digest()).decode()}'"
+def _hashes(tag: str) -> str:
+    """Return the hash sources of the page's inline scripts or styles."""
+    texts = re.findall(rf"<{tag}>(.*?)</{tag}>", page_html(), re.DOTALL)
+    digests = (hashlib.sha256(text.encode()).digest() for text in texts)
+    return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
