@@ -11,6 +11,7 @@ import pytest
 from live_page import SIZE, exported, page_of
 
 import voxdisplay as vd
+from voxdisplay.view.axes_and_grid import outline_axes
 from voxdisplay.view.camera import Camera
 
 pytestmark = browsers.NEEDED
@@ -57,11 +58,26 @@ def test_the_page_projects_as_the_camera_does(tab, tmp_path):
     page = tab(exported(tmp_path, [page_of((0, 0, 0))]))
     page.wait("painted")
     points = np.random.default_rng(5).uniform(0, 7, (20, 3))
-    for yaw, pitch, distance in ((0.3, -0.2, 1.5), (2.0, 1.1, 4.0), (-3.0, 0.0, 9.0)):
-        page.run(f"setCamera({{yaw: {yaw}, pitch: {pitch}, distance: {distance}}})")
-        got = page.run(f"{points.tolist()}.map(p => project(p, projection([3, 5, 7], 640, 480)))")
-        want = Camera(yaw, pitch, distance).project(points, SIZE, (640, 480))
-        assert np.allclose(np.array(got).T, want)
+    for size in ((640, 480), (300, 700)):
+        for yaw, pitch, distance, zoom, flat in (
+            (0.3, -0.2, 1.5, 1, False), (2.0, 1.1, 4.0, 2.5, False), (-3.0, 0.0, 9.0, 0.4, True),
+        ):  # fmt: skip
+            page.run(
+                f"setCamera({{yaw: {yaw}, pitch: {pitch}, distance: {distance}, zoom: {zoom}, "
+                f"flat: {str(flat).lower()}}})"
+            )
+            camera = Camera(yaw, pitch, distance, zoom, flat)
+            place = f"projection([3, 5, 7], {size[0]}, {size[1]})"
+            got = page.run(f"{points.tolist()}.map(p => project(p, {place}).slice(0, 3))")
+            assert np.allclose(np.array(got).T, camera.project(points, SIZE, size))
+            got = page.run(
+                f"outlineAxes([3, 5, 7], {size[0]}, {size[1]}).map(e => [e.axis, corner(e.a, "
+                f"[3, 5, 7]), corner(e.b, [3, 5, 7]), ...e.middle, ...e.out])"
+            )
+            want = outline_axes(vd.Grid(*SIZE), camera, size)
+            assert [e[:3] for e in got] == [[e.number, [*e.start], [*e.end]] for e in want]
+            places = np.array([[*e.middle, *e.outward] for e in want])
+            assert np.allclose(np.array([e[3:] for e in got]), places)
 
 
 def test_both_renderers_draw_the_same(tab, tmp_path):
@@ -122,7 +138,7 @@ def test_keys_do_what_they_say(tab, tmp_path):
     assert after["yaw"] > before["yaw"]
     assert after["pitch"] > before["pitch"]
     assert after["x"] < 0
-    assert after["distance"] < before["distance"]
+    assert after["zoom"] > before["zoom"]
     page.key("0")
     assert page.run("({...camera})") == before
     for key, axis in (("x", 0), ("y", 1), ("z", 2)):
@@ -173,7 +189,7 @@ def test_the_pointer_turns_moves_zooms_and_names_voxels(tab, tmp_path):
         page.mouse("mouseReleased", 340, 320, button=button, clickCount=1)
         assert page.run("({...camera})")[changed] > before[changed]
     page.mouse("mouseWheel", 300, 300, deltaX=0, deltaY=-200)
-    page.wait("camera.distance < START.distance")
+    page.wait("camera.zoom > 1")
 
 
 def test_fingers_turn_and_pinch(tab, tmp_path):
@@ -193,7 +209,7 @@ def test_fingers_turn_and_pinch(tab, tmp_path):
     touch("touchStart", (150, 200), (210, 200))
     touch("touchMove", (120, 200), (240, 200))
     touch("touchEnd")
-    assert page.run("camera.distance") < 1.5
+    assert page.run("camera.zoom") == pytest.approx(2)
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])

@@ -1,13 +1,16 @@
 """Background of a picture: the grid's bounding box, floor lines and axes on dark ground.
 
-x is red, y green, z blue; each axis starts at voxel (0, 0, 0) and points to where its coordinate
-grows. Knows no voxel.
+x is red, y green, z blue; each axis lies on an edge of the box that is part of its outline, so that
+neither it nor its label crosses what is in the box, and points to where its coordinate grows. Knows
+no voxel.
 """
 
 from __future__ import annotations
 
 import functools
 import itertools
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +25,14 @@ AXIS_COLORS: tuple[Rgb, Rgb, Rgb] = ((255, 84, 84), (72, 214, 112), (92, 148, 25
 _EDGE: Rgb = (92, 104, 128)
 _FLOOR: Rgb = (60, 70, 92)
 _TEXT: Rgb = (150, 160, 180)
-# Length of an axis beyond the box, in longest sides: a flat grid's axes stay apart.
+# Length of an axis beyond the box, in longest sides.
 _AXIS_OVERHANG = 0.075
+# Edges that the camera sees before the box, against those behind it.
+_FRONT_OPACITY = 0.35
+# Corners that are less than this beyond an edge do not keep it from being part of the outline.
+_OUTLINE_TOLERANCE_PX = 0.01
+# Edges that are seen shorter than this, in shorter sides of the picture, get no axis.
+_SHORTEST_AXIS = 0.05
 # Floor cells along the longest side, at most.
 _MAX_FLOOR_CELLS = 8
 # Lines are drawn larger by this factor and reduced: Pillow does not antialias.
@@ -36,16 +45,82 @@ _FADE_STEPS = 12
 def draw_stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
     """Return the background. It is cached: do not draw on it."""
     pen = _Pen(grid, camera, size)
+    axes = outline_axes(grid, camera, size)
     pen.lines(_floor_lines(grid), _FLOOR, 0.9)
-    pen.lines(_box_edges(grid), _EDGE, 1.0)
-    ends = axis_tips(grid)
-    for tip, color in zip(ends, AXIS_COLORS, strict=True):
-        pen.arrow(np.zeros(3), tip, color, 1.7)
+    covered = {frozenset((axis.start, axis.end)) for axis in axes}
+    front = _nearest_corner(grid, camera)
+    for before in (False, True):
+        edges = [
+            (np.array(one), np.array(other))
+            for one, other in _box_edges(grid)
+            if frozenset((one, other)) not in covered and (front in (one, other)) == before
+        ]
+        pen.lines(edges, _EDGE, 1.0, _FRONT_OPACITY if before else 1.0)
+    for axis in axes:
+        start, end = np.array(axis.start), np.array(axis.end)
+        tip = end + (end - start) * (_AXIS_OVERHANG * max(grid) / grid[axis.number])
+        pen.arrow(start, tip, AXIS_COLORS[axis.number], 1.5)
     image = Image.new("RGB", size, BACKGROUND)
     image.paste(pen.image.reduce(_SUPERSAMPLING), pen.corner)
     if labels:
-        _draw_labels(image, ends, grid, camera)
+        for axis in axes:
+            _draw_label(image, axis, grid[axis.number])
     return image
+
+
+Corner = tuple[float, float, float]
+
+
+class OutlineAxis(NamedTuple):
+    """An edge of the box on which an axis is drawn.
+
+    Attributes
+    ----------
+    number : int
+        0 for x, 1 for y, 2 for z.
+    start, end : Corner
+        Its ends, x, y, z; the coordinate grows from start to end.
+    middle : (x_px, y_px)
+        The middle of the edge in the picture.
+    outward : (dx, dy)
+        Unit vector across the edge in the picture, away from the box.
+
+    """
+
+    number: int
+    start: Corner
+    end: Corner
+    middle: tuple[float, float]
+    outward: tuple[float, float]
+
+
+def outline_axes(grid: Grid, camera: Camera, size: tuple[int, int]) -> list[OutlineAxis]:
+    """Return the edge for each axis: of those in the box's outline the lowest, for z the leftmost.
+
+    An axis that points at the camera has none.
+    """
+    corners = _corners(grid)
+    x, y, _ = camera.project(corners, grid, size)
+    points = dict(zip(corners, np.stack((x, y), axis=1), strict=True))
+    found: dict[int, tuple[float, OutlineAxis]] = {}
+    for start, end in _box_edges(grid):
+        along = points[end] - points[start]
+        length = float(np.hypot(*along))
+        if length < _SHORTEST_AXIS * min(size):
+            continue
+        across = np.array([along[1], -along[0]]) / length
+        beyond = np.array([(point - points[start]) @ across for point in points.values()])
+        if beyond.min() < -_OUTLINE_TOLERANCE_PX:
+            across, beyond = -across, -beyond
+        if beyond.min() < -_OUTLINE_TOLERANCE_PX:
+            continue
+        number = int(np.argmax(np.subtract(end, start)))
+        middle = (points[start] + points[end]) / 2
+        rank = float(-middle[0] if number == 2 else middle[1])
+        if number not in found or rank > found[number][0] + _OUTLINE_TOLERANCE_PX:
+            place, outward = tuple(middle.tolist()), tuple((-across).tolist())
+            found[number] = rank, OutlineAxis(number, start, end, place, outward)
+    return [found[number][1] for number in sorted(found)]
 
 
 def axis_tips(grid: Grid) -> Floats:
@@ -53,14 +128,32 @@ def axis_tips(grid: Grid) -> Floats:
     return np.diag(np.array(grid) + _AXIS_OVERHANG * max(grid))
 
 
-def _box_edges(grid: Grid) -> list[tuple[Floats, Floats]]:
-    """Return the nine edges of the box that are no axes."""
-    corners = [np.array(corner) * grid for corner in itertools.product((0.0, 1.0), repeat=3)]
+def _corners(grid: Grid) -> list[Corner]:
+    """Return the eight corners of the box."""
+    nx, ny, nz = map(float, grid)
+    return [(x, y, z) for x in (0.0, nx) for y in (0.0, ny) for z in (0.0, nz)]
+
+
+def _box_edges(grid: Grid) -> list[tuple[Corner, Corner]]:
+    """Return the twelve edges of the box, each in the direction in which its coordinate grows."""
     return [
         (one, other)
-        for one, other in itertools.combinations(corners, 2)
-        if np.count_nonzero(one != other) == 1 and one.any()
+        for one, other in itertools.combinations(_corners(grid), 2)
+        if sum(a != b for a, b in zip(one, other, strict=True)) == 1
     ]
+
+
+def _nearest_corner(grid: Grid, camera: Camera) -> Corner:
+    """Return the corner of the box that is nearest to the camera."""
+    corners = _corners(grid)
+    toward = np.array(
+        [
+            -math.sin(camera.yaw) * math.cos(camera.pitch),
+            -math.cos(camera.yaw) * math.cos(camera.pitch),
+            math.sin(camera.pitch),
+        ]
+    )
+    return corners[int(np.argmax(np.array(corners) @ toward))]
 
 
 def _floor_lines(grid: Grid) -> list[tuple[Floats, Floats]]:
@@ -82,7 +175,8 @@ class _Pen:
         self._unit = _SUPERSAMPLING * max(1.0, min(size) / 600)
         self._middle = float(camera.project([np.array(grid) / 2], grid, size)[2][0])
         # Only the part of the picture that has lines and arrow heads.
-        ends = np.vstack((axis_tips(grid), list(itertools.product(*((0, side) for side in grid)))))
+        over = _AXIS_OVERHANG * max(grid)
+        ends = list(itertools.product(*((-over, side + over) for side in grid)))
         places = np.stack(camera.project(ends, grid, size)[:2])
         room = 3 + 3 * self._unit / _SUPERSAMPLING
         low = np.clip(np.floor(places.min(axis=1) - room), 0, np.array(size) - 1).astype(int)
@@ -96,7 +190,9 @@ class _Pen:
         x, y, scale = self._camera.project(points, self._grid, self._size)
         return (np.stack((x, y), axis=1) - self.corner) * _SUPERSAMPLING, scale / self._middle
 
-    def lines(self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float) -> None:
+    def lines(
+        self, ends: list[tuple[Floats, Floats]], color: Rgb, width: float, opacity: float = 1.0
+    ) -> None:
         """Draw lines in segments whose brightness shows their distance."""
         if not ends:
             return
@@ -104,7 +200,7 @@ class _Pen:
         along = starts + (stops - starts) * np.linspace(0, 1, _FADE_STEPS + 1)[:, None]
         points, near = self._project(along.reshape(-1, 3))
         near = near.reshape(len(ends), -1)
-        fade = np.clip((near[:, :-1] + near[:, 1:]) / 2 * 1.55 - 0.95, 0.12, 1)
+        fade = np.clip((near[:, :-1] + near[:, 1:]) / 2 * 1.55 - 0.95, 0.12, 1) * opacity
         mixed = (
             np.rint(BACKGROUND + np.subtract(color, BACKGROUND) * fade[..., None])
             .astype(int)
@@ -131,21 +227,19 @@ class _Pen:
         self._draw.polygon([tuple(corner) for corner in head], fill=color)
 
 
-def _draw_labels(image: Image.Image, ends: Floats, grid: Grid, camera: Camera) -> None:
-    """Write the name and length of each axis at its tip."""
+def _draw_label(image: Image.Image, axis: OutlineAxis, side: int) -> None:
+    """Write the name and length of an axis beside the middle of its edge, outside of the box."""
     draw = ImageDraw.Draw(image)
     height = max(9.0, min(image.size) / 40)
     font = ImageFont.load_default(height)
-    points = np.stack(camera.project(np.vstack((np.zeros(3), ends)), grid, image.size)[:2], axis=1)
-    for axis, (name, side) in enumerate(zip("xyz", grid, strict=True)):
-        along = points[axis + 1] - points[0]
-        along /= max(1.0, float(np.hypot(*along)))
-        ahead = draw.textlength(name, font=font) + height * 0.45
-        left, top, right, bottom = draw.textbbox((0, 0), f"{name}{side}", font=font)
-        right += height * 0.45
-        box = np.array([right - left, bottom - top])
-        # The text's centre lies beyond the tip by what its box needs in that direction.
-        middle = points[axis + 1] + along * (np.abs(along) @ box / 2 + 0.5 * height)
-        corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
-        draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis])
-        draw.text((corner[0] + ahead, corner[1]), str(side), font=font, fill=_TEXT)
+    name = "xyz"[axis.number]
+    ahead = draw.textlength(name, font=font) + height * 0.45
+    left, top, right, bottom = draw.textbbox((0, 0), f"{name}{side}", font=font)
+    right += height * 0.45
+    box = np.array([right - left, bottom - top])
+    # The text's centre lies outside of the edge by what its box needs in that direction.
+    outward = np.array(axis.outward)
+    middle = axis.middle + outward * (np.abs(outward) @ box / 2 + 0.7 * height)
+    corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
+    draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis.number])
+    draw.text((corner[0] + ahead, corner[1]), str(side), font=font, fill=_TEXT)

@@ -17,11 +17,14 @@ Floats = NDArray[np.float64]
 # At this distance no corner of a grid, at most sqrt(3)/2 from its centre, is behind the camera.
 NEAREST = 1.0
 FARTHEST = 10.0
+SMALLEST_ZOOM, LARGEST_ZOOM = 0.2, 12.0
+# Margin on each side of the fitted grid, in shorter sides of the picture: room for labels.
+_MARGIN = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A camera that looks at the grid's centre, z up.
+    """A camera that turns around the grid, z up, and shows all of it.
 
     Attributes
     ----------
@@ -30,24 +33,28 @@ class Camera:
         away from it. A greater yaw turns the grid clockwise as seen from above; a greater pitch
         raises the camera, and at pi/2 it looks straight down.
     distance : float
-        From the camera to the grid's centre, in longest sides of the grid; 1 to 10.
-    fov : float
-        Field of view across the picture's shorter side, in radians.
+        From the camera to the grid's centre, in longest sides of the grid; 1 to 10. It is the
+        strength of the perspective, not the size of the picture.
+    zoom : float
+        Magnification of the fitted picture, 0.2 to 12.
+    orthographic : bool
+        Whether what is parallel stays parallel.
 
     """
 
     yaw: float = -0.6
     pitch: float = 0.42
     distance: float = 2.6
-    fov: float = 0.72
+    zoom: float = 1.0
+    orthographic: bool = False
 
     def __post_init__(self) -> None:
-        if not all(map(math.isfinite, (self.yaw, self.pitch, self.distance, self.fov))):
+        if not all(map(math.isfinite, (self.yaw, self.pitch, self.distance, self.zoom))):
             raise ValueError("the numbers of a camera must be finite")
         if not NEAREST <= self.distance <= FARTHEST:
             raise ValueError(f"the distance {self.distance} is not {NEAREST:g} to {FARTHEST:g}")
-        if not 0 < self.fov < math.pi:
-            raise ValueError(f"the field of view {self.fov} is not between 0 and pi")
+        if not SMALLEST_ZOOM <= self.zoom <= LARGEST_ZOOM:
+            raise ValueError(f"the zoom {self.zoom} is not {SMALLEST_ZOOM:g} to {LARGEST_ZOOM:g}")
 
     @np.errstate(under="ignore")  # of angles next to nothing
     def project(
@@ -62,8 +69,10 @@ class Camera:
             away  = X*sin(yaw) + Y*cos(yaw)
             up    = Z*cos(pitch) + away*sin(pitch)
             depth = distance + away*cos(pitch) - Z*sin(pitch)
-            k = min(W, H) / (2 * tan(fov/2)) / depth
-            x_px = W/2 + k*right,  y_px = H/2 - k*up,  scale = k / L
+            k = fit / depth
+            x_px = W/2 + k*right,  y_px = H/2 + fit*middle - k*up,  scale = k / L
+
+        `orthographic` makes ``depth = distance``. `fit` and `middle` are those of `fitted`.
 
         Parameters
         ----------
@@ -92,9 +101,51 @@ class Camera:
         right = x * math.cos(self.yaw) - y * math.sin(self.yaw)
         away = x * math.sin(self.yaw) + y * math.cos(self.yaw)
         up = z * math.cos(self.pitch) + away * math.sin(self.pitch)
-        depth = self.distance + away * math.cos(self.pitch) - z * math.sin(self.pitch)
-        k = min(width, height) / (2 * math.tan(self.fov / 2)) / depth
-        return width / 2 + k * right, height / 2 - k * up, k / longest
+        fit, middle = self.fitted(grid, size)
+        if self.orthographic:
+            k = np.full_like(right, fit / self.distance)
+        else:
+            k = fit / (self.distance + away * math.cos(self.pitch) - z * math.sin(self.pitch))
+        return width / 2 + k * right, height / 2 + fit * middle - k * up, k / longest
+
+    def fitted(self, grid: tuple[int, int, int], size: tuple[int, int]) -> tuple[float, float]:
+        """Return the scale and the middle by which the grid is fitted into a picture and centred.
+
+        What is fitted is the cylinder that the grid's box sweeps in one turn, of radius
+        ``r = hypot(nx, ny)/2/L`` and height ``h = nz/L``, so that the picture neither grows nor
+        shrinks while the box turns. On its rims, ``up/depth`` is greatest and least where
+        ``away = +-r``. ``right/depth`` is at most ``r / sqrt(a**2 - b**2)``, with
+        ``a = distance - h/2*abs(sin(pitch))`` and ``b = r*cos(pitch)``.
+
+        Parameters
+        ----------
+        grid : Grid or (nx, ny, nz)
+        size : (W, H)
+            The picture, in pixels.
+
+        Returns
+        -------
+        fit : float
+            Pixels of what is as large as its depth.
+        middle : float
+            The ``up/depth`` that lies in the picture's middle.
+
+        """
+        longest = max(grid)
+        radius, half = math.hypot(*grid[:2]) / 2 / longest, grid[2] / 2 / longest
+        sin, cos = math.sin(self.pitch), math.cos(self.pitch)
+        depends = 0.0 if self.orthographic else 1.0
+        rims = [
+            (z * cos + away * sin) / (self.distance + depends * (away * cos - z * sin))
+            for z in (-half, half)
+            for away in (-radius, radius)
+        ]
+        low, high = min(rims), max(rims)
+        nearest = self.distance - depends * half * abs(sin)
+        wide = 2 * radius / math.sqrt(nearest**2 - (depends * radius * cos) ** 2)
+        margins = 2 * _MARGIN * min(size)
+        fit = min((size[0] - margins) / wide, (size[1] - margins) / (high - low))
+        return self.zoom * fit, (low + high) / 2
 
     def turned(self, yaw: float, pitch: float = 0.0) -> Camera:
         """Return the camera turned by angles in radians; the pitch is limited to +-pi/2."""
@@ -102,5 +153,5 @@ class Camera:
         return replace(self, yaw=math.remainder(self.yaw + yaw, 2 * math.pi), pitch=pitch)
 
     def zoomed(self, factor: float) -> Camera:
-        """Return the camera nearer by a factor, or farther below 1; the distance is limited."""
-        return replace(self, distance=min(max(self.distance / factor, NEAREST), FARTHEST))
+        """Return the camera with a magnification greater by a factor; it is limited."""
+        return replace(self, zoom=min(max(self.zoom * factor, SMALLEST_ZOOM), LARGEST_ZOOM))

@@ -119,12 +119,22 @@ def render_voxels(
         return image
     exposed = _tone_mapped(glare.light * np.float32(exposure or auto_exposure(glare.light)))
     sharp = _to_srgb(exposed)
+    image = _put_before(image, sharp, glare.left, glare.top)
     if not options.glow:
-        return _screen_blended(image, sharp, glare.left, glare.top)
+        return image
     whole = Image.new("RGB", options.size)
     whole.paste(sharp, (glare.left, glare.top))
-    image = _screen_blended(image, sharp, glare.left, glare.top)
     return _screen_blended(image, *_bloom(whole))
+
+
+def _put_before(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:
+    """Put light before a part of an image, as opaque as it is bright; return the image."""
+    box = left, top, left + light.width, top + light.height
+    red, green, blue = light.split()
+    dark = ImageChops.invert(ImageChops.lighter(ImageChops.lighter(red, green), blue))
+    behind = ImageChops.multiply(image.crop(box), Image.merge("RGB", (dark, dark, dark)))
+    image.paste(ImageChops.add(behind, light), box)
+    return image
 
 
 def _screen_blended(image: Image.Image, light: Image.Image, left: int, top: int) -> Image.Image:

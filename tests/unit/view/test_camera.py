@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from voxdisplay.view.camera import FARTHEST, NEAREST, Camera
+from voxdisplay.view.camera import FARTHEST, LARGEST_ZOOM, NEAREST, SMALLEST_ZOOM, Camera
 
 GRID = (3, 5, 7)
 SIZE = (800, 600)
@@ -21,24 +21,48 @@ def by_hand(camera, point, grid, size):
     right = x * math.cos(camera.yaw) - y * math.sin(camera.yaw)
     away = x * math.sin(camera.yaw) + y * math.cos(camera.yaw)
     up = z * math.cos(camera.pitch) + away * math.sin(camera.pitch)
-    depth = camera.distance + away * math.cos(camera.pitch) - z * math.sin(camera.pitch)
-    k = min(size) / (2 * math.tan(camera.fov / 2)) / depth
-    return size[0] / 2 + k * right, size[1] / 2 - k * up, k / longest
+    depth = camera.distance
+    if not camera.orthographic:
+        depth += away * math.cos(camera.pitch) - z * math.sin(camera.pitch)
+    fit, middle = camera.fitted(grid, size)
+    k = fit / depth
+    return size[0] / 2 + k * right, size[1] / 2 + fit * middle - k * up, k / longest
 
 
-@given(angles, st.floats(-1.6, 1.6), st.floats(NEAREST, FARTHEST), st.floats(0.1, 3))
-def test_it_is_the_formula_of_its_docstring(yaw, pitch, distance, fov):
-    camera = Camera(yaw, pitch, distance, fov)
+@given(
+    angles, st.floats(-1.6, 1.6), st.floats(NEAREST, FARTHEST), st.floats(0.2, 12), st.booleans()
+)
+def test_it_is_the_formula_of_its_docstring(yaw, pitch, distance, zoom, orthographic):
+    camera = Camera(yaw, pitch, distance, zoom, orthographic)
     points = np.array([[0, 0, 0], [3, 0, 0], [0, 5, 0], [0, 0, 7], [0.5, 4.5, 2.5]])
     found = np.stack(camera.project(points, GRID, SIZE), axis=1)
     with np.errstate(under="ignore"):
         assert np.allclose(found, [by_hand(camera, point, GRID, SIZE) for point in points])
 
 
-def test_the_centre_of_the_grid_is_the_middle_of_the_picture():
-    for camera in (Camera(), Camera(1, 1), Camera(-3, -1.5, 9, 0.2)):
-        x, y, _ = camera.project([[1.5, 2.5, 3.5]], GRID, SIZE)
-        assert (x[0], y[0]) == pytest.approx((400, 300))
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("pitch", [-1.5, -0.4, 0.0, 0.42, 1.2, math.pi / 2])
+@pytest.mark.parametrize("grid", [(3, 5, 7), (128, 128, 128), (64, 8, 16), (1, 1, 40)])
+@pytest.mark.parametrize("size", [(800, 600), (390, 844)])
+def test_a_grid_that_turns_is_fitted_and_centred(grid, pitch, size, orthographic):
+    """What it sweeps touches the margins on two sides, and is as far from both of each pair."""
+    corners = np.array(
+        [[x, y, z] for x in (0, grid[0]) for y in (0, grid[1]) for z in (0, grid[2])]
+    )
+    turn = np.linspace(0, 2 * math.pi, 2000)
+    views = [Camera(yaw, pitch, orthographic=orthographic) for yaw in turn]
+    seen = np.array([camera.project(corners, grid, size)[:2] for camera in views])
+    low, high = seen.min(axis=(0, 2)), seen.max(axis=(0, 2))
+    assert low + high == pytest.approx(size, abs=0.5)
+    assert (low / min(size)).min() == pytest.approx(0.1, abs=1e-3)
+
+
+def test_what_is_parallel_stays_parallel_in_an_orthographic_picture():
+    ends = np.array([[0, 0, 0], [3, 0, 0], [0, 5, 7], [3, 5, 7]])
+    x, y, _ = Camera(orthographic=True).project(ends, GRID, SIZE)
+    assert (x[1] - x[0], y[1] - y[0]) == pytest.approx((x[3] - x[2], y[3] - y[2]))
+    x, y, _ = Camera().project(ends, GRID, SIZE)
+    assert (x[1] - x[0], y[1] - y[0]) != pytest.approx((x[3] - x[2], y[3] - y[2]))
 
 
 def test_from_the_front_x_grows_right_and_z_up_and_y_away():
@@ -70,12 +94,12 @@ def test_every_grid_is_in_the_picture_from_everywhere(yaw, pitch):
 def test_turning_and_zooming_stay_within_what_a_camera_may_be(yaw, pitch, factor):
     camera = Camera().turned(yaw, pitch).zoomed(factor)
     assert abs(camera.pitch) <= math.pi / 2
-    assert NEAREST <= camera.distance <= FARTHEST
+    assert SMALLEST_ZOOM <= camera.zoom <= LARGEST_ZOOM
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"yaw": math.nan}, {"distance": 0.5}, {"distance": 11}, {"fov": 0}, {"fov": 4}]
+    "wrong", [{"yaw": math.nan}, {"distance": 0.5}, {"distance": 11}, {"zoom": 0}, {"zoom": 13}]
 )
 def test_a_camera_that_cannot_be(wrong):
-    with pytest.raises(ValueError, match=r"distance|view|finite"):
+    with pytest.raises(ValueError, match=r"distance|zoom|finite"):
         Camera(**wrong)

@@ -106,7 +106,7 @@ def test_what_is_served():
         status, headers, body = fetch(url)
         assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
         assert body.startswith(b"<!doctype html>")
-        assert len(body) < 49_000
+        assert len(body) < 60_000
         assert "default-src 'none'" in headers["Content-Security-Policy"]
         assert "unsafe" not in headers["Content-Security-Policy"]
         status, headers, body = fetch(url + "frame.png")

@@ -124,12 +124,56 @@ def test_the_box_and_the_axes_are_drawn_and_labelled():
     red = (stage[..., 0] > 200) & (stage[..., 1] < 120)
     green = (stage[..., 1] > 180) & (stage[..., 0] < 120)
     blue = (stage[..., 2] > 200) & (stage[..., 0] < 140)
-    corners = [[0, 0, 0], [3, 0, 0], [0, 5, 0], [0, 0, 7]]
-    x, y, _ = Camera().project(corners, grid, (800, 600))
-    for axis, mask in enumerate((red, green, blue), 1):
+    ends = [[[0, 0, 0], [3, 0, 0]], [[3, 0, 0], [3, 5, 0]], [[0, 0, 0], [0, 0, 7]]]
+    for (start, end), mask in zip(ends, (red, green, blue), strict=True):
+        x, y, _ = Camera().project([start, end], grid, (800, 600))
         for share in (0.3, 0.7):
-            px, py = (int(c[0] + share * (c[axis] - c[0])) for c in (x, y))
+            px, py = (int(c[0] + share * (c[1] - c[0])) for c in (x, y))
             assert mask[py - 2 : py + 3, px - 2 : px + 3].any()
+
+
+@pytest.mark.parametrize("grid", [Grid(3, 5, 7), Grid(40, 4, 9)], ids=str)
+@pytest.mark.parametrize("pitch", [-0.7, 0.0, 0.42, 1.3])
+def test_axes_and_labels_are_outside_of_the_box(grid, pitch):
+    """What has colour lies on or beyond the outline, wherever the camera is."""
+    corners = [[x, y, z] for x in (0, grid.nx) for y in (0, grid.ny) for z in (0, grid.nz)]
+    for yaw in np.linspace(-3, 3, 9):
+        look = RenderOptions(size=(400, 300), camera=Camera(yaw, pitch))
+        stage = np.asarray(render_page(page(grid, []), grid, RGB, look)).astype(int)
+        colored = np.argwhere(stage.max(axis=2) - stage.min(axis=2) > 90)[:, ::-1]
+        assert len(colored) > 100
+        points = np.stack(look.camera.project(corners, grid, look.size)[:2], axis=1)
+        ring = outline(points)
+        beyond = [
+            ((colored - one) @ (np.array([-1, 1]) * (other - one)[::-1])) / np.hypot(*(other - one))
+            for one, other in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+        ]
+        assert np.min(beyond, axis=0).max() < 4.5
+
+
+def outline(points):
+    """Return the convex hull of points in the plane, by gift wrapping; y grows downwards."""
+    ring = [points[np.argmin(points[:, 0])]]
+    while True:
+        best = next(p for p in points if np.hypot(*(p - ring[-1])) > 1e-6)
+        for p in points:
+            (ax, ay), (bx, by) = best - ring[-1], p - ring[-1]
+            turn = ax * by - ay * bx
+            if turn < -1e-9 or (abs(turn) < 1e-9 and np.hypot(bx, by) > np.hypot(ax, ay)):
+                best = p
+        if np.allclose(best, ring[0]):
+            return np.array(ring)
+        ring.append(best)
+
+
+def test_light_stands_before_the_floor():
+    grid = Grid(20, 20, 9)
+    array = page(grid, [(x, y, 0) for x in range(20) for y in range(20)], color=(255, 0, 0))
+    drawn = np.asarray(render_page(array, grid, RGB, RenderOptions(glow=False))).astype(int)
+    stage = np.asarray(render_page(page(grid, []), grid, RGB)).astype(int)
+    bright = (np.asarray(render_page(array, grid, RGB, BARE))[..., 0] > 200) & (stage[..., 2] > 60)
+    assert bright.sum() > 100, "lines are behind it"
+    assert (drawn - np.asarray(render_page(array, grid, RGB, BARE)))[bright].max() < 25
 
 
 def test_the_labels_are_inside_the_picture_from_everywhere():

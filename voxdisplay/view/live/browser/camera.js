@@ -2,7 +2,7 @@
 // -- Camera: the projection of voxdisplay/view/camera.py, then panned and magnified
 
 const slices = [[0, 65535], [0, 65535], [0, 65535]];
-const START = { yaw: -0.6, pitch: 0.42, distance: 2.6, fov: 0.72, zoom: 1, x: 0, y: 0 };
+const START = { yaw: -0.6, pitch: 0.42, distance: 2.6, zoom: 1, x: 0, y: 0, flat: false };
 const camera = { ...START };
 
 // The projection as numbers: right, up and depth are linear in x, y and z.
@@ -10,18 +10,23 @@ function projection([nx, ny, nz], width, height) {
   const L = Math.max(nx, ny, nz), minSide = Math.min(width, height);
   const cy = Math.cos(camera.yaw), sy = Math.sin(camera.yaw), cp = Math.cos(camera.pitch), sp = Math.sin(camera.pitch);
   const line = (a, b, c, d = 0) => [a / L, b / L, c / L, d - (a * nx + b * ny + c * nz) / 2 / L];
+  // Fitted is the cylinder that the box sweeps in a turn: see Camera.fitted.
+  const D = camera.distance, f = camera.flat ? 0 : 1, r = Math.hypot(nx, ny) / 2 / L, h = nz / 2 / L;
+  const rims = [-h, h].flatMap(z => [-r, r].map(a => (z * cp + a * sp) / (D + f * (a * cp - z * sp))));
+  const low = Math.min(...rims), high = Math.max(...rims), near = D - f * h * Math.abs(sp);
+  const wide = 2 * r / Math.sqrt(near ** 2 - (f * r * cp) ** 2), margins = 0.2 * minSide;
+  const k = camera.zoom * Math.min((width - margins) / wide, (height - margins) / (high - low));
   return {
-    L, right: line(cy, -sy, 0), up: line(sy * sp, cy * sp, cp),
-    depth: line(sy * cp, cy * cp, -sp, camera.distance),
-    k: camera.zoom * minSide / (2 * Math.tan(camera.fov / 2)),
-    x: width / 2 + camera.x * minSide, y: height / 2 + camera.y * minSide,
+    L, k, right: line(cy, -sy, 0), up: line(sy * sp, cy * sp, cp),
+    depth: line(f * sy * cp, f * cy * cp, -f * sp, D),
+    x: width / 2 + camera.x * minSide, y: height / 2 + camera.y * minSide + k * (low + high) / 2,
   };
 }
 
 function project([x, y, z], of) {
   const along = ([a, b, c, d]) => a * x + b * y + c * z + d;
-  const k = of.k / along(of.depth);
-  return [of.x + k * along(of.right), of.y - k * along(of.up), k / of.L];
+  const depth = along(of.depth), k = of.k / depth;
+  return [of.x + k * along(of.right), of.y - k * along(of.up), k / of.L, depth];
 }
 
 // Screen position and depth of each voxel: x, y, depth. Voxels outside the slices are at infinity.

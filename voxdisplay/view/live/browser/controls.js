@@ -7,9 +7,7 @@ function rotate(yaw, pitch) {
   schedule();
 }
 function zoom(factor) {
-  const near = camera.zoom > 1 || camera.distance / factor < 1;
-  if (near) camera.zoom = clamp(camera.zoom * factor, 1, 12);
-  if (!near || camera.zoom === 1) camera.distance = clamp(camera.distance / factor, 1, 10);
+  camera.zoom = clamp(camera.zoom * factor, 0.2, 12);
   schedule();
 }
 function pan(x, y) {

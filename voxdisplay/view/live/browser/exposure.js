@@ -41,9 +41,10 @@ class Raster {
   }
 }
 const sharp = new Raster(), scattered = new Raster();
-const word = (r, g, b) => 0xff000000 | b << 16 | g << 8 | r;
+const word = (r, g, b, a = 255) => a << 24 | b << 16 | g << 8 | r;
 
-// Map light to sRGB; return its averages over cells, for the bloom.
+// Map light to sRGB, as opaque as it is bright: it stands before the background. Return its averages
+// over cells, for the bloom.
 function toneMap(light, w, h, cell) {
   const out = sharp.words(w, h), gain = autoExposure(light, w, h), steps = TONES * gain / TOP;
   const cw = Math.ceil(w / cell), coarse = new Float32Array(3 * cw * Math.ceil(h / cell)), share = 1 / cell / cell;
@@ -52,10 +53,11 @@ function toneMap(light, w, h, cell) {
     for (let column = 0; column < w; column++, i++, o += 4) {
       const r = light[o], g = light[o + 1], b = light[o + 2];
       const most = r > g ? (r > b ? r : b) : (g > b ? g : b);
-      if (most < 1e-5) { out[i] = 0xff000000; continue; }
+      if (most < 1e-5) { out[i] = 0; continue; }
       const step = Math.min(TONES - 1, most * steps | 0), scale = TONE[step] * gain, white = WHITE[step];
       const red = SRGB[r * scale + white | 0], green = SRGB[g * scale + white | 0], blue = SRGB[b * scale + white | 0];
-      out[i] = word(red, green, blue);
+      const top = Math.max(red, green, blue), full = 255 / top;
+      out[i] = word(red * full, green * full, blue * full, top);
       const c = 3 * (base + (column / cell | 0));
       coarse[c] += red * share; coarse[c + 1] += green * share; coarse[c + 2] += blue * share;
     }

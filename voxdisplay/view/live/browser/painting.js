@@ -34,8 +34,9 @@ function paint() {
     light = renderer.add(frame, w, h, q, width, height);
   }
   const cell = Math.max(1, Math.round(8 * pixel / q)), cells = toneMap(light, w, h, cell);
-  context.globalCompositeOperation = "screen";
+  context.globalCompositeOperation = "source-over";
   sharp.onto(context, q);
+  context.globalCompositeOperation = "screen";
   if (show.glow && frame.n) {
     bloom(cells, 8 * pixel / q / cell);
     scattered.onto(context, q * cell);
