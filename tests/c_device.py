@@ -16,8 +16,12 @@ from typing import Any, Self
 import document
 
 FIRMWARE = Path(__file__).parents[1] / "firmware"
-FEATURES = ("line", "box", "dots", "oct", "diff", "arc", "palette", "read", "digest")
+FEATURES = (
+    *("line", "box", "dots", "oct", "diff", "arc", "palette", "read", "digest"),
+    *("slabs", "fade", "arc2"),
+)
 ONLY_INDEX8 = {"diff", "palette"}
+NOT_MONO1 = {"fade"}
 FORMATS = ("mono1", "index8", "rgb565", "rgb888")
 HELLO = bytes.fromhex("30 00 00 01 17 5A 00 00")
 FLAGS = ("-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow")
@@ -31,7 +35,8 @@ _directory = tempfile.TemporaryDirectory(prefix="firmware-")
 
 def all_features(pixel_format: str) -> frozenset[str]:
     """Names of all features that a format allows."""
-    return frozenset(FEATURES) - (ONLY_INDEX8 if pixel_format != "index8" else set())
+    unfit = ONLY_INDEX8 if pixel_format != "index8" else set()
+    return frozenset(FEATURES) - unfit - (NOT_MONO1 if pixel_format == "mono1" else set())
 
 
 def build(

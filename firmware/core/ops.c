@@ -66,6 +66,7 @@ static enum code set_pen(struct decoder *d)
     }
     d->at += PIXEL_BYTES;
     d->pen = value;
+    end_fade(d);
     return OK;
 }
 
@@ -81,6 +82,7 @@ static enum code move(struct decoder *d)
         return OUTSIDE;
     }
     d->cursor = index_of(xyz);
+    join_fade(d, false);
     return OK;
 }
 
@@ -136,13 +138,14 @@ static enum code draw_chain(struct decoder *d, uint32_t octant, bool from)
             return OUTSIDE;
         }
         d->cursor = index_of(xyz);
+        join_fade(d, false);
     } else {
         if (d->cursor == VXD_VOXELS) {
             return OUTSIDE;
         }
         cursor_xyz(d, xyz);
     }
-    write_voxel(d->cursor, d->pen);
+    write_first(d, d->cursor);
     for (uint32_t i = 0; i < n; i++) {
         /* bit 0: the main axis; bits 1 and 2: the axes after it, in a circle */
         uint32_t moves = (uint32_t)d->at[i / 4U] >> 2U * (i % 4U) << 1 | 1U;
@@ -162,23 +165,19 @@ static enum code draw_chain(struct decoder *d, uint32_t octant, bool from)
             }
             axis = axis == 2U ? 0 : axis + 1U;
         }
-        write_voxel(d->cursor, d->pen);
+        write_next(d, d->cursor);
     }
     d->at += (n + 3U) / 4U;
+    join_fade(d, true);
     return OK;
 }
 
-/* Decode a count (section 7.2), whose first five bits are in the op byte. */
-static enum code get_count(struct decoder *d, uint32_t bits, uint32_t *n)
+enum code get_leb128(struct decoder *d, uint32_t *value)
 {
-    uint32_t k = 0;
-    uint32_t byte = 0;
+    uint32_t byte;
 
-    *n = bits + 1U;
-    if (bits != 31U) {
-        return OK;
-    }
-    for (uint32_t shift = 0; shift <= 28U; shift += 7U) {
+    *value = 0;
+    for (uint32_t shift = 0;; shift += 7U) {
         if (d->at == d->end) {
             return TRUNCATED;
         }
@@ -186,16 +185,27 @@ static enum code get_count(struct decoder *d, uint32_t bits, uint32_t *n)
         if (shift == 28U && byte > 15U) {
             return COUNT;
         }
-        k |= (byte & 127U) << shift;
+        *value |= (byte & 127U) << shift;
         if (byte < 128U) {
-            if ((byte == 0 && shift != 0) || k > 0xFFFFFFFFU - 32U) {
-                return COUNT;
-            }
-            break;
+            return byte == 0 && shift != 0 ? COUNT : OK;
         }
     }
-    *n = 32U + k;
-    return OK;
+}
+
+/* Decode a count (section 7.2), whose first five bits are in the op byte. */
+static enum code get_count(struct decoder *d, uint32_t bits, uint32_t *n)
+{
+    enum code code = OK;
+
+    *n = bits + 1U;
+    if (bits == 31U) {
+        code = get_leb128(d, n);
+        *n += 32U;
+        if (code == OK && *n < 32U) {
+            code = COUNT;
+        }
+    }
+    return code;
 }
 
 /* SKIP, RUN, LIT and DIFF: n pixels in scan order. */
@@ -227,6 +237,10 @@ static enum code draw_run(struct decoder *d, uint32_t op)
     }
     if (n > VXD_VOXELS - d->cursor) {
         return OUTSIDE;
+    }
+    join_fade(d, false);
+    if (kind >= 6U) {
+        end_fade(d);
     }
     if (kind == 4U) {
         d->cursor += n;
@@ -280,6 +294,14 @@ static enum code apply_op(struct decoder *d)
         case 0x06:
             return set_colors(d);
 #endif
+#if VXD_FADE
+        case 0x08:
+            return set_fade(d);
+#if VXD_PALETTE
+        case 0x09:
+            return set_ramp(d);
+#endif
+#endif
         default:
             return OP;
         }
@@ -287,7 +309,17 @@ static enum code apply_op(struct decoder *d)
     case 2:
 #if VXD_ARC
         if (op == 0x58U) {
-            return draw_arc(d);
+            return draw_arc(d, false);
+        }
+#endif
+#if VXD_SLABS
+        if (op == 0x59U) {
+            return draw_slabs(d);
+        }
+#endif
+#if VXD_ARC2
+        if (op == 0x5AU) {
+            return draw_arc(d, true);
         }
 #endif
         return low > 23U ? OP : draw_chain(d, low, op >> 5 == 2U);
@@ -309,7 +341,7 @@ static enum code apply_op(struct decoder *d)
 
 enum code apply_ops(const uint8_t *payload, uint32_t length, uint32_t *offset)
 {
-    struct decoder d = {payload, payload + length, 0, FULL_PIXEL};
+    struct decoder d = {.at = payload, .end = payload + length, .pen = FULL_PIXEL};
     enum code code = OK;
 
     while (code == OK && d.at != d.end) {

@@ -1,13 +1,15 @@
-/* Range-coded chains: the decoder of the op ARC (section 7.7). */
+/* Range-coded chains: the decoder of the ops ARC and ARC2 (sections 7.7 and 7.10). */
 #include "internal.h"
 
-#if VXD_ARC
+#if VXD_CHAINS
 
-#define BEHIND 3U
 #define MAX_RUN 255U
+#define MAX_K 15U
+#define MAX_DELTA 30U
+#define MORTON (VXD_NX <= 1024 && VXD_NY <= 1024 && VXD_NZ <= 1024)
 
 enum { MORE = 0, JUMP = 1, INK = 2, NUMBER = 3, LONE = 18, TURN = 26, MAIN = 42, HISTORY = 74,
-       RUNS = 138, MODELS = 266 };
+       RUNS = 138, NEAR = 266, FADE = 267, DELTA = 268 };
 
 /* What one axis remembers of the steps before. */
 struct axis {
@@ -19,100 +21,17 @@ struct axis {
     int8_t way;
 };
 
-/* A model is its chance of a 0, of 4096, times 8, and how many bits it has seen, at most 6. */
-static struct {
-    uint32_t range;
-    uint32_t code;
-    uint32_t behind; /* bytes read behind the payload; above BEHIND the op is truncated */
-    const uint8_t *next_byte;
-    const uint8_t *payload_end;
-    struct axis axes[3];
-    uint16_t model[MODELS];
-} arc;
+static struct axis axes[3];
 
-static void shift_in(void)
-{
-    uint32_t byte = 0;
-
-    if (arc.next_byte != arc.payload_end) {
-        byte = *arc.next_byte++;
-    } else {
-        arc.behind++; /* above BEHIND the op is truncated */
-    }
-    arc.code = arc.code << 8 | byte;
-}
-
-static uint32_t split(uint32_t bound)
-{
-    uint32_t bit = arc.code >= bound;
-
-    if (bit) {
-        arc.code -= bound;
-        arc.range -= bound;
-    } else {
-        arc.range = bound;
-    }
-    while (arc.range < (uint32_t)1 << 24) {
-        arc.range <<= 8;
-        shift_in();
-    }
-    return bit;
-}
-
-static void learn(uint32_t i, uint32_t bit)
-{
-    uint32_t p = arc.model[i] >> 3;
-    uint32_t seen = arc.model[i] & 7U;
-    uint32_t shift = 1U + (seen >> 1);
-
-    p = bit ? p - (p >> shift) : p + ((4096U - p) >> shift);
-    arc.model[i] = (uint16_t)(p << 3 | (seen < 6U ? seen + 1U : seen));
-}
-
-static uint32_t bit_of_two(uint32_t i, uint32_t j)
-{
-    uint32_t bit = split((arc.range >> 13) * ((uint32_t)(arc.model[i] >> 3) + (arc.model[j] >> 3)));
-
-    learn(i, bit);
-    if (j != i) {
-        learn(j, bit);
-    }
-    return bit;
-}
-
-static uint32_t bit_of(uint32_t i)
-{
-    return bit_of_two(i, i);
-}
-
-static uint32_t plain(uint32_t bits)
-{
-    uint32_t value = 0;
-
-    for (; bits != 0; bits--) {
-        value = value << 1 | split((arc.range >> 13) * 4096U);
-    }
-    return value;
-}
-
-static uint32_t number(void)
+/* Decode a number whose length is in unary, by models from `model` on, at most `most`. */
+static uint32_t number(uint32_t model, uint32_t most)
 {
     uint32_t k = 0;
 
-    while (k < 15U && bit_of(NUMBER + k)) {
+    while (k < most && bit_of(model + k)) {
         k++;
     }
     return (1U << k) - 1U + plain(k);
-}
-
-static uint32_t bits_of(uint32_t m)
-{
-    uint32_t bits = 0;
-
-    for (; m != 0; m >>= 1) {
-        bits++;
-    }
-    return bits;
 }
 
 static uint32_t least(uint32_t a, uint32_t b)
@@ -177,96 +96,189 @@ static void step(uint32_t xyz[3])
     uint32_t moved[3];
 
     for (uint32_t i = 1; i < 3U; i++) {
-        if (streak(&arc.axes[i]) > streak(&arc.axes[m])) {
+        if (streak(&axes[i]) > streak(&axes[m])) {
             m = i;
         }
     }
     b = m == 2U ? 0 : m + 1U;
     c = b == 2U ? 0 : b + 1U;
     {
-        uint32_t longer = streak(&arc.axes[b]);
+        uint32_t longer = streak(&axes[b]);
 
-        if (streak(&arc.axes[c]) > longer) {
-            longer = streak(&arc.axes[c]);
+        if (streak(&axes[c]) > longer) {
+            longer = streak(&axes[c]);
         }
-        moved[m] = bit_of(MAIN + 8U * least(streak(&arc.axes[m]), 3U) + least(longer, 7U));
+        moved[m] = bit_of(MAIN + 8U * least(streak(&axes[m]), 3U) + least(longer, 7U));
     }
     if (moved[m]) {
-        turn_and_go(&arc.axes[m], &xyz[m]);
-        moved[b] = moves_beside(&arc.axes[b]);
+        turn_and_go(&axes[m], &xyz[m]);
+        moved[b] = moves_beside(&axes[b]);
     } else {
-        moved[b] = bit_of(LONE + least(streak(&arc.axes[b]), 7U));
+        moved[b] = bit_of(LONE + least(streak(&axes[b]), 7U));
     }
     if (moved[b]) {
-        turn_and_go(&arc.axes[b], &xyz[b]);
+        turn_and_go(&axes[b], &xyz[b]);
     }
     if (moved[m]) {
-        moved[c] = moves_beside(&arc.axes[c]);
+        moved[c] = moves_beside(&axes[c]);
     } else {
-        moved[c] = moved[b] ? bit_of(LONE + least(streak(&arc.axes[c]), 7U)) : 1U;
+        moved[c] = moved[b] ? bit_of(LONE + least(streak(&axes[c]), 7U)) : 1U;
     }
     if (moved[c]) {
-        turn_and_go(&arc.axes[c], &xyz[c]);
+        turn_and_go(&axes[c], &xyz[c]);
     }
     for (uint32_t i = 0; i < 3U; i++) {
-        record(&arc.axes[i], moved[i]);
+        record(&axes[i], moved[i]);
     }
 }
 
-enum code draw_arc(struct decoder *d)
+#if VXD_ARC2
+static uint32_t morton_of(const uint32_t xyz[3])
 {
+    uint32_t morton = 0;
+
+    for (uint32_t bit = 0; bit < 30U; bit++) {
+        morton |= (xyz[bit % 3U] >> bit / 3U & 1U) << bit;
+    }
+    return morton;
+}
+
+static void voxel_of(uint32_t morton, uint32_t xyz[3])
+{
+    xyz[0] = xyz[1] = xyz[2] = 0;
+    for (uint32_t bit = 0; bit < 30U; bit++) {
+        xyz[bit % 3U] |= (morton >> bit & 1U) << bit / 3U;
+    }
+}
+#endif
+
+static void plain_start(uint32_t xyz[3])
+{
+    xyz[0] = plain(bits_of(VXD_NX - 1U));
+    xyz[1] = plain(bits_of(VXD_NY - 1U));
+    xyz[2] = plain(bits_of(VXD_NZ - 1U));
+}
+
+#if VXD_ARC2
+/* Decode the start of a piece of ARC2, whose `morton` is that of the start before. */
+static enum code near_start(bool first, uint32_t *morton, uint32_t xyz[3])
+{
+    if (!MORTON || first || !bit_of(NEAR)) {
+        plain_start(xyz);
+        *morton = morton_of(xyz);
+        return OK;
+    }
+    *morton += number(DELTA, MAX_DELTA);
+    if (*morton >> 30) {
+        return OUTSIDE;
+    }
+    voxel_of(*morton, xyz);
+    return OK;
+}
+
+#if VXD_FADES
+static enum code arc_fade(struct decoder *d)
+{
+    static uint8_t colors[16U * PEN_COLOR_BYTES];
+    const uint32_t k = plain(4) + 1U;
+    const uint32_t last = number(NUMBER, MAX_K);
+    const uint32_t place = number(NUMBER, MAX_K);
+
+    if (place > last) {
+        return COUNT;
+    }
+    for (uint32_t i = 0; i < PEN_COLOR_BYTES * k; i++) {
+        colors[i] = (uint8_t)plain(8);
+    }
+    begin_fade(d, colors, k, last + 1U, place);
+    return OK;
+}
+#endif
+#endif
+
+/* Decode the pen of a piece. */
+static enum code arc_pen(struct decoder *d, bool second)
+{
+#if VXD_ARC2 && VXD_FADES
+    if (second && bit_of(FADE)) {
+        return arc_fade(d);
+    }
+#else
+    (void)second;
+#endif
+    d->pen = plain(VXD_FORMAT == VXD_MONO1 ? 1U : 8U * PIXEL_BYTES);
+    end_fade(d);
+    return OK;
+}
+
+/* Write the pen to a voxel of a piece: ARC2 counts it in a fade, ARC does not. */
+static bool write_piece(struct decoder *d, const uint32_t xyz[3], bool second)
+{
+    if (!on_grid(xyz)) {
+        return false;
+    }
+    if (second) {
+        write_next(d, index_of(xyz));
+    } else {
+        write_voxel(index_of(xyz), d->pen);
+    }
+    return true;
+}
+
+enum code draw_arc(struct decoder *d, bool second)
+{
+    static const uint8_t shifts[7] = {1, 1, 2, 2, 3, 3, 4};
     uint32_t xyz[3] = {0, 0, 0};
     bool first = true;
+#if VXD_ARC2
+    uint32_t morton = 0;
+#endif
 
-    for (uint32_t i = 0; i < MODELS; i++) {
-        arc.model[i] = 2048U << 3;
-    }
-    arc.range = (uint32_t)1 << 24;
-    arc.code = 0;
-    arc.behind = 0;
-    arc.next_byte = d->at;
-    arc.payload_end = d->end;
-    d->at = d->end;
-    shift_in();
-    shift_in();
-    shift_in();
+    begin_bits(d, RANGE_MODELS_OF_CHAINS, shifts);
     while (bit_of(MORE)) {
-        bool jump = first || bit_of(JUMP);
+        const bool jump = first || bit_of(JUMP);
+        enum code code = OK;
         uint32_t n;
 
-        first = false;
         if (bit_of(INK)) {
-            d->pen = plain(VXD_FORMAT == VXD_MONO1 ? 1U : 8U * PIXEL_BYTES);
+            code = arc_pen(d, second);
         }
-        if (jump) {
-            xyz[0] = plain(bits_of(VXD_NX - 1U));
-            xyz[1] = plain(bits_of(VXD_NY - 1U));
-            xyz[2] = plain(bits_of(VXD_NZ - 1U));
-            for (uint32_t i = 0; i < 3U; i++) {
-                arc.axes[i] = (struct axis){0, 0, 0, 0, 0, 0};
+        if (code == OK && jump) {
+#if VXD_ARC2
+            if (second) {
+                code = near_start(first, &morton, xyz);
+            } else
+#endif
+            {
+                plain_start(xyz);
             }
+            memset(axes, 0, sizeof axes);
         }
-        n = number();
-        if (arc.behind > BEHIND) {
+        first = false;
+        if (bits_truncated()) {
             return TRUNCATED;
         }
-        if (jump && !write_at(xyz[0], xyz[1], xyz[2], d->pen)) {
+        if (code != OK) {
+            return code;
+        }
+        n = number(NUMBER, MAX_K);
+        if (bits_truncated()) {
+            return TRUNCATED;
+        }
+        if (jump && !write_piece(d, xyz, second)) {
             return OUTSIDE;
         }
         for (; n != 0; n--) {
             step(xyz);
-            if (arc.behind > BEHIND) {
+            if (bits_truncated()) {
                 return TRUNCATED;
             }
-            if (!write_at(xyz[0], xyz[1], xyz[2], d->pen)) {
+            if (!write_piece(d, xyz, second)) {
                 return OUTSIDE;
             }
         }
     }
-    if (arc.behind > BEHIND) {
-        return TRUNCATED;
-    }
-    return arc.behind == BEHIND ? OK : PADDING;
+    return end_bits();
 }
 
 #endif

@@ -98,14 +98,14 @@ static void send_info(uint32_t of_session)
 {
     /* The fields of section 5 that the configuration gives; pages: 2. */
     static const uint8_t fields[32] = {
-        INFO << 4, 0, 0, 1, 0, 0, 0, 0, 0, VXD_FORMAT,
+        INFO << 4, 0, 0, 1, 0, 0, 0, 0, VXD_SLABS | VXD_FADE | VXD_ARC2, VXD_FORMAT,
         VXD_NX & 255, VXD_NX >> 8, VXD_NY & 255, VXD_NY >> 8, VXD_NZ & 255, VXD_NZ >> 8, 2, 0,
         VXD_MAX_PAYLOAD & 255, VXD_MAX_PAYLOAD >> 8,
         VXD_RING & 255, VXD_RING >> 8 & 255, (uint32_t)VXD_RING >> 16 & 255, (uint32_t)VXD_RING >> 24,
         0, 0, 0, 0,
         VXD_LINE | VXD_BOX << 1 | VXD_DOTS << 2 | VXD_OCT << 3 | VXD_DIFF << 4 | VXD_ARC << 5 |
             VXD_PALETTE << 6 | VXD_READ << 7,
-        VXD_DIGEST, 0, 0};
+        VXD_DIGEST | VXD_SLABS << 1 | VXD_FADE << 2 | VXD_ARC2 << 3, 0, 0};
     uint32_t at;
 
     memcpy(packet, fields, sizeof fields);

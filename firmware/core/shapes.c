@@ -1,7 +1,7 @@
 /* The ops of the features LINE, BOX, DOTS and OCT (sections 7.3 and 7.4). */
 #include "internal.h"
 
-#if VXD_DOTS || VXD_OCT || VXD_ARC
+#if VXD_OCT || VXD_SLABS
 bool write_at(uint32_t x, uint32_t y, uint32_t z, uint32_t pen)
 {
     const uint32_t xyz[3] = {x, y, z};
@@ -57,8 +57,13 @@ enum code draw_line(struct decoder *d)
     /* rest is (2 k d + L) mod 2 L on each axis; p has the quotient. */
     rest[0] = rest[1] = rest[2] = length;
     for (int32_t k = 0;; k++) {
-        write_voxel(index_of(p), d->pen);
+        if (k == 0) {
+            write_first(d, index_of(p));
+        } else {
+            write_next(d, index_of(p));
+        }
         if (k == length) {
+            join_fade(d, true);
             return OK;
         }
         for (uint32_t axis = 0; axis < 3U; axis++) {
@@ -85,9 +90,10 @@ enum code draw_box(struct decoder *d)
     if (code != OK) {
         return code;
     }
+    join_fade(d, false);
     for (uint32_t axis = 0; axis < 3U; axis++) {
         if (p[axis] > q[axis]) {
-            uint32_t low = q[axis];
+            const uint32_t low = q[axis];
 
             q[axis] = p[axis];
             p[axis] = low;
@@ -122,11 +128,13 @@ enum code draw_dots(struct decoder *d)
         uint32_t xyz[3];
 
         get_xyz(d, xyz);
-        if (!write_at(xyz[0], xyz[1], xyz[2], d->pen)) {
+        if (!on_grid(xyz)) {
             return OUTSIDE;
         }
         d->cursor = index_of(xyz);
+        write_next(d, d->cursor);
     }
+    join_fade(d, true);
     return OK;
 }
 #endif

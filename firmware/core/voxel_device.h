@@ -39,7 +39,7 @@
 #define VXD_RING 1024
 #endif
 
-/* Features: 1 with, 0 without. DIFF and PALETTE need VXD_INDEX8. */
+/* Features: 1 with, 0 without. DIFF and PALETTE need VXD_INDEX8, FADE anything but VXD_MONO1. */
 #ifndef VXD_LINE
 #define VXD_LINE 1
 #endif
@@ -57,6 +57,15 @@
 #endif
 #ifndef VXD_ARC
 #define VXD_ARC 1
+#endif
+#ifndef VXD_ARC2
+#define VXD_ARC2 1
+#endif
+#ifndef VXD_SLABS
+#define VXD_SLABS 1
+#endif
+#ifndef VXD_FADE
+#define VXD_FADE (VXD_FORMAT != VXD_MONO1)
 #endif
 #ifndef VXD_PALETTE
 #define VXD_PALETTE (VXD_FORMAT == VXD_INDEX8)

@@ -95,8 +95,8 @@ class Packets:
         return (bytes((op + n - 1,)) if n < 32 else bytes((op + 31,)) + leb128(n - 32)), n
 
     def op(self) -> bytes:
-        makers = (self.simple, self.chain, self.run, self.run, self.last)
-        return self.random.choice(makers)()
+        makers = [self.simple, self.chain, self.run, self.run, self.last]
+        return self.random.choice(makers if self.mono else [*makers, self.fade])()
 
     def simple(self) -> bytes:
         r = self.random
@@ -128,11 +128,22 @@ class Packets:
         bits = {0xC0: 1, 0xE0: 4}.get(kind, 0) * n
         return op + r.getrandbits(bits).to_bytes((bits + 7) // 8, "little")
 
+    def fade(self) -> bytes:
+        """FADE or RAMP, and a chain."""
+        r = self.random
+        k = r.randrange(1, 5)
+        if r.randrange(2):
+            colors = r.randbytes(3 * k)
+            return bytes((9, r.randrange(250), r.randrange(7), k - 1)) + colors
+        n = r.choice((1, 2, 5, 300))
+        colors = r.randbytes((1 if self.size == 1 else 3) * k)
+        return bytes((8, k - 1)) + leb128(n - 1) + leb128(r.randrange(n)) + colors + self.chain()
+
     def last(self) -> bytes:
-        """OCT or ARC, which seldom end well here."""
+        """OCT, or a range-coded op, which seldom end well here."""
         r = self.random
         if r.randrange(2):
-            return b"\x58" + r.randbytes(r.randrange(12))
+            return bytes((r.randrange(0x58, 0x5B),)) + r.randbytes(r.randrange(12))
         place = bytes(6 if self.wide else 3)
         return bytes((0x60 + r.randrange(3),)) + place + r.randbytes(r.randrange(4))
 

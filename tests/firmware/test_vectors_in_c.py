@@ -13,14 +13,8 @@ LITERALS = document.literals()
 
 
 def each(kind: str) -> pytest.MarkDecorator:
-    vectors = [vector for vector in document.vectors(kind) if of_version_1_0(vector)]
+    vectors = list(document.vectors(kind))
     return pytest.mark.parametrize("vector", vectors, ids=str)
-
-
-def of_version_1_0(vector: document.Vector) -> bool:
-    """Return whether a device has no feature of a later version: the reference device has none."""
-    wanted = dict(vector.lines).get("features", "").split("|")
-    return all(LITERALS[f"FEATURE_{name}"] < 9 for name in wanted if name)
 
 
 @each("ops")
