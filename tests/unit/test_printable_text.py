@@ -25,7 +25,7 @@ from voxdisplay.transport import diagnosis, usb
 from voxdisplay.transport.discovery import FoundPort, serial_ports
 from voxdisplay.view.html_export import save_html
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.view.terminal import TerminalView
 from voxdisplay.wire.packet import Error
 

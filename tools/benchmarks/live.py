@@ -26,9 +26,9 @@ import voxdisplay as vd
 from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.tap import Tap
-from voxdisplay.view.live.message import Snapshot, encode
 from voxdisplay.view.live.page import page_html
 from voxdisplay.view.live.server import open_server
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
@@ -182,7 +182,7 @@ def _watching(tap: Tap) -> Iterator[list[int]]:
 _WATCHER = """
 import sys
 from voxdisplay.errors import TransportClosed
-from voxdisplay.view.live.message import encode
+from voxdisplay.view.live.snapshot_message import encode
 from voxdisplay.view.live.sources import TapSource
 host, port = sys.argv[1].split(":")
 source, seen = TapSource(host, int(port), ""), 0

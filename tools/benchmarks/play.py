@@ -29,7 +29,7 @@ import voxdisplay as vd
 from benchmarks.pictures import SEED
 from voxdisplay.display.plan import Line, Receiver
 from voxdisplay.display.show_plan import plan_show
-from voxdisplay.shows.binding import Playable, bind_timeline
+from voxdisplay.shows.playable import Playable, bind_schedule
 from voxdisplay.shows.record import record
 from voxdisplay.shows.recording_writer import RecordingFormat, drawing_features
 from voxdisplay.shows.rendering import Rendering
@@ -272,7 +272,7 @@ def _port(baud: int) -> Iterator[str]:
 
 def _carried(show: Any, line: Line) -> float:
     """Return the frames per second that a line carries of a show."""
-    source = bind_timeline(show, vd.Frame(SIZE), loop=False).segments[-1].show
+    source = bind_schedule(show, vd.Frame(SIZE), loop=False).segments[-1].show
     costs = plan_show(Stretch(source), (line,), Receiver(refresh_hz=REFRESH_HZ))
     bytes_of_all = costs.mean_bytes[0]
     return min(line.bytes_per_s / max(bytes_of_all, costs.worst_plans[0].answer_bytes), REFRESH_HZ)

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.display.player import Player
     from voxdisplay.frame import Fit
-    from voxdisplay.shows.binding import Playable
     from voxdisplay.shows.play_report import PlayReport
+    from voxdisplay.shows.playable import Playable
 
 _PROGRESS_S: Final = 0.25
 _SEEK_S: Final = 5.0
@@ -231,7 +231,7 @@ def _progress() -> Iterator[Callable[[Player], None]]:
         passed_s, shown = now - before[0], player.shown - before[1]
         before = now, player.shown
         state = "paused" if player.paused else f"{shown / passed_s:4.1f} shown"
-        total_s = player.timeline.duration_s
+        total_s = player.schedule.duration_s
         of = "" if total_s == float("inf") else f" of {total_s:.1f}"
         stream.write(f"\r{player.position_s:7.1f}{of} s   {player.asked_fps:g} fps asked, {state}"
                      "\x1b[K")  # fmt: skip

@@ -139,8 +139,8 @@ def _serve(
 def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
     from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
-    from voxdisplay.view.live.message import Snapshot  # noqa: PLC0415 - an extra
     from voxdisplay.view.live.moving_source import MovingSource  # noqa: PLC0415
+    from voxdisplay.view.live.snapshot_message import Snapshot  # noqa: PLC0415 - an extra
     from voxdisplay.view.live.sources import StaticSource  # noqa: PLC0415
 
     found, title = _scene_show(scene, size), Path(scene).name

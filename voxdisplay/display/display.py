@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from voxdisplay.display.player import Late, Pacing, Player
     from voxdisplay.frame import Fit
     from voxdisplay.frame.output_transform import OutputTransform
-    from voxdisplay.shows.binding import Playable
     from voxdisplay.shows.play_report import PlayReport
+    from voxdisplay.shows.playable import Playable
 
 
 class Display(PacedDisplay):

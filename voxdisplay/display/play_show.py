@@ -11,8 +11,8 @@ from voxdisplay.argument_checks import choice, duration, flag, function, positiv
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.player import Late, Pacing, Player, Turn
 from voxdisplay.frame import FITS, Fit, Frame
-from voxdisplay.shows.binding import Playable, bind_timeline
 from voxdisplay.shows.play_report import PlayReport
+from voxdisplay.shows.playable import Playable, bind_schedule
 from voxdisplay.shows.preparing import FrameSource
 
 
@@ -57,20 +57,20 @@ def play_show(
     function("observer", observer)
     speed = positive("speed", speed)
     start_s = duration("start", start)
-    timeline = bind_timeline(
+    schedule = bind_schedule(
         show,
         blank,
         fit=fit,
         loop=None if loop is None else flag("loop", loop),
         until_s=None if until is None else positive("until", until),
     )
-    if timeline.slot_at(start_s) is None:
-        raise ValueError(f"start: the show ends at {timeline.duration_s:g} s")
-    shows = [segment.show for segment in timeline.segments]
+    if schedule.slot_at(start_s) is None:
+        raise ValueError(f"start: the show ends at {schedule.duration_s:g} s")
+    shows = [segment.show for segment in schedule.segments]
     source = FrameSource(shows, check=check_frame, clock=clock, note=note)
     try:
         player = Player(
-            turn, clock, timeline, source, start_s=start_s, speed=speed, pacing=pacing, late=late,
+            turn, clock, schedule, source, start_s=start_s, speed=speed, pacing=pacing, late=late,
             observer=observer,
         )  # fmt: skip
         return player.run()

@@ -1,4 +1,4 @@
-"""`Player`: plays a timeline of shows on an open display.
+"""`Player`: plays a schedule of shows on an open display.
 
 Each iteration of its loop starts the frame whose turn it is, has the next one prepared, and turns
 the link while it waits. Must not know how frames are made or encoded.
@@ -17,10 +17,10 @@ from voxdisplay.display.connection import Clock
 from voxdisplay.display.display_operations import DisplayOperations
 from voxdisplay.display.frame_queue import Picture
 from voxdisplay.display.tick_clock import TickClock
+from voxdisplay.shows.frame_schedule import FrameSchedule, Slot
 from voxdisplay.shows.play_clock import PlayClock
 from voxdisplay.shows.play_report import PlayMeter, PlayReport
 from voxdisplay.shows.preparing import FrameSource
-from voxdisplay.shows.timeline import Slot, Timeline
 
 Turn: TypeAlias = Callable[[], AbstractContextManager[DisplayOperations]]
 Pacing: TypeAlias = Literal["device", "host"]
@@ -41,7 +41,7 @@ class _Swap:
 
 
 class Player:
-    """One playing of a timeline.
+    """One playing of a schedule.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ class Player:
         Returns a context in which the display's operations may be used.
     clock : callable
         Returns seconds, on any monotonic clock.
-    timeline : Timeline
+    schedule : FrameSchedule
     source : FrameSource
         Prepares its frames.
     start_s, speed : float
-        Where it begins, and seconds of the timeline per second.
+        Where it begins, and seconds of the schedule per second.
     pacing : {"device", "host"}
         Whether each refresh tick of the device gets a frame, or each frame its time.
     late : {"drop", "delay"}
@@ -64,7 +64,7 @@ class Player:
 
     Attributes
     ----------
-    timeline : Timeline
+    schedule : FrameSchedule
     shown : int
         Frames displayed so far.
 
@@ -74,7 +74,7 @@ class Player:
         self,
         turn: Turn,
         clock: Clock,
-        timeline: Timeline,
+        schedule: FrameSchedule,
         source: FrameSource,
         *,
         start_s: float = 0.0,
@@ -83,7 +83,7 @@ class Player:
         late: Late = "drop",
         observer: Callable[[Player], None] | None = None,
     ) -> None:
-        self.timeline = timeline
+        self.schedule = schedule
         self._turn, self._clock, self._source = turn, clock, source
         self._delays = late == "delay"
         self._observer = observer
@@ -109,8 +109,8 @@ class Player:
 
     @property
     def position_s(self) -> float:
-        """Position in seconds of the timeline."""
-        return min(self._play.position(self._clock()), self.timeline.duration_s)
+        """Position in seconds of the schedule."""
+        return min(self._play.position(self._clock()), self.schedule.duration_s)
 
     @property
     def shown(self) -> int:
@@ -120,7 +120,7 @@ class Player:
     @property
     def asked_fps(self) -> float:
         """Frames per second that are due where it is."""
-        slot = self._last or self.timeline.slot_at(self._play.position(self._clock()))
+        slot = self._last or self.schedule.slot_at(self._play.position(self._clock()))
         return 1 / self._period_s(slot) if slot else 0.0
 
     def pause(self) -> None:
@@ -138,9 +138,9 @@ class Player:
         """Go forward, or back, by some seconds; while it is paused, the frame there is shown."""
         now = self._clock()
         position_s = max(0.0, self._play.position(now) + seconds)
-        last = self.timeline.frames
-        if position_s >= self.timeline.duration_s and last:
-            end = self.timeline.slot(last - 1)
+        last = self.schedule.frames
+        if position_s >= self.schedule.duration_s and last:
+            end = self.schedule.slot(last - 1)
             position_s = end.begins_s if end else 0.0
         self._play.seek(position_s, now)
         self._restart()
@@ -178,7 +178,7 @@ class Player:
         with self._turn() as operations:
             queue = operations.queue
             queue.on_shown = self._note_shown
-            if first := self.timeline.slot_at(self._tick_position_s):
+            if first := self.schedule.slot_at(self._tick_position_s):
                 self._request(operations, first)
         try:
             return self._run()
@@ -281,16 +281,16 @@ class Player:
     def _due(self, position_s: float) -> Slot | None:
         """Return the frame that is due at a position; None if the last one has had its time."""
         if self._delays and self._last:
-            following = self.timeline.slot(self._last.ordinal + 1)
+            following = self.schedule.slot(self._last.ordinal + 1)
             return (
                 following
                 if following and following.begins_s <= position_s
                 else (self._last if position_s < self._last.ends_s else following)
             )
-        if due := self.timeline.slot_at(position_s):
+        if due := self.schedule.slot_at(position_s):
             return due
-        frames = self.timeline.frames
-        end = self.timeline.slot(frames - 1) if frames else None
+        frames = self.schedule.frames
+        end = self.schedule.slot(frames - 1) if frames else None
         return None if self._last == end else end  # the last one is never left out
 
     def _request_ahead(self, operations: DisplayOperations, now: float, due: Slot) -> None:
@@ -300,9 +300,9 @@ class Player:
         while len(pending) < self._source.prefetch:
             ordinal = max(pending, default=after) + 1
             ready_s = self._play.position(now + (len(pending) + 1) * self._source.estimate_s)
-            slot = self.timeline.slot_at(ready_s)
+            slot = self.schedule.slot_at(ready_s)
             if slot is None or slot.ordinal < ordinal or self._delays or not self._last:
-                slot = self.timeline.slot(ordinal)
+                slot = self.schedule.slot(ordinal)
             if slot is None:
                 return
             self._request(operations, slot)
@@ -344,6 +344,6 @@ class Player:
             if self._last is not None:
                 ticks = math.ceil((self._last.ends_s - position_s) / step_s - 1e-6)
                 position_s += max(0, ticks) * step_s
-            if slot := self.timeline.slot_at(position_s + 1e-9):
+            if slot := self.schedule.slot_at(position_s + 1e-9):
                 self._request(operations, slot)
                 position_s = max(slot.ends_s, position_s + step_s)

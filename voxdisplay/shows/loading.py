@@ -13,8 +13,8 @@ from voxdisplay.errors import RecordingError, SceneError
 from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.model import Scene
 from voxdisplay.scene.reader import load_scene
-from voxdisplay.shows.binding import Playable
 from voxdisplay.shows.fixed_format_show import FixedFormatShow
+from voxdisplay.shows.playable import Playable
 from voxdisplay.shows.playlist import Playlist, PlaylistEntry, PlaylistFile, check_playlist
 from voxdisplay.shows.recording import Recording
 from voxdisplay.shows.show_files import SHOW_SUFFIXES, open_show

@@ -1,4 +1,4 @@
-"""Position of a player on its timeline: speed, pause and seek.
+"""Position of a player on its schedule: speed, pause and seek.
 
 Must not know a clock: the time is an argument.
 """
@@ -16,9 +16,9 @@ class PlayClock:
     now : float
         Seconds on any monotonic clock.
     position_s : float
-        Where it begins, in seconds of the timeline.
+        Where it begins, in seconds of the schedule.
     speed : float
-        Seconds of the timeline per second.
+        Seconds of the schedule per second.
 
     """
 

@@ -1,4 +1,4 @@
-"""Playlists: entries with their parts, speeds and fades, and the timeline that they make.
+"""Playlists: entries with their parts, speeds and fades, and the schedule that they make.
 
 Must not read files or know displays.
 """
@@ -11,10 +11,10 @@ from typing import Any, Final
 
 from voxdisplay.errors import SceneError, did_you_mean
 from voxdisplay.frame import Drawable, Fit, Frame
-from voxdisplay.shows.binding import bind_show
 from voxdisplay.shows.fade import FadedShow
+from voxdisplay.shows.frame_schedule import FrameSchedule, Segment
+from voxdisplay.shows.playable import bind_show
 from voxdisplay.shows.show import Show, ShowSource
-from voxdisplay.shows.timeline import Segment, Timeline
 
 _STILL_S: Final = 5.0
 _ENTRY_KEYS: Final = ("show", "repeat", "speed", "fade", "from", "until")
@@ -84,10 +84,10 @@ class Playlist:
     shuffle: bool = False
     notes: tuple[str, ...] = ()
 
-    def timeline_on(
+    def schedule_on(
         self, blank: Frame, *, fit: Fit = "contain", until_s: float | None = None
-    ) -> Timeline:
-        """See `TimelineSource.timeline_on`."""
+    ) -> FrameSchedule:
+        """See `ScheduleSource.schedule_on`."""
         if until_s is not None:
             raise ValueError("until: a playlist ends its entries where its file says")
         segments = []
@@ -102,7 +102,7 @@ class Playlist:
                 faded = FadedShow(show, item.start_s, segment.end_s, item.fade_s * item.speed)
                 segment = Segment(faded, item.start_s, until_s, item.speed)
             segments += [segment] * item.repeat
-        return Timeline(segments, self.repeat, shuffle=self.shuffle)
+        return FrameSchedule(segments, self.repeat, shuffle=self.shuffle)
 
 
 def check_playlist(value: Any, file: str) -> PlaylistFile:

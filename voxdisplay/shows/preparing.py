@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import Final, TypeAlias
 
 from voxdisplay.frame import Frame
+from voxdisplay.shows.frame_schedule import Slot
 from voxdisplay.shows.show import EncodedFrame, EncodedShow, Show
-from voxdisplay.shows.timeline import Slot
 from voxdisplay.shows.worker_process import Encoding, WorkerProcess
 
 Picture: TypeAlias = Frame | EncodedFrame
@@ -30,7 +30,7 @@ class FrameSource:
     Parameters
     ----------
     shows : sequence of Show
-        By the segments of a timeline.
+        By the segments of a schedule.
     check : callable
         Returns a frame for how the display stands; raises if it is not of the display's kind.
     clock : callable

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from voxdisplay.frame import Fit, Frame
-from voxdisplay.shows.binding import Playable, bind_timeline
-from voxdisplay.shows.timeline import Timeline
+from voxdisplay.shows.frame_schedule import FrameSchedule
+from voxdisplay.shows.playable import Playable, bind_schedule
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +25,13 @@ class ShowSequence:
 
     shows: tuple[Playable, ...]
 
-    def timeline_on(
+    def schedule_on(
         self, blank: Frame, *, fit: Fit = "contain", until_s: float | None = None
-    ) -> Timeline:
-        """See `TimelineSource.timeline_on`."""
-        timelines = [
-            bind_timeline(show, blank, fit=fit, loop=False, until_s=until_s) for show in self.shows
+    ) -> FrameSchedule:
+        """See `ScheduleSource.schedule_on`."""
+        schedules = [
+            bind_schedule(show, blank, fit=fit, loop=False, until_s=until_s) for show in self.shows
         ]
-        return Timeline(
-            [each for timeline in timelines for each in timeline.segments * timeline.turns]
+        return FrameSchedule(
+            [each for schedule in schedules for each in schedule.segments * schedule.turns]
         )

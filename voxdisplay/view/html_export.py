@@ -1,7 +1,8 @@
 """Export of pages to one HTML file that needs no server: it can be turned and played.
 
 It is the page of the live view with embedded frames, each a message of
-`voxdisplay.view.live.message`. It loads nothing from elsewhere, and its policy forbids that.
+`voxdisplay.view.live.snapshot_message`. It loads nothing from elsewhere, and its policy forbids
+that.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.atomic_write import atomic_write
-from voxdisplay.view.live.message import Snapshot, encode
 from voxdisplay.view.live.page import content_security_policy, page_html
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 
 _LEVEL = 9
 _HEAD = '<meta charset="utf-8">\n'

@@ -1,4 +1,4 @@
-"""Playlists: their files, what is wrong with them, and the timelines that they make."""
+"""Playlists: their files, what is wrong with them, and the schedules that they make."""
 
 import json
 import re
@@ -33,8 +33,8 @@ def write(tmp_path):
     return write
 
 
-def frames_of(timeline):
-    slots = [timeline.slot(ordinal) for ordinal in range(timeline.turn_frames)]
+def frames_of(schedule):
+    slots = [schedule.slot(ordinal) for ordinal in range(schedule.turn_frames)]
     return [(slot.segment, slot.number, round(slot.begins_s, 6)) for slot in slots]
 
 
@@ -53,25 +53,25 @@ def test_entries_are_played_with_their_parts_speeds_and_repeats(write):
     )
     playlist = vd.load_show(path)
     assert isinstance(playlist, Playlist)
-    timeline = playlist.timeline_on(vd.Frame(SIZE))
-    lengths = [segment.length_s for segment in timeline.segments]
+    schedule = playlist.schedule_on(vd.Frame(SIZE))
+    lengths = [segment.length_s for segment in schedule.segments]
     assert lengths == pytest.approx([2, 2, 2, 3, 5])
-    frames = frames_of(timeline)
+    frames = frames_of(schedule)
     assert frames[:20] == [(0, n, n / 10) for n in range(20)]
     assert frames[40:50] == [(2, 5 + n, 4 + n / 5) for n in range(10)]
     assert frames[50:] == [(3, 0, 6.0), (4, 0, 9.0)]
-    assert timeline.duration_s == pytest.approx(14)
+    assert schedule.duration_s == pytest.approx(14)
 
 
 def test_repeat_and_shuffle(write):
     path = write(a=MOVING, list={"playlist": ["a.json"], "repeat": 0, "shuffle": True})
     playlist = vd.load_show(path)
-    assert playlist.timeline_on(vd.Frame(SIZE)).duration_s == float("inf")
+    assert playlist.schedule_on(vd.Frame(SIZE)).duration_s == float("inf")
     assert playlist.shuffle
     path = write(list={"playlist": ["a.json"], "repeat": 3})
-    assert vd.load_show(path).timeline_on(vd.Frame(SIZE)).duration_s == 6
+    assert vd.load_show(path).schedule_on(vd.Frame(SIZE)).duration_s == 6
     with pytest.raises(ValueError, match="until"):
-        vd.load_show(path).timeline_on(vd.Frame(SIZE), until_s=1.0)
+        vd.load_show(path).schedule_on(vd.Frame(SIZE), until_s=1.0)
 
 
 def test_playlists_of_playlists(write):
@@ -149,10 +149,10 @@ def test_a_scene_is_read_as_a_scene(write):
 def test_shows_in_a_row(write):
     path = write(a=MOVING, s=STILL, list={"playlist": ["a.json"], "repeat": 2})
     row = ShowSequence((vd.load_show(path), vd.load_show(path.with_name("s.json"))))
-    timeline = row.timeline_on(vd.Frame(SIZE))
-    assert [segment.length_s for segment in timeline.segments] == pytest.approx([2, 2, 1 / 30])
+    schedule = row.schedule_on(vd.Frame(SIZE))
+    assert [segment.length_s for segment in schedule.segments] == pytest.approx([2, 2, 1 / 30])
     row = ShowSequence((vd.load_show(path.with_name("a.json")),) * 2)
-    assert row.timeline_on(vd.Frame(SIZE), until_s=0.5).duration_s == 1.0
+    assert row.schedule_on(vd.Frame(SIZE), until_s=0.5).duration_s == 1.0
 
 
 # -- fades
@@ -189,8 +189,8 @@ def test_one_bit_a_voxel_does_not_fade():
 
 def test_a_still_picture_fades_frame_by_frame(write):
     path = write(s=STILL, list={"playlist": [{"show": "s.json", "until": 1, "fade": 9}]})
-    timeline = vd.load_show(path).timeline_on(vd.Frame(SIZE))
-    (segment,) = timeline.segments
-    assert segment.frames == timeline.frames > 20
+    schedule = vd.load_show(path).schedule_on(vd.Frame(SIZE))
+    (segment,) = schedule.segments
+    assert segment.frames == schedule.frames > 20
     light = [int(segment.show.frame(n).rgb().sum()) for n in range(segment.frames)]
     assert np.argmax(light) == pytest.approx(segment.frames / 2, abs=1)

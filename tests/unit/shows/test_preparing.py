@@ -8,9 +8,9 @@ import voxdisplay as vd
 from voxdisplay.frame.output_transform import OutputTransform
 from voxdisplay.raster.light import CurrentLimit
 from voxdisplay.shows import preparing
+from voxdisplay.shows.frame_schedule import Slot
 from voxdisplay.shows.preparing import PREFETCH, FrameSource
 from voxdisplay.shows.show import EncodedFrame
-from voxdisplay.shows.timeline import Slot
 from voxdisplay.shows.worker_process import encode_frame
 
 ENCODING = (1024, (), 1e6)

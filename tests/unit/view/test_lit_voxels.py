@@ -9,7 +9,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 
 # (x, y, z): colour. In scan order; colours that every format but mono1 has as they are.
 LIT = {

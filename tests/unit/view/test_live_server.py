@@ -22,8 +22,8 @@ from websockets.sync.client import connect
 import voxdisplay as vd
 from voxdisplay.errors import TransportClosed
 from voxdisplay.view.live.address import parse_address
-from voxdisplay.view.live.message import Snapshot
 from voxdisplay.view.live.server import open_server
+from voxdisplay.view.live.snapshot_message import Snapshot
 from voxdisplay.view.live.sources import StaticSource
 
 WAIT = 20

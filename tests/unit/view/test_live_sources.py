@@ -17,8 +17,8 @@ from firmware_sim.device import Device
 from firmware_sim.tap import Tap
 from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.view.live.address import parse_address
-from voxdisplay.view.live.message import Snapshot, encode
 from voxdisplay.view.live.page import page_html as page_text
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.view.live.sources import DisplaySource, TapSource
 
 WAIT = 20

@@ -10,8 +10,8 @@ import pytest
 import voxdisplay as vd
 from voxdisplay.errors import TransportClosed
 from voxdisplay.raster.pixel_map import PixelMap
-from voxdisplay.view.live.message import Snapshot
 from voxdisplay.view.live.moving_source import MovingSource
+from voxdisplay.view.live.snapshot_message import Snapshot
 
 
 def picture(number):

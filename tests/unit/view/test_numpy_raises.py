@@ -7,7 +7,7 @@ import voxdisplay as vd
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.half_blocks import half_blocks
 from voxdisplay.view.lit_voxels import lit_voxels
-from voxdisplay.view.live.message import Snapshot, encode
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.view.picture import RenderOptions, render_page
 from voxdisplay.view.save import FILM_SUFFIXES, WRITERS, ExportJob, save
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Hashable
 
 from voxdisplay.errors import TransportClosed
-from voxdisplay.view.live.message import Snapshot
+from voxdisplay.view.live.snapshot_message import Snapshot
 
 
 def due_ordinal(elapsed_s: float, fps: float) -> int:

@@ -17,9 +17,9 @@ from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
 from voxdisplay.errors import MissingExtra
-from voxdisplay.view.live.message import Snapshot, encode
 from voxdisplay.view.live.origins import OriginCheck
 from voxdisplay.view.live.page import content_security_policy, page_html
+from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.view.live.sources import Source
 from voxdisplay.view.picture import render_page
 

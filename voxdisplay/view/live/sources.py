@@ -20,7 +20,7 @@ from voxdisplay.errors import OpenError, TransportClosed
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT
 from voxdisplay.raster.pixel_format import PixelFormat, Pixels
-from voxdisplay.view.live.message import Snapshot
+from voxdisplay.view.live.snapshot_message import Snapshot
 
 _POLL_S = 0.05
 # A display without a digest is read whole to find out whether it shows something else.

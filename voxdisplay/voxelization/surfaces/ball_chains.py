@@ -19,8 +19,8 @@ import numpy as np
 from voxdisplay.bodies.implicit import ImplicitFunction
 from voxdisplay.expressions.interval import Interval
 from voxdisplay.voxelization.index_ranges import expand_ranges
-from voxdisplay.voxelization.surfaces.cover import cover_wires, distinct
 from voxdisplay.voxelization.surfaces.implicit import voxelize_implicit
+from voxdisplay.voxelization.surfaces.wire_cover import cover_wires, distinct
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:

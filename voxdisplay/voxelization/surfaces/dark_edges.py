@@ -13,8 +13,8 @@ from voxdisplay.compute.array_types import Bools, Ints
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.voxelization.surfaces.lit_mask import LitMask
 from voxdisplay.voxelization.surfaces.mesh_topology import Topology
-from voxdisplay.voxelization.surfaces.repeats import Repeats
 from voxdisplay.voxelization.surfaces.snapped_mesh import HALF, SHIFT, TRIANGLES_PER_BLOCK, UNIT
+from voxdisplay.voxelization.surfaces.sparse_repeat import Repeats
 from voxdisplay.voxelization.surfaces.triangle_blocks import TriangleBlock, triangle_blocks
 
 _AFTER = [1, 2, 0]

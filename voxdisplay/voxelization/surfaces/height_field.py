@@ -16,9 +16,9 @@ import numpy as np
 from voxdisplay.errors import BodyError
 from voxdisplay.expressions.interval import Interval
 from voxdisplay.voxelization.index_ranges import expand_ranges
-from voxdisplay.voxelization.surfaces.bricks import prune
-from voxdisplay.voxelization.surfaces.cell_cover import open_cells
-from voxdisplay.voxelization.surfaces.cover import distinct
+from voxdisplay.voxelization.surfaces.implicit_cover_proof import open_cells
+from voxdisplay.voxelization.surfaces.interval_subdivision import prune
+from voxdisplay.voxelization.surfaces.wire_cover import distinct
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from voxdisplay.errors import BodyError
-from voxdisplay.voxelization.surfaces.bricks import BRICK, Bricks, prune
-from voxdisplay.voxelization.surfaces.cell_cover import open_cells
-from voxdisplay.voxelization.surfaces.cover import cover_wires, distinct
+from voxdisplay.voxelization.surfaces.implicit_cover_proof import open_cells
+from voxdisplay.voxelization.surfaces.interval_subdivision import BRICK, Bricks, prune
+from voxdisplay.voxelization.surfaces.wire_cover import cover_wires, distinct
 from voxdisplay.voxelization.voxel_box import VoxelBox
 from voxdisplay.voxelization.voxel_set import VoxelSet
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.voxelization.surfaces.cover import cover_wires, distinct
+from voxdisplay.voxelization.surfaces.wire_cover import cover_wires, distinct
 from voxdisplay.voxelization.voxel_set import VoxelSet
 
 if TYPE_CHECKING:

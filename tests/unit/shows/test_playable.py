@@ -1,7 +1,7 @@
 """Shows bound to a display: frames made elsewhere stand as the display does."""
 
 import voxdisplay as vd
-from voxdisplay.shows.binding import bind_show
+from voxdisplay.shows.playable import bind_show
 
 
 class OneFrame:

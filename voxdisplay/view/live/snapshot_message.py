@@ -1,4 +1,4 @@
-"""Message to a browser: one picture as lit voxels with their pixel values.
+"""Snapshot message to a browser: one picture as lit voxels with their pixel values.
 
 A message is a u32 (the offset of the data, a multiple of 8), a JSON object filled up with spaces,
 and planes of bytes, all little-endian::

@@ -1,4 +1,4 @@
-"""Timeline: shows in a row, and which frame is due at a time.
+"""Frame schedule: shows in a row, and which frame is due at a time.
 
 All times follow from the numbers of turn, segment and frame; none is the sum of earlier ones. Must
 not know a clock.
@@ -29,7 +29,7 @@ class Segment:
         The part, in seconds of the show; by default all of it. A still picture stays until
         ``until_s``.
     speed : float
-        Seconds of the show per second of the timeline.
+        Seconds of the show per second of the schedule.
 
     """
 
@@ -48,7 +48,7 @@ class Segment:
 
     @property
     def length_s(self) -> float:
-        """Seconds of the timeline; 0 or less for a part that is empty."""
+        """Seconds of the schedule; 0 or less for a part that is empty."""
         return (self.end_s - self.start_s) / self.speed
 
     @property
@@ -70,18 +70,18 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A frame in its place on the timeline.
+    """A frame in its place on the schedule.
 
     Attributes
     ----------
     ordinal : int
-        Its number among all frames of the timeline.
+        Its number among all frames of the schedule.
     segment : int
         Index of its segment.
     number : int
         Its number in the show.
     begins_s, ends_s : float
-        When it is due, and when the next one is, in seconds of the timeline.
+        When it is due, and when the next one is, in seconds of the schedule.
 
     """
 
@@ -92,7 +92,7 @@ class Slot:
     ends_s: float
 
 
-class Timeline:
+class FrameSchedule:
     """Segments that are played one after the other, and again if it repeats.
 
     Parameters
@@ -133,9 +133,9 @@ class Timeline:
         """Count of all frames; None if it repeats for ever."""
         return self.turns * self.turn_frames or None
 
-    def repeated(self, turns: int) -> Timeline:
+    def repeated(self, turns: int) -> FrameSchedule:
         """Return the same with another number of turns; 0: for ever."""
-        return Timeline(self.segments, turns, shuffle=self._shuffle)
+        return FrameSchedule(self.segments, turns, shuffle=self._shuffle)
 
     def _place(self, order: tuple[int, ...]) -> None:
         lengths = [self.segments[index].length_s for index in order]

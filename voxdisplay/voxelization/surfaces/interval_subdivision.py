@@ -1,4 +1,4 @@
-"""Bricks of space in which a function may have a zero, by bounds of its values.
+"""Interval subdivision: the bricks of space that may hold a zero, by bounds of a function.
 
 Must not know what is evaluated inside of them.
 """

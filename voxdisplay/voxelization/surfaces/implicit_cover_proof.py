@@ -1,4 +1,4 @@
-"""Proof that voxels cover an implicit surface: each of its points is within 1 of a lit one.
+"""Proof of the cover of an implicit surface: each of its points is within 1 of a lit one.
 
 A dual cell is a unit cube with voxel centres at its corners. Cells that may hold a zero of the
 function, by its bounds, must have a lit corner, or be refuted by bounds over smaller boxes.
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.voxelization.surfaces.bricks import (
+from voxdisplay.voxelization.surfaces.interval_subdivision import (
     BRICK,
     Bricks,
     Numbers,
@@ -18,7 +18,7 @@ from voxdisplay.voxelization.surfaces.bricks import (
     halve,
     may_be_zero,
 )
-from voxdisplay.voxelization.surfaces.cover import contains
+from voxdisplay.voxelization.surfaces.wire_cover import contains
 
 if TYPE_CHECKING:
     from voxdisplay.bodies.implicit import SpaceFunction

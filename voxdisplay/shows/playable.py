@@ -1,4 +1,4 @@
-"""Timelines of what can be played: shows, scenes and playlists, bound to a display's frames.
+"""Schedules of what can be played: shows, scenes and playlists, bound to a display's frames.
 
 Must not know displays.
 """
@@ -10,8 +10,8 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.frame import Drawable, Fit, Frame
+from voxdisplay.shows.frame_schedule import FrameSchedule, Segment
 from voxdisplay.shows.show import Show, ShowSource
-from voxdisplay.shows.timeline import Segment, Timeline
 
 STILL_FPS = 30.0
 """Frame rate of a still picture: it is shown at once, and for so long."""
@@ -41,16 +41,16 @@ class StillShow:
 
 
 @runtime_checkable
-class TimelineSource(Protocol):
-    """Several shows that become a timeline when the display is known, such as a playlist."""
+class ScheduleSource(Protocol):
+    """Several shows that become a schedule when the display is known, such as a playlist."""
 
-    def timeline_on(
+    def schedule_on(
         self, blank: Frame, *, fit: Fit = "contain", until_s: float | None = None
-    ) -> Timeline:
-        """Return the timeline as frames of the kind of a blank one."""
+    ) -> FrameSchedule:
+        """Return the schedule as frames of the kind of a blank one."""
 
 
-Playable: TypeAlias = Show | ShowSource | Drawable | TimelineSource
+Playable: TypeAlias = Show | ShowSource | Drawable | ScheduleSource
 
 
 def bind_show(playable: Show | ShowSource | Drawable, blank: Frame, fit: Fit) -> Show:
@@ -87,15 +87,15 @@ def _bind(playable: Show | ShowSource | Drawable, blank: Frame, fit: Fit) -> Sho
     raise wrong_kind("show", "a show, a scene, a playlist or a frame", playable)
 
 
-def bind_timeline(
+def bind_schedule(
     playable: Playable,
     blank: Frame,
     *,
     fit: Fit = "contain",
     loop: bool | None = None,
     until_s: float | None = None,
-) -> Timeline:
-    """Return the timeline of something that can be played.
+) -> FrameSchedule:
+    """Return the schedule of something that can be played.
 
     Parameters
     ----------
@@ -110,10 +110,10 @@ def bind_timeline(
         Where it ends, in seconds of the show.
 
     """
-    if isinstance(playable, TimelineSource):
-        timeline = playable.timeline_on(blank, fit=fit, until_s=until_s)
-        return timeline if loop is None else timeline.repeated(0 if loop else timeline.turns or 1)
+    if isinstance(playable, ScheduleSource):
+        schedule = playable.schedule_on(blank, fit=fit, until_s=until_s)
+        return schedule if loop is None else schedule.repeated(0 if loop else schedule.turns or 1)
     show = bind_show(playable, blank, fit)
     repeats = show.loop if loop is None else loop
     segment = Segment(show, until_s=math.inf if until_s is None else until_s)
-    return Timeline([segment], turns=0 if repeats else 1)
+    return FrameSchedule([segment], turns=0 if repeats else 1)

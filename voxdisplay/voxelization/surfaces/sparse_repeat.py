@@ -1,4 +1,4 @@
-"""Repetition of array entries, most of which are wanted once."""
+"""Sparse repetition: array entries, most of which are wanted once, each as often as wanted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cover of thin parts: voxels along wires and at points that a surface has lit no voxel near.
+"""Cover of wires and points: the voxels along those that a surface has lit no voxel near.
 
 The corners of a dual face or cell are the 4 or 8 voxel centres at its corners. Where a wire
 crosses a dual face none of whose corners is lit, the nearest is lit; and so is the voxel of a
