@@ -11,7 +11,7 @@ TEXT = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
 def test_its_scene_is_the_one_that_its_command_shows():
     (text,) = re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)
-    example = vd.load_scene("examples/paper-curve.json")
+    example = vd.load_scene("examples/lissajous.json")
     (shown,), (meant,) = vd.read_scene(text).items, example.items
     assert (vd.voxelize(shown.curve).voxels == vd.voxelize(meant.curve).voxels).all()
 
