@@ -43,6 +43,25 @@ def test_a_scene_as_a_picture(run, tmp_path):
     assert np.array_equal(pixels(path), np.asarray(meant))
 
 
+def test_a_scene_is_seen_from_where_it_says(run, tmp_path):
+    """The trefoil has a view of its own; an option wins over the half that it names."""
+    scene = vd.load_scene(TREFOIL)
+    yaw, pitch, zoom = scene.view
+    frame = vd.Frame((128, 128, 128))
+    frame.draw(scene)
+    for options, camera in (
+        ([], Camera(np.radians(yaw), np.radians(pitch), zoom=zoom)),
+        (["--zoom", "1"], Camera(np.radians(yaw), np.radians(pitch))),
+        (["--view-angle", "0,0"], Camera(0, 0, zoom=zoom)),
+    ):
+        path = tmp_path / "x.png"
+        run("preview", TREFOIL, "-o", path, "--pixels", "320x200", *options)
+        meant = render_page(
+            frame.array(), frame.grid, frame.format, RenderOptions((320, 200), camera)
+        )
+        assert np.array_equal(pixels(path), np.asarray(meant))
+
+
 def test_on_another_display(run, tmp_path):
     path = tmp_path / "x.png"
     options = ["--size", "9,12,20", "--format", "mono1", "--pixels", "200x200", "--plain"]

@@ -123,6 +123,18 @@ def test_a_palette_is_the_page_s_own(tab, tmp_path):
     assert page.run("digest(current())") == f"{frame.digest():08x}"
 
 
+def test_the_page_begins_where_a_scene_is_best_seen_from(tab, tmp_path):
+    camera = Camera(0.4, 1.1, zoom=1.5)
+    page = tab(exported(tmp_path, [page_of((1, 2, 3))], camera=camera))
+    page.wait("painted")
+    wanted = {"yaw": 0.4, "pitch": 1.1, "zoom": 1.5}
+    assert page.run("({...camera})") == page.run("({...START})")
+    assert {key: page.run(f"camera.{key}") for key in wanted} == wanted
+    page.key("ArrowRight")
+    page.key("0")
+    assert page.run("camera.yaw") == 0.4
+
+
 # -- input
 
 

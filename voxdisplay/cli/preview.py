@@ -60,14 +60,13 @@ _FPS: Final = 20.0  # of a film that turns once
     type=AngleType(),
     metavar="YAW,PITCH",
     help="View direction in degrees: 0,0 is from the front, x to the right and z up; a greater "
-    "pitch looks from above.  [default: -34,24]",
+    "pitch looks from above.  [default: the scene's, else -34,24]",
 )
 @click.option(
     "--zoom",
     type=RangeType("times", 0.3, 2.5, "1.5"),
-    default=1.0,
     metavar="FACTOR",
-    help="0.3 to 2.5; above 1 is nearer.  [default: 1]",
+    help="0.3 to 2.5; above 1 is nearer.  [default: the scene's, else 1]",
 )
 @display_size_option(
     f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]",
@@ -105,7 +104,7 @@ def preview(
     output: Path,
     size_px: tuple[int, int],
     view_angle: tuple[float, float] | None,
-    zoom: float,
+    zoom: float | None,
     size: Grid | None,
     format_: str,
     fit: Fit,
@@ -120,7 +119,11 @@ def preview(
     Needs the extra `view`: pip install 'voxdisplay[view]'.
     """
     from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
-    from voxdisplay.cli.scene_drawing import draw_scene, load_fitted_scene  # noqa: PLC0415
+    from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415
+        best_seen,
+        draw_scene,
+        load_fitted_scene,
+    )
     from voxdisplay.cli.show_films import (  # noqa: PLC0415
         FILM_SUFFIXES,
         check_film_size,
@@ -138,7 +141,6 @@ def preview(
     if suffix in TURNED:
         check_film_size(seconds * (fps or _FPS), size_px)
     options = RenderOptions(size=size_px, glow=not plain, axes=not plain)
-    options = options.with_view(view_angle, zoom)
     title = "voxdisplay" if scene == "-" else Path(scene).stem
     show, frame = None, vd.Frame((1, 1, 1))
     if is_show_file(scene):
@@ -147,9 +149,11 @@ def preview(
         frame = frame_at(show, at_s or 0.0)
     else:
         fitted, grid = load_fitted_scene(load_shown(scene, model), size, fit)
+        options = best_seen(fitted, options)
         frame = vd.Frame(grid, format_)
         if fitted.duration:
             show = fitted.show_on(frame, fit="none")
+    options = options.with_view(view_angle, zoom)
     made: ExportJob | FilmJob
     if show and at_s is None and suffix in FILM_SUFFIXES:
         made = film_of(show, options, title, fps=fps, drawn=suffix in TURNED)

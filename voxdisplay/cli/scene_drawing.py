@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from voxdisplay.cli.model_files import ModelFile
     from voxdisplay.frame import Fit
     from voxdisplay.scene.item import SceneItem
+    from voxdisplay.view.picture import RenderOptions
 
 _MAX_JUMPS_NAMED: Final = 3
 _MAX_UNDEFINED_NAMED: Final = 8
@@ -108,6 +110,14 @@ def fit_scene(
     if remark:
         note(remark)
     return fitted
+
+
+def best_seen(scene: vd.Scene, options: RenderOptions) -> RenderOptions:
+    """Return the options with the point of view from which a scene is best seen."""
+    if scene.view is None:
+        return options
+    yaw, pitch, zoom = scene.view
+    return options.with_view((math.radians(yaw), math.radians(pitch)), zoom)
 
 
 def draw_scene(scene: vd.Scene, frame: vd.Frame) -> None:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from voxdisplay.display.baud import Baud
     from voxdisplay.raster.pixel_format import Pixels
     from voxdisplay.shows.show import Show
+    from voxdisplay.view.camera import Camera
     from voxdisplay.view.live.sources import Source
     from voxdisplay.view.terminal import TerminalView
 
@@ -143,16 +144,19 @@ def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
     from voxdisplay.view.live.snapshot_message import Snapshot  # noqa: PLC0415 - an extra
     from voxdisplay.view.live.sources import StaticSource  # noqa: PLC0415
 
-    found, title = _scene_show(scene, size), Path(scene).name
+    (found, camera), title = _scene_show(scene, size), Path(scene).name
     if isinstance(found, vd.Frame):
-        lit = PixelMap(*found.lit())
-        yield StaticSource(Snapshot(lit, found.grid, found.format, 1, title, found.digest()))
+        lit, digest = PixelMap(*found.lit()), found.digest()
+        yield StaticSource(Snapshot(lit, found.grid, found.format, 1, title, digest, camera=camera))
         return
 
     def snapshot(number: int) -> Snapshot:
         frame = found.frame(number)
         page = color_page(frame)
-        return Snapshot(page, frame.grid, vd.PixelFormat.RGB888, number + 1, title, frame.digest())
+        digest = frame.digest()
+        return Snapshot(
+            page, frame.grid, vd.PixelFormat.RGB888, number + 1, title, digest, camera=camera
+        )
 
     yield MovingSource(found.frame_count, found.fps, snapshot, title)
 
@@ -203,24 +207,27 @@ class _ReadbackDisplay:
         return page
 
 
-def _scene_show(scene: str, size: vd.Grid | None) -> vd.Frame | Show:
-    """Return the picture of a scene; of one that moves, and of a recording, the show."""
+def _scene_show(scene: str, size: vd.Grid | None) -> tuple[vd.Frame | Show, Camera | None]:
+    """Return a scene's picture; of one that moves, and of a recording, the show; and its camera."""
     from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415
+        best_seen,
         draw_scene,
         load_fitted_scene,
         note_choices,
     )
     from voxdisplay.cli.show_films import is_show_file, open_show_file  # noqa: PLC0415
+    from voxdisplay.view.picture import RenderOptions  # noqa: PLC0415 - an extra
 
     if is_show_file(scene):
-        return open_show_file(scene, size, None, "contain")
+        return open_show_file(scene, size, None, "contain"), None
     fitted, grid = load_fitted_scene(load_shown(scene, ModelOptions()), size)
     frame = vd.Frame(grid)
+    camera = best_seen(fitted, RenderOptions()).camera if fitted.view else None
     if fitted.duration:
         note_choices(fitted)
-        return fitted.show_on(frame, fit="none")
+        return fitted.show_on(frame, fit="none"), camera
     draw_scene(fitted, frame)
-    return frame
+    return frame, camera
 
 
 @contextlib.contextmanager
@@ -231,10 +238,12 @@ def _scene_view(scene: str, size: vd.Grid | None) -> Iterator[TerminalView]:
     from voxdisplay.view.live.moving_source import due_ordinal  # noqa: PLC0415
     from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
-    found, title = _scene_show(scene, size), Path(scene).name
+    (found, camera), title = _scene_show(scene, size), Path(scene).name
     if isinstance(found, vd.Frame):
         lit = lit_voxels(PixelMap(*found.lit()), found.grid, found.format)
-        yield TerminalView(found.grid, title, lambda: lit, changes=False)
+        still = TerminalView(found.grid, title, lambda: lit, changes=False)
+        still.camera = camera or still.camera
+        yield still
         return
     began_s = time.monotonic()
 
@@ -244,7 +253,9 @@ def _scene_view(scene: str, size: vd.Grid | None) -> Iterator[TerminalView]:
         return lit_voxels(color_page(frame), frame.grid, vd.PixelFormat.RGB888)
 
     grid = found.frame(0).grid
-    yield TerminalView(grid, title, read, changes=True, read_interval_s=1 / found.fps)
+    moving = TerminalView(grid, title, read, changes=True, read_interval_s=1 / found.fps)
+    moving.camera = camera or moving.camera
+    yield moving
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ import numpy as np
 from voxdisplay.argument_checks import choice, distances, instance, whole_number
 from voxdisplay.frame import FITS, Drawing, Fit, Frame
 from voxdisplay.raster.grid import Grid
+from voxdisplay.scene.best_view import BestView
 from voxdisplay.scene.content_fit import content_placement
 from voxdisplay.scene.item import PartSpan, SceneItem
 from voxdisplay.scene.placement import Placement, placed
@@ -45,6 +46,8 @@ class Scene:
         Choices made by the reader, one line each, for people.
     spans : tuple of PartSpan
         Items of which a part is shown.
+    view : BestView or None
+        Where it is best seen from; None: nowhere in particular.
 
     """
 
@@ -52,6 +55,7 @@ class Scene:
     items: tuple[SceneItem, ...]
     notes: tuple[str, ...] = ()
     spans: tuple[PartSpan, ...] = ()
+    view: BestView | None = None
 
     def __repr__(self) -> str:
         size = f" {self.size}" if self.size else ""

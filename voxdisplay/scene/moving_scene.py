@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from voxdisplay.raster.grid import Grid
+    from voxdisplay.scene.best_view import BestView
     from voxdisplay.scene.builder import Built, SceneBuilder
     from voxdisplay.scene.environment import ValueTable
     from voxdisplay.scene.json_text import JsonText
@@ -82,12 +83,17 @@ class MovingScene(Scene):
 
     @classmethod
     def of_film(
-        cls, film: Film, size: Grid | None, notes: tuple[str, ...], fit: Placement | None = None
+        cls,
+        film: Film,
+        size: Grid | None,
+        notes: tuple[str, ...],
+        fit: Placement | None = None,
+        view: BestView | None = None,
     ) -> MovingScene:
         """Return the scene of a film; raise SceneError if it cannot be built at time 0."""
         built = film.build(0.0, fit)
         notes = tuple(dict.fromkeys((*notes, *built.notes)))
-        return cls(size, built.items, notes, built.spans, film, fit)
+        return cls(size, built.items, notes, built.spans, view, film, fit)
 
     @property
     def duration(self) -> float:
@@ -129,18 +135,19 @@ class MovingScene(Scene):
         if not 0 <= time <= self.duration:
             raise ValueError(f"time: {time:g} s is not from 0 to {self.duration:g}")
         built = self.film.build(time, self.fit)
-        return Scene(self.size, built.items, self.notes, built.spans)
+        return Scene(self.size, built.items, self.notes, built.spans, self.view)
 
     def at_frame(self, number: int) -> Scene:
         """Return the scene at a frame: `Scene.at_frame`."""
         number = whole_number("number", number, 0, self.frame_count - 1)
         built = self.film.build(self.film.timeline.time_of(number), self.fit)
-        return Scene(self.size, built.items, self.notes, built.spans)
+        return Scene(self.size, built.items, self.notes, built.spans, self.view)
 
     def placed(self, placement: Placement, grid: Grid) -> MovingScene:
         """Return the scene under an affine map: `Scene.placed`."""
         fit = placement.after(self.fit)
-        return replace(MovingScene.of_film(self.film, grid, self.notes, fit), notes=self.notes)
+        placed = MovingScene.of_film(self.film, grid, self.notes, fit, self.view)
+        return replace(placed, notes=self.notes)
 
     def _moments(self) -> Iterator[Scene]:
         moments = min(_MOMENTS, self.frame_count)

@@ -71,6 +71,21 @@ Object = (
 TYPES = {str(scene_object.__struct_config__.tag): scene_object for scene_object in get_args(Object)}
 
 
+class View(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """The point of view from which a scene is best seen."""
+
+    angle: Annotated[
+        tuple[Number, Number],
+        Meta(
+            title="Angle",
+            description="Yaw and pitch in degrees: [0, 0] is from the front, x to the right and z "
+            "up; a greater pitch looks from above. It is [-34, 24] when left out.",
+            extra={"expected": "two angles [yaw, pitch] in degrees"},
+        ),
+    ] = (-34.0, 24.0)
+    zoom: Annotated[Number, Meta(title="Zoom", description="0.3 to 2.5; above 1 is nearer.")] = 1.0
+
+
 class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """A scene: objects in drawing order.
 
@@ -119,6 +134,15 @@ class SceneFile(Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
             description="Whether a scene with a duration starts again at its end.",
         ),
     ] = False
+    view: Annotated[
+        View | None,
+        Meta(
+            title="View",
+            description="Where the scene is best seen from: pictures and the live view begin "
+            "there. It changes nothing on a display.",
+            extra={"expected": 'a view {"angle": [yaw, pitch], "zoom": factor}'},
+        ),
+    ] = None
     schema: Annotated[
         str, Meta(title="Schema", description="Address of this schema, for editors.")
     ] = field(name="$schema", default="")

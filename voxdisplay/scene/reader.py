@@ -20,13 +20,14 @@ from voxdisplay.errors import SceneError, did_you_mean, similar_file
 from voxdisplay.expressions.params import param_order
 from voxdisplay.expressions.parse import constant, excerpt
 from voxdisplay.raster.grid import Grid
+from voxdisplay.scene.best_view import BestView, best_view
 from voxdisplay.scene.builder import SceneBuilder
 from voxdisplay.scene.environment import MovingEnvironment, StillEnvironment, ValueTable
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error
 from voxdisplay.scene.foreign_files import recognise, unicode_encoding
 from voxdisplay.scene.json_text import JsonText
 from voxdisplay.scene.model import Scene
-from voxdisplay.scene.objects import TYPES, Object, SceneFile
+from voxdisplay.scene.objects import TYPES, Object, SceneFile, View
 from voxdisplay.scene.scene_files import SceneFiles
 from voxdisplay.scene.scene_object import SceneObject
 from voxdisplay.scene.type_mismatch import MOST_COMPARED, describe_value, find_mismatch
@@ -178,8 +179,9 @@ def _scene(raw: Any, folder: Path | None, source: JsonText) -> Scene:
     names = _params(file.params)
     size = _size(file.size, names) if file.size else None
     files = SceneFiles(folder, size)
+    view = _view(file.view, names)
     built = SceneBuilder(file.objects, paths, StillEnvironment(names), files, source).build()
-    return Scene(files.size, built.items, (*built.notes, *notes), built.spans)
+    return Scene(files.size, built.items, (*built.notes, *notes), built.spans, view)
 
 
 def _moving_scene(
@@ -196,13 +198,23 @@ def _moving_scene(
     assert file.duration is not None  # noqa: S101 - see the caller
     timeline = Timeline(file.duration, file.fps, loop=file.loop, params=file.params)
     size = _size(file.size, timeline.constants) if file.size else None
+    view = _view(file.view, timeline.constants)
     table = ValueTable(timeline.variables, timeline.values_at)
     environment = MovingEnvironment(timeline.constants, table)
     duration = timeline.duration
     files = SceneFiles(folder, size)
     builder = SceneBuilder(file.objects, paths, environment, files, source, duration)
-    scene = MovingScene.of_film(Film(timeline, table, builder, source), size, notes)
+    film = Film(timeline, table, builder, source)
+    scene = MovingScene.of_film(film, size, notes, view=view)
     return scene if files.size == size else replace(scene, size=files.size)
+
+
+def _view(view: View | None, names: dict[str, float]) -> BestView | None:
+    if view is None:
+        return None
+    return best_view(
+        view, EvaluationContext("$.view", StillEnvironment(names), SceneFiles(None, None))
+    )
 
 
 def _has_key_like(key: str, raw: dict[str, Any]) -> bool:
@@ -275,6 +287,7 @@ def _key_hint(raw: dict[str, Any], path: str) -> str | None:
     meant = "type" in raw or _has_key_like("type", raw) or _has_key_like("objects", raw)
     if path == "$" and single and not meant:
         return 'a scene has the key "objects", a file of one object the key "type"'
-    if path == "$" and single and raw.get("type") in TYPES and raw.keys() & {"size", "params"}:
-        return "size and params belong to a scene, beside objects"
+    of_scenes = {"size", "params", "view"}
+    if path == "$" and single and raw.get("type") in TYPES and raw.keys() & of_scenes:
+        return "size, params and view belong to a scene, beside objects"
     return None

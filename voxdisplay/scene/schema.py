@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
-from voxdisplay.scene.objects import TYPES, SceneFile
+from voxdisplay.scene.objects import TYPES, SceneFile, View
 from voxdisplay.scene.type_mismatch import field_types
 from voxdisplay.scene.values import (
     Color,
@@ -52,6 +52,7 @@ _SHARED = {
 }
 _TITLES: dict[type, str] = {
     SceneFile: "Scene",
+    View: "View",
     ColorMap: "Colour map",
     Track: "Track",
     TransformStep: "Step of a transform",

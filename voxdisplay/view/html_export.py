@@ -24,6 +24,7 @@ from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.view.atomic_write import atomic_write
+from voxdisplay.view.camera import Camera
 from voxdisplay.view.live.page import content_security_policy, page_html
 from voxdisplay.view.live.snapshot_message import Snapshot, encode
 
@@ -42,6 +43,7 @@ def save_html(
     title: str = "voxdisplay",
     fps: float = 20.0,
     palette: Colors | None = None,
+    camera: Camera | None = None,
 ) -> None:
     """Write pages as one HTML file, which replaces another only when it is complete.
 
@@ -58,6 +60,8 @@ def save_html(
         Pages per second, 0.1 to 120.
     palette : (256, 3) uint8 array, optional
         Of index8 pages; by default the default one.
+    camera : Camera, optional
+        From where the pages are seen first.
 
     Raises
     ------
@@ -80,6 +84,7 @@ def save_html(
             number,
             title,
             palette=palette,
+            camera=camera,
         )
         for number, one in enumerate(pages, 1)
     ]

@@ -64,10 +64,13 @@ class RenderOptions:
     axes: bool = True
     labels: bool = True
 
-    def with_view(self, angle: tuple[float, float] | None, zoom: float = 1.0) -> RenderOptions:
-        """Return the options with another yaw and a pitch, in radians, and nearer by a factor."""
+    def with_view(
+        self, angle: tuple[float, float] | None, zoom: float | None = None
+    ) -> RenderOptions:
+        """Return the options with another yaw and pitch, in radians, and another zoom."""
         yaw, pitch = angle or (self.camera.yaw, self.camera.pitch)
-        return replace(self, camera=replace(self.camera, yaw=yaw, pitch=pitch).zoomed(zoom))
+        zoom = self.camera.zoom if zoom is None else zoom
+        return replace(self, camera=replace(self.camera, yaw=yaw, pitch=pitch, zoom=zoom))
 
 
 def render_page(

@@ -112,6 +112,7 @@ def _html(path: Path, shot: ExportJob | FilmJob, _: Progress | None) -> None:
         title=shot.title,
         fps=shot.fps,
         palette=shot.palette,
+        camera=shot.options.camera,
     )
 
 

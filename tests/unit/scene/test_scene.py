@@ -117,6 +117,38 @@ class TestMeaning:
         assert read_scene('{"$schema": "scene.schema.json", "objects": []}').items == ()
 
 
+class TestView:
+    def test_it_stays_with_the_scene(self) -> None:
+        angle = {"view": {"angle": ["-a", "2*a"], "zoom": 1.5}, "params": {"a": 20}}
+        for more in ({}, {"duration": 1, "fps": 4}):
+            scene = scene_of(SEGMENT, size=[9, 9, 9], **angle, **more)
+            assert scene.view == (-20, 40, 1.5)
+            assert scene.fitted(Grid(3, 5, 7))[0].view == scene.view
+            assert scene.at_frame(0).view == scene.view
+            assert scene.at(0).view == scene.view
+        assert scene_of(SEGMENT).view is None
+        assert scene_of(SEGMENT, view={}).view == (-34, 24, 1)
+
+    @pytest.mark.parametrize(
+        ("view", "path", "message"),
+        [
+            ({"angle": [0, 91]}, "$.view.angle[1]", "-90 to 90, not 91"),
+            ({"angle": [-361, 0]}, "$.view.angle[0]", "-360 to 360"),
+            ({"angle": [0, "q"]}, "$.view.angle[1]", "unknown name 'q'"),
+            ({"angle": 3}, "$.view.angle", "two angles [yaw, pitch]"),
+            ({"zoom": 9}, "$.view.zoom", "0.3 to 2.5, not 9"),
+            ({"zom": 1}, "$.view", "unknown key 'zom'"),
+            (1, "$.view", "a view {"),
+        ],
+        ids=str,
+    )
+    def test_mistakes(self, view: Any, path: str, message: str) -> None:
+        error = refused({"objects": [SEGMENT], "view": view})
+        assert str(error.path).startswith(path)
+        assert message in str(error)
+        assert error.line == 1
+
+
 class TestFit:
     SCENE = scene_of(SEGMENT, size=[128, 128, 128])
 

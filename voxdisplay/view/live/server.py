@@ -17,11 +17,12 @@ from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
 from voxdisplay.errors import MissingExtra
+from voxdisplay.view.camera import Camera
 from voxdisplay.view.live.origins import OriginCheck
 from voxdisplay.view.live.page import content_security_policy, page_html
 from voxdisplay.view.live.snapshot_message import Snapshot, encode
 from voxdisplay.view.live.sources import Source
-from voxdisplay.view.picture import render_page
+from voxdisplay.view.picture import RenderOptions, render_page
 
 try:
     from websockets.asyncio.server import Server, ServerConnection, serve
@@ -274,6 +275,9 @@ def _response(
 
 def _png(snapshot: Snapshot) -> bytes:
     out = io.BytesIO()
-    drawn = render_page(snapshot.page, snapshot.grid, snapshot.format, palette=snapshot.palette)
+    options = RenderOptions(camera=snapshot.camera or Camera())
+    drawn = render_page(
+        snapshot.page, snapshot.grid, snapshot.format, options, palette=snapshot.palette
+    )
     drawn.save(out, "PNG", compress_level=1)
     return out.getvalue()

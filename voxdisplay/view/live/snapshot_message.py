@@ -9,9 +9,10 @@ and planes of bytes, all little-endian::
                  rgb888 (red, green, blue)
     palette      for index8: three planes of 256, red, green and blue of each pixel value
 
-Lit voxels are in scan order, which deflates well. The JSON has ``number``, ``title``,
-``size``, ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap``, ``wide``, and
-``own``: which entries are not those of the default palette.
+Lit voxels are in scan order, which deflates well. The JSON has ``number``, ``title``, ``size``,
+``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap``, ``wide``, ``own``:
+which entries are not those of the default palette; and ``view``: from where it is best seen, [yaw
+and pitch in radians, zoom], or null.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import DEFAULT, Colors, Palette
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
+from voxdisplay.view.camera import Camera
 from voxdisplay.view.lit_voxels import lit_voxels
 
 _OFFSET = struct.Struct("<I")
@@ -54,6 +56,8 @@ class Snapshot:
         Further figures of the source, by names for users.
     palette : (256, 3) uint8 array or None
         Of an index8 page; None for the default one.
+    camera : Camera or None
+        From where it is best seen.
 
     """
 
@@ -65,6 +69,7 @@ class Snapshot:
     digest: int | None = None
     counters: Mapping[str, int] = field(default_factory=dict)
     palette: Colors | None = None
+    camera: Camera | None = None
 
 
 def encode(snapshot: Snapshot) -> bytes:
@@ -79,7 +84,7 @@ def encode(snapshot: Snapshot) -> bytes:
         places = np.packbits(lit, bitorder="little").tobytes()
     else:
         places = voxels.T.astype("<u2" if wide else "u1").tobytes()
-    palette = Palette(snapshot.palette)
+    palette, camera = Palette(snapshot.palette), snapshot.camera
     head = json.dumps(
         {
             "number": snapshot.number,
@@ -92,6 +97,7 @@ def encode(snapshot: Snapshot) -> bytes:
             "bitmap": bitmap,
             "wide": wide,
             "own": palette.entries_differing(DEFAULT).tolist(),
+            "view": [camera.yaw, camera.pitch, camera.zoom] if camera else None,
         }
     ).encode()
     head += b" " * (-(len(head) + _OFFSET.size) % 8)

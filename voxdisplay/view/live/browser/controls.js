@@ -15,6 +15,11 @@ function pan(x, y) {
   camera.y = clamp(camera.y + y, -6, 6);
   schedule();
 }
+// Begin where the first picture is best seen from.
+function beginView(view) {
+  if (view) [START.yaw, START.pitch, START.zoom] = view;
+  setCamera();
+}
 const setCamera = changes => { Object.assign(camera, START, changes); schedule(); };
 
 const area = $("stage"), touches = new Map();

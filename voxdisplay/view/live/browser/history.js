@@ -14,6 +14,7 @@ function current() {
 }
 
 function push(buffer) {
+  if (!history.length) beginView(decode(buffer).view);
   history.push(buffer);
   keptBytes += buffer.byteLength;
   while (!embedded && history.length > 1 && (history.length > MOST_FRAMES || keptBytes > MOST_BYTES)) {

@@ -8,7 +8,7 @@ const make = (tag, given, ...inside) => {
   return it;
 };
 
-// -- Messages: see voxdisplay/view/live/message.py
+// -- Messages: see voxdisplay/view/live/snapshot_message.py
 
 function decode(buffer) {
   const start = new DataView(buffer).getUint32(0, true);
