@@ -16,7 +16,6 @@ from typing import Any, overload
 from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
 from voxdisplay.bodies.body import Body
 from voxdisplay.curves.curve import Curve
-from voxdisplay.voxelization import measure
 from voxdisplay.voxelization.body_voxelization import MAX_SPAN, box_of, voxelize_body
 from voxdisplay.voxelization.digitise import digitise
 from voxdisplay.voxelization.point_indices import point_indices
@@ -31,7 +30,6 @@ __all__ = [
     "VoxelSet",
     "clip",
     "march",
-    "measure",
     "point_indices",
     "voxelize",
     "voxelize_batches",

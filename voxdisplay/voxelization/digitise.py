@@ -7,7 +7,6 @@ know how they are done.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from operator import attrgetter
@@ -26,14 +25,9 @@ from voxdisplay.voxelization.adaptive_sampling import (
     refine_samples,
     split_at_jumps,
 )
-from voxdisplay.voxelization.certify import Certificate, certify
 from voxdisplay.voxelization.curve_batch import CLOSURE_TOLERANCE, CurveBatch, Samples
-from voxdisplay.voxelization.enclosing_boxes import Boxes, enclose_curves, sample_overlooked
-from voxdisplay.voxelization.grid_plane import trace_all_planes, trace_curves
-from voxdisplay.voxelization.loop_closing import close_loops, loops_of
-from voxdisplay.voxelization.loop_corners import join_at_corners, split_at_corners
+from voxdisplay.voxelization.grid_plane import trace_curves
 from voxdisplay.voxelization.plane_crossings import dominant_crossings
-from voxdisplay.voxelization.restoring import restore_coverage
 from voxdisplay.voxelization.sequence import Sequence
 from voxdisplay.voxelization.thinning import thin_events
 from voxdisplay.voxelization.voxel_events import VoxelEvents
@@ -90,14 +84,21 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
     begin = perf_counter()
     samples = refine_samples(batch, initial_samples(batch))
     kernel_backend.enable_if_worthwhile(samples.t.size, ahead)
-    boxes = enclose_curves(batch, samples) if certified else None
-    if boxes:
-        samples = refine_samples(batch, sample_overlooked(batch, samples, boxes))
+    if certified:
+        from voxdisplay.voxelization.coverage_proof import enclose, prove  # noqa: PLC0415 - on request
+
+        boxes, samples = enclose(batch, samples)
     samples = split_at_jumps(batch, samples)
     closed = _closed(batch, samples)
     crossings, parts = dominant_crossings(batch, samples), samples
     some_closed = bool(closed.any())
     if some_closed:
+        from voxdisplay.voxelization.loop_closing import close_loops, loops_of  # noqa: PLC0415
+        from voxdisplay.voxelization.loop_corners import (  # noqa: PLC0415 - many are open
+            join_at_corners,
+            split_at_corners,
+        )
+
         crossings, parts, whole = split_at_corners(batch, crossings, samples, closed)
     traced = trace_curves(batch, crossings, parts)
     events = thin_events(traced, parts, keep_tips=certified)
@@ -137,53 +138,7 @@ def _digitise_batch(batch: CurveBatch, ahead: float, *, certified: bool) -> list
     for number, (own_voxels, own_t) in changed.items():
         curve, spent = batch.curves[number], seconds * len(own_voxels)
         sequences[number] = Sequence(own_voxels, True, ONE_PIECE, own_t, curve, spent)
-    if boxes:
-        for number, sequence in enumerate(sequences):
-            begin = perf_counter()
-            thin = events.take(np.arange(bounds[number], bounds[number + 1]))
-            proven = _with_proof(batch, sequence, boxes, number, thin, traced)
-            spent = seconds * len(proven) + perf_counter() - begin
-            sequences[number] = replace(proven, seconds=spent)
-    return sequences
-
-
-def _with_proof(
-    batch: CurveBatch,
-    sequence: Sequence,
-    boxes: Boxes,
-    index: int,
-    thin: VoxelEvents,
-    traced: VoxelEvents,
-) -> Sequence:
-    """Return the sequence with its proof, restored if need be, or with the reason why not."""
-    if index in boxes.obstacles:
-        return replace(sequence, proof=boxes.obstacles[index])
-    if len(sequence.starts) > 1:
-        return replace(sequence, proof="the curve jumps")
-    own = boxes.of_curve(index)
-    ends = boxes.t_lo[own], boxes.t_hi[own]
-    box = boxes.low[:, own], boxes.high[:, own]
-    curve, closed = sequence.curve, sequence.closed
-    proof = certify(curve, ends, box, sequence.voxels, sequence.t, closed=closed)
-    for again in (False, True):
-        if isinstance(proof, Certificate):
-            break
-        if again:
-            t = np.append(ends[0], ends[1][-1])
-            of = np.full(t.size, index)
-            points = batch.evaluate(of, t)
-            samples = Samples(np.zeros_like(of), t, points, np.array([index]))
-            full = trace_all_planes(batch, samples)
-            thin = thin_events(full, samples, keep_tips=True)
-        else:
-            full = traced.take(traced.piece == thin.piece[0])
-        restored = restore_coverage(thin, full, ends, box, closed=closed)
-        voxels = np.ascontiguousarray(restored.voxels.T)
-        voxels.flags.writeable = restored.t.flags.writeable = False
-        second = certify(curve, ends, box, voxels, restored.t, closed=closed)
-        if isinstance(second, Certificate):
-            return replace(sequence, voxels=voxels, t=restored.t, proof=second)
-    return replace(sequence, proof=proof)
+    return [*prove(batch, sequences, boxes, bounds, events, traced)] if certified else sequences
 
 
 def _starts(events: VoxelEvents) -> Ints:

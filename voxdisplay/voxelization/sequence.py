@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.singular_points import SingularPoint, singular_points
-from voxdisplay.voxelization import measure
 from voxdisplay.voxelization.certify import END_ERROR, Certificate
 
 
@@ -164,6 +163,8 @@ class Sequence:
     @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Distance of every voxel's centre from the curve, in voxels: (N,); read-only."""
+        from voxdisplay.voxelization import measure  # noqa: PLC0415 - drawing needs no measures
+
         apart = measure.distances(self.voxels, self.curve)
         lost = apart > END_ERROR
         if lost.any():  # at features that are too narrow to be found without a hint
@@ -185,6 +186,8 @@ class Sequence:
     @cached_property
     def contact_pairs(self) -> NDArray[np.int64]:
         """Index pairs at which the sequence touches itself: see `measure.contacts`."""
+        from voxdisplay.voxelization import measure  # noqa: PLC0415 - drawing needs no measures
+
         pairs = measure.contacts(self.voxels, closed=self.closed)
         pairs.flags.writeable = False
         return pairs
@@ -192,6 +195,8 @@ class Sequence:
     @cached_property
     def report(self) -> Report:
         """Quality figures, computed when first asked for: that can take longer than drawing."""
+        from voxdisplay.voxelization import measure  # noqa: PLC0415 - drawing needs no measures
+
         return Report(
             voxels=len(self),
             closed=self.closed,
