@@ -28,9 +28,11 @@ FEATURES: Final = {
     "slabs": spec.FEATURE_SLABS,
     "fade": spec.FEATURE_FADE,
     "arc2": spec.FEATURE_ARC2,
+    "hold": spec.FEATURE_HOLD,
 }
 _INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the format INDEX8
 _COLORED: Final = frozenset(("fade",))  # not with MONO1
+_TICKING: Final = frozenset(("hold",))  # not without refresh ticks
 _FIRST_OF_1_1: Final = 9  # section 15: features from this bit on are of version 1.1
 LIES: Final = ("grid", "credit", "format", "features", "payload", "boot")
 _INFO_FIXED: Final = 29  # bytes of an INFO's payload before its strings (5)
@@ -59,7 +61,8 @@ class Config:
     name, firmware, serial
         Strings of INFO.
     features
-        Names of the announced features, of `FEATURES`; None for all that the pixel format allows.
+        Names of the announced features, of `FEATURES`; None for all that the pixel format and the
+        refresh allow.
     max_silent_acks
         How many ACKs in a row are left out while more packets can be taken, 0 to 8 (9).
     lies
@@ -111,12 +114,14 @@ class Config:
             for name in FEATURES
             if (name not in _INDEXED or self.pixels.code == spec.FORMAT_INDEX8)
             and (name not in _COLORED or self.pixels.code != spec.FORMAT_MONO1)
+            and (name not in _TICKING or self.refresh)
         ]
         features = frozenset(allowed)
         if self.features is not None:
             features = _names(self.features)
             object.__setattr__(self, "features", features)
-        _check_names("feature", features, allowed, f" with the format {self.pixel_format}")
+        ticks = "" if self.refresh else " and no refresh ticks"
+        _check_names("feature", features, allowed, f" with the format {self.pixel_format}{ticks}")
         bits = sum(1 << FEATURES[name] for name in features)
         object.__setattr__(self, "feature_bits", bits)
         object.__setattr__(self, "lies", _names(self.lies))

@@ -148,9 +148,15 @@ class Device:
             self._drain()
         return bytes(out)
 
-    def tick(self) -> None:
-        """Process a refresh tick: a pending frame is put on display."""
-        if not self.session or not self.pending:
+    def tick(self, count: int = 1) -> None:
+        """Process refresh ticks: a pending frame whose hold is over is put on display.
+
+        Parameters
+        ----------
+        count
+            How many ticks have come. At those before the last one no frame was pending.
+        """
+        if not self.session or not self.session.tick(count):
             return
         self._swap(self.session)
         self._acknowledge()
@@ -260,7 +266,7 @@ class Device:
             session.begin_frame(frame, flags)
             self.memory.begin_frame(dark=bool(flags & spec.DATA_FLAG_CLEAR))
         if verdict in (DataAction.BEGIN, DataAction.APPLY):
-            self._unpacker.draw(packet, self.memory.back)
+            session.hold(self._unpacker.draw(packet, self.memory.back))
             session.mark_received(seq, flags)
         session.last = seq
         self._unacknowledged += 1

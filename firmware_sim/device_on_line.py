@@ -62,7 +62,8 @@ class DeviceOnLine:
         self._up = FaultyLine(faults, seed, "up")
         self._clock = clock
         self._epoch = clock()
-        self._swap_tick: int | None = None  # number of the tick that a swap waits for
+        self._swap_tick: int | None = None  # number of the next tick, if a swap waits for one
+        self._last_tick = 0  # number of the last tick that the device was told of
 
     def receive(self, data: bytes) -> None:
         """Carry bytes from the host to the device."""
@@ -116,9 +117,10 @@ class DeviceOnLine:
         self._unplugged = False
 
     def _swap_time(self) -> float:
-        """Return the time of the tick that a swap waits for; infinity if none does.
+        """Return the time of the next tick if a swap waits for one; otherwise infinity.
 
-        Ticks are counted from the start, so that they do not drift. Only those that swap matter.
+        Ticks are counted from the start, so that they do not drift. The device is told of the
+        others together, when a frame waits.
         """
         if self._swap_tick is None:
             return math.inf
@@ -143,8 +145,9 @@ class DeviceOnLine:
                 self._collect_output(feeds, passed + 1)
                 continue
             if self._swap_tick is not None and tick <= comes:
+                passed, self._last_tick = self._swap_tick - self._last_tick, self._swap_tick
                 self._swap_tick += 1
-                self.device.tick()
+                self.device.tick(passed)
                 self._collect_output(tick)
                 continue
             come = self._down.take(comes)

@@ -46,7 +46,7 @@ class OpDecoder:
         self.steps = [grid.crumb_offsets(octant) for octant in range(spec.LIMIT_MAX_OCTANT + 1)]
         self.brick_offsets = brick_offsets(grid)
 
-    def draw(self, packet: bytes, page: Page) -> None:
+    def draw(self, packet: bytes, page: Page) -> int:
         """Draw the ops of a packet.
 
         Parameters
@@ -55,6 +55,11 @@ class OpDecoder:
             Header and payload of a DATA packet.
         page
             The page to draw on.
+
+        Returns
+        -------
+        int
+            The longest hold that they name, in ticks (7.12).
 
         Raises
         ------
@@ -68,10 +73,11 @@ class OpDecoder:
             if draw is None:
                 raise operands.error(spec.CODE_OP, f"op {op:02X} is reserved or not announced")
             draw(decoder, op & OPERAND_MASK)
+        return decoder.hold_ticks
 
 
 class _PacketDecoder:
-    """State of the decoder within one packet: cursor, pen and fade.
+    """State of the decoder within one packet: cursor, pen, fade and hold.
 
     There is a method for each op; it takes the low five bits of the op byte.
     """
@@ -83,6 +89,7 @@ class _PacketDecoder:
         self._operands = operands
         self._page = page
         self._fade: fades.Fade | None = None
+        self.hold_ticks = 0
         self._cursor = 0
         self._pen = device.pixel_format.full
 
@@ -156,6 +163,9 @@ class _PacketDecoder:
         place = self._operands.coordinates()
         self._check_coordinates(place)
         self._cursor = self._grid.index(*place)
+
+    def hold(self, _: int) -> None:
+        self.hold_ticks = max(self.hold_ticks, self._operands.byte())
 
     def colors(self, _: int) -> None:
         first = self._operands.byte()
@@ -328,6 +338,7 @@ def _op_table(features: int) -> list[_Op | None]:
         (spec.FEATURE_BOX, spec.OP_BOX, 0, _PacketDecoder.box),
         (spec.FEATURE_DOTS, spec.OP_DOTS, 0, _PacketDecoder.dots),
         (spec.FEATURE_PALETTE, spec.OP_COLORS, 0, _PacketDecoder.colors),
+        (spec.FEATURE_HOLD, spec.OP_HOLD, 0, _PacketDecoder.hold),
         (spec.FEATURE_FADE, spec.OP_FADE, 0, _PacketDecoder.fade),
         (_ramp_feature(features), spec.OP_RAMP, 0, _PacketDecoder.ramp),
         (None, spec.OP_STEP, spec.LIMIT_MAX_OCTANT, _PacketDecoder.step),

@@ -61,6 +61,8 @@ class Session:
         self._newest = _NO_FRAME  # f of section 6
         self._clear = False  # the CLEAR flag with which f began
         self._commit: int | None = None  # lowest sequence number of a COMMIT of f
+        self._hold = 0  # of f
+        self._since = spec.LIMIT_MAX_HOLD  # ticks since the last exchange
 
     def _ahead(self, seq: int) -> int:
         return (seq - self.next) % 256
@@ -133,6 +135,7 @@ class Session:
         self._newest = frame
         self._clear = bool(flags & spec.DATA_FLAG_CLEAR)
         self._commit = None
+        self._hold = 0
 
     def mark_received(self, seq: int, flags: int) -> None:
         """Mark a packet of f as received, and update the state if f is whole now."""
@@ -154,7 +157,17 @@ class Session:
             if not present:
                 return
 
+    def hold(self, ticks: int) -> None:
+        """Record a hold that a packet of f names (7.12)."""
+        self._hold = max(self._hold, ticks)
+
+    def tick(self, count: int) -> bool:
+        """Count refresh ticks; return whether f is to be exchanged at the last of them (7.12)."""
+        self._since = min(self._since + count, spec.LIMIT_MAX_HOLD)
+        return self.state is BackPage.PENDING and self._since >= self._hold
+
     def swap(self) -> None:
         """Record that f is on display."""
+        self._since = 0
         self.shown = self._newest
         self.state = BackPage.EMPTY

@@ -70,6 +70,7 @@ FEATURE_DIGEST: Final = 8
 FEATURE_SLABS: Final = 9
 FEATURE_FADE: Final = 10
 FEATURE_ARC2: Final = 11
+FEATURE_HOLD: Final = 12
 
 # 6 DATA, frames and pages
 DATA_FLAG_CLEAR: Final = 1
@@ -83,6 +84,7 @@ OP_LINE: Final = 0x03
 OP_BOX: Final = 0x04
 OP_DOTS: Final = 0x05
 OP_COLORS: Final = 0x06
+OP_HOLD: Final = 0x07
 OP_FADE: Final = 0x08
 OP_RAMP: Final = 0x09
 OP_STEP: Final = 0x20
@@ -194,6 +196,8 @@ LIMIT_MAX_DOTS: Final = 256
 LIMIT_MAX_LEVEL: Final = 4
 LIMIT_MAX_COLORS: Final = 256
 LIMIT_MAX_FADE: Final = 0x100000
+LIMIT_MAX_HOLD: Final = 255
+LIMIT_MAX_HELD: Final = 1000
 LIMIT_MAX_STATUS: Final = 4
 LIMIT_MAX_SILENT: Final = 8
 

@@ -89,15 +89,18 @@ class PlainDecoder:
         group = op & 0xE0
         names = {0x20: "STEP", 0x40: "FROM", 0x60: "OCT", 0x80: "SKIP", 0xA0: "RUN", 0xC0: "LIT",
                  0xE0: "DIFF"}  # fmt: skip
-        low = ["END", "PEN", "MOVE", "LINE", "BOX", "DOTS", "COLORS", "", "FADE", "RAMP"]
+        low = ["END", "PEN", "MOVE", "LINE", "BOX", "DOTS", "COLORS", "HOLD", "FADE", "RAMP"]
         name = names[group] if group else low[op]
         self.ops.append(name)
         methods = {"PEN": self.set_pen, "FROM": self.go_from}
         methods.get(name, getattr(self, name.lower(), None))(op)
         if name in {"PEN", "LIT", "DIFF"}:
             self.fading = None
-        if name not in {"OCT", "COLORS", "RAMP", "PEN"}:
+        if name not in {"OCT", "COLORS", "RAMP", "PEN", "HOLD"}:
             self.again = self.fading is not None and name in {"STEP", "FROM", "LINE", "DOTS"}
+
+    def hold(self, _op):
+        self.byte()
 
     # -- fades: [number of voxels, colours, place]
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, OUTPUT = ROOT / "protocol.md", ROOT / "vectors.json"
 ABOUT = "The vectors of protocol.md, section 17, made by tools/vectors_json.py. Hex is lower case."
 HEX_KEYS = {"decoded", "encoded", "bytes", "crc", "packet", "wire", "ops"}
-OF_INDEX8, NOT_OF_MONO1 = {"DIFF", "PALETTE"}, {"FADE"}  # section 5
+OF_INDEX8, NOT_OF_MONO1, WITH_TICKS = {"DIFF", "PALETTE"}, {"FADE"}, "HOLD"  # section 5
 
 
 def plain_hex(text: str) -> str:
@@ -71,6 +71,7 @@ def parse_vector(kind: str, name: str, body: str, features: list[str]) -> dict[s
     elif kind in {"ops", "refused"}:
         format_ = vector["format"]
         hidden = {
+            WITH_TICKS,
             *(() if format_ == "INDEX8" else OF_INDEX8),
             *(NOT_OF_MONO1 if format_ == "MONO1" else ()),
         }

@@ -10,6 +10,7 @@ from broken_devices import (  # noqa: F401 - each registers its own
     fades,
     frames,
     handshake,
+    holds,
     noise,
     ops,
     packets,

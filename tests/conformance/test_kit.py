@@ -79,7 +79,7 @@ def explain(report):
 def device_of(vector):
     pixel_format = getattr(spec, f"FORMAT_{vector['format']}")
     allowed = dict(vector.lines).get("features")
-    names = allowed.split("|") if allowed else list(FEATURES)
+    names = allowed.split("|") if allowed else [name for name in FEATURES if name != "HOLD"]
     if pixel_format != spec.FORMAT_INDEX8:
         names = [name for name in names if name not in {"DIFF", "PALETTE"}]
     if pixel_format == spec.FORMAT_MONO1:

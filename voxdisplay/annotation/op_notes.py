@@ -21,6 +21,7 @@ _OPS = {
     spec.OP_BOX: "BOX",
     spec.OP_DOTS: "DOTS",
     spec.OP_COLORS: "COLORS",
+    spec.OP_HOLD: "HOLD",
     spec.OP_FADE: "FADE",
     spec.OP_RAMP: "RAMP",
     spec.OP_ARC: "ARC",
@@ -97,6 +98,8 @@ class AnnotatingDecoder(ReferenceDecoder):
             words.append(f"by {'xyz'[main]},")
         elif op & 0xE0 == spec.OP_OCT:
             words.append(f"side {1 << (op & 0x1F)},")
+        if op == spec.OP_HOLD:
+            words.append(f"{operands[0]} ticks,")
         if op in {spec.OP_PEN, spec.OP_COLORS, spec.OP_FADE, spec.OP_RAMP}:
             words.append(operands[:16].hex(" ") + (" ..." if len(operands) > 16 else ""))
         if self._drawn:

@@ -138,6 +138,11 @@ def fade(device: AnnouncedDevice, stops: Sequence[Sequence[int]], count: int, at
     return head + b"".join(bytes(stop[: color_bytes(device)]) for stop in stops)
 
 
+def hold(ticks: int) -> bytes:
+    """Return HOLD."""
+    return bytes((spec.OP_HOLD, ticks))
+
+
 def ramp(first: int, count: int, stops: Sequence[Sequence[int]]) -> bytes:
     """Return RAMP of colours over ``count`` entries."""
     head = bytes((spec.OP_RAMP, first, count - 1, len(stops) - 1))

@@ -36,6 +36,7 @@ class ReferenceDecoder:
         self.cursor = 0
         self.pen = device.full_pixel
         self.fade: Fade | None = None
+        self.hold = 0
         self._payload = b""
         self._at = 0
         self._op_at = 0
@@ -57,6 +58,7 @@ class ReferenceDecoder:
     def begin_packet(self) -> None:
         """Reset the cursor to 0 and the pen to the full pixel."""
         self.cursor, self.pen, self.fade = 0, self.device.full_pixel, None
+        self.hold = 0
 
     def coordinates(self, a: int, b: int, c: int) -> Voxel:
         """Return x, y, z of coordinates as they were sent: in the order x, y, z."""
@@ -373,6 +375,10 @@ class ReferenceDecoder:
         part = range(side)
         return [(x + i, y + j, z + k) for k in part for j in part for i in part]
 
+    def op_hold(self, _: int) -> None:
+        """HOLD: name the ticks for which the frame before stays on display."""
+        self.hold = max(self.hold, self._byte())
+
     def op_colors(self, _: int) -> None:
         """COLORS: set entries of the palette."""
         first = self._byte()
@@ -421,6 +427,7 @@ _OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] 
     (spec.OP_BOX, 0, "BOX", ReferenceDecoder.op_box),
     (spec.OP_DOTS, 0, "DOTS", ReferenceDecoder.op_dots),
     (spec.OP_COLORS, 0, "PALETTE", ReferenceDecoder.op_colors),
+    (spec.OP_HOLD, 0, "HOLD", ReferenceDecoder.op_hold),
     (spec.OP_FADE, 0, "FADE", ReferenceDecoder.op_fade),
     (spec.OP_RAMP, 0, "RAMP", ReferenceDecoder.op_ramp),
     (spec.OP_STEP, spec.LIMIT_MAX_OCTANT, "", ReferenceDecoder.op_step),

@@ -247,6 +247,10 @@ class _Parser:
             raise self._error("a mono1 pixel is 0 or 1")
         self._fade.end()
 
+    def read_hold(self) -> None:
+        """Read HOLD, which draws nothing."""
+        self._take(1)
+
     def read_fade(self) -> None:
         """Read FADE."""
         stops = self._take(1)[0] + 1
@@ -442,6 +446,7 @@ _SIMPLE: Final = {
     spec.OP_BOX: _Parser.read_box,
     spec.OP_DOTS: _Parser.read_dots,
     spec.OP_COLORS: _Parser.read_colors,
+    spec.OP_HOLD: _Parser.read_hold,
     spec.OP_FADE: _Parser.read_fade,
     spec.OP_RAMP: _Parser.read_ramp,
     spec.OP_ARC: _Parser.read_arc,

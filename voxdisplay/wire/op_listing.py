@@ -14,6 +14,7 @@ from voxdisplay.wire import spec
 from voxdisplay.wire.op_encoding import SHORT_COUNT, EncoderConfig
 
 UNKNOWN: Final = "?"
+_HOLD_BYTES: Final = 2
 _CRUMBS_PER_BYTE: Final = 4
 
 
@@ -125,6 +126,7 @@ _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]
         lambda payload, at, config: 2 + (payload[at + 1] + 1) * config.position_bytes,
     ),
     "COLORS": (spec.OP_COLORS, 0xFF, lambda payload, at, _config: 3 + 3 * (payload[at + 2] + 1)),
+    "HOLD": (spec.OP_HOLD, 0xFF, lambda _payload, _at, _config: _HOLD_BYTES),
     "FADE": (spec.OP_FADE, 0xFF, _fade),
     "RAMP": (spec.OP_RAMP, 0xFF, lambda payload, at, _config: 4 + 3 * (payload[at + 3] + 1)),
     "STEP": (spec.OP_STEP, 0xE0, _chain),

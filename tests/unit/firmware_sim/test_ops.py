@@ -46,7 +46,7 @@ OP, COUNT, TRUNCATED, PADDING, PIXEL, OUTSIDE = range(7, 13)
 @pytest.mark.parametrize(
     ("name", "ops", "code", "offset"),
     [
-        *(("index8", f"a0 {op:02x}", OP, 4) for op in (7, *range(10, 32), *range(0x65, 0x80))),
+        *(("index8", f"a0 {op:02x}", OP, 4) for op in (*range(10, 32), *range(0x65, 0x80))),
         *(("rgb565", f"{op:02x}", OP, 3) for op in (6, *range(0xE0, 0x100))),
         *(("index8", f"{op:02x} 00 00 00 00 00", OP, 3) for op in (*range(0x38, 0x40), 0x5B, 0x5F)),
         ("index8", "9f 80 00", COUNT, 3),
@@ -96,6 +96,7 @@ OP, COUNT, TRUNCATED, PADDING, PIXEL, OUTSIDE = range(7, 13)
         ("index8", "a0 05", TRUNCATED, 4),
         ("index8", "a0 05 01 03 00 00 09 09", TRUNCATED, 4),
         ("index8", "a0 06 00", TRUNCATED, 4),
+        ("index8", "a0 07", TRUNCATED, 4),
         ("index8", "06 ff 01 00 00 00 00 00", TRUNCATED, 3),
         ("index8", "60 02 04", TRUNCATED, 3),
         ("index8", "62 00 00 00 03 01", TRUNCATED, 3),

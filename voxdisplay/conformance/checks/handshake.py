@@ -47,6 +47,8 @@ def info_fields(probe: Probe) -> None:
     for name in ("DIFF", "PALETTE"):
         fits = not device.has(name) or info.format == spec.FORMAT_INDEX8
         probe.require(fits, f"{name} only with the format INDEX8", info)
+    ticks = not device.has("HOLD") or device.refresh > 0
+    probe.require(ticks, "HOLD only with refresh ticks", info)
 
 
 @check("5", "info-strings", "INFO ends with three strings in UTF-8")

@@ -103,6 +103,7 @@ def reserved_ops(probe: Probe) -> None:
         spec.OP_BOX: "BOX",
         spec.OP_DOTS: "DOTS",
         spec.OP_COLORS: "PALETTE",
+        spec.OP_HOLD: "HOLD",
         spec.OP_FADE: "FADE",
         spec.OP_RAMP: "RAMP",
         spec.OP_ARC: "ARC",
@@ -155,6 +156,7 @@ def truncated(probe: Probe) -> None:
         "OCT": bytes((spec.OP_OCT | 2,)) + place + b"\3\1\1",
         "DIFF": bytes((spec.OP_DIFF | 4, 0, 0, 0)),
         "PALETTE": ops.colors(3, [(1, 2, 3), (4, 5, 6)]),
+        "HOLD": ops.hold(1),
     }
     whole += [op for name, op in more.items() if device.has(name)]
     for op in whole:
