@@ -9,6 +9,9 @@ import document
 import pytest
 from conftest import ROOT
 
+from voxdisplay.annotation.capture_file import DEVICE, HOST
+from voxdisplay.annotation.line_monitor import LineMonitor
+
 SCENE = {"type": "segment", "from": [0.5, 0.5, 0.5], "to": [2.5, 4.5, 6.5], "color": "red"}
 # ACK: kind, next, frame, last, session, boot, received, credit, digest, damaged
 DIGEST_AT = 16
@@ -206,3 +209,22 @@ def test_text_of_a_device_does_not_steer_the_terminal(tmp_path, captured):
     printed = explained(tmp_path, tampered(captured, 9, named))
     assert "\x1b" not in printed.stdout
     assert "[2Jisplay emulator" in printed.stdout
+
+
+@pytest.mark.parametrize(("ticks", "too_long"), [(10, False), (11, True)])
+def test_frames_that_are_held_for_more_than_a_second_together(ticks, too_long):
+    monitor = LineMonitor()
+    texts = {"features": "READ|DIGEST|HOLD", "refresh": "20000"}
+    (dialogue,) = (v for v in document.vectors("dialogue") if v.name == "held-for-three-ticks")
+    assert dict(dialogue.lines).items() >= texts.items()
+    hello, info = [
+        bytes.fromhex(text) for key, text in dialogue.lines if key in {"host", "device"}
+    ][:2]
+    for to, body in ((DEVICE, hello), (HOST, info)):
+        monitor.delimiter(to)
+        monitor.packet(to, body, len(body) + 6)
+    dropped = bytes((0x11, 0, 0, 7, 9))
+    packets = [dropped, bytes((0x15, 1, 1, 7, 10, 7, 3)), bytes((0x15, 2, 2, 7, ticks))]
+    remarks = [remark for body in packets for remark in monitor.packet(DEVICE, body, 20)]
+    assert any("HOLD" in remark.text and "10 ticks" in remark.text for remark in remarks)
+    assert any(remark.section == "7.12" for remark in remarks) == too_long

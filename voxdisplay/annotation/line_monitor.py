@@ -29,6 +29,7 @@ class _Frame:
     payloads: dict[int, bytes] = field(default_factory=dict)
     written: dict[int, tuple[int, int]] = field(default_factory=dict)  # index -> (value, seq)
     commit: int | None = None
+    hold: int = 0
 
 
 @dataclass
@@ -200,7 +201,11 @@ class LineMonitor:
             current.commit = seq
         payload = body[packets.HEADER_BYTES :]
         current.payloads[seq] = payload
-        for index, value in self._ops(payload).items():
+        decoder = self._ops(payload)
+        if decoder.hold > current.hold:
+            current.hold = decoder.hold
+            self._check_holds(session)
+        for index, value in decoder.written.items():
             before, by = current.written.setdefault(index, (value, seq))
             if before != value and by != seq:
                 voxel = self._device.voxel_at(index)
@@ -208,8 +213,15 @@ class LineMonitor:
                 break
             current.written[index] = (value, seq)
 
-    def _ops(self, payload: bytes) -> dict[int, int]:
-        """Remark on each op; return the pixels that they write, by index."""
+    def _check_holds(self, session: _Session) -> None:
+        """Remark on holds of frames on their way that are too long together: section 7.12."""
+        whole = [frame for frame in session.frames[:-1] if frame.commit is not None]
+        ticks = sum(frame.hold for frame in (*whole, session.frames[-1]))
+        if ticks * 1_000_000 > spec.LIMIT_MAX_HELD * self._device.refresh:
+            self._note(f"frames that are not on display are held for {ticks} ticks", "7.12")
+
+    def _ops(self, payload: bytes) -> AnnotatingDecoder:
+        """Remark on each op; return the decoder that has drawn them."""
         decoder = AnnotatingDecoder(self._device)
         try:
             decoder.draw(payload)
@@ -220,7 +232,7 @@ class LineMonitor:
             self._note(f"{at:>5}  {op_name(payload[refused.at])} must be refused: {code}", "11")
         else:
             self._remarks += decoder.remarks
-        return decoder.written
+        return decoder
 
     # -- packets of the device
 
