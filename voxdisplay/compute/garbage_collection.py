@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+Part = TypeVar("Part")
 
 
 @contextmanager
@@ -21,3 +24,19 @@ def garbage_collection_paused() -> Iterator[None]:
         yield
     finally:
         gc.enable()
+
+
+def collecting_between(parts: Iterable[Part]) -> Iterator[Part]:
+    """Yield parts; the garbage collector is paused while each is made and used, not in between.
+
+    Then it looks at the objects of one part, and not again and again at all there are.
+    """
+    ahead = iter(parts)
+    while True:
+        with garbage_collection_paused():
+            try:
+                part = next(ahead)
+            except StopIteration:
+                return
+            yield part
+            del part

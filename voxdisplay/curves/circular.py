@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from voxdisplay.compute.array_types import Evaluate, Floats, Ints
+from voxdisplay.compute.array_types import Bools, Evaluate, Floats, Ints
 from voxdisplay.curves import arguments
+from voxdisplay.curves.columns import are_moderate, from_columns
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.orthonormal_basis import orthonormal_bases, orthonormal_basis
 from voxdisplay.expressions.interval import Interval
@@ -132,9 +133,27 @@ class Ellipse(_Helical):
     """
 
     def __init__(self, center: ArrayLike, axes: ArrayLike, *, closed: bool = True) -> None:
-        a, b = half_axes = arguments.array("axes", axes, (2, 3))
+        a, b = arguments.array("axes", axes, (2, 3))
         super().__init__(center, a, b, closed=closed)
-        self._arguments = {"center": self._center[:, 0], "axes": half_axes}
+
+    @cached_property
+    def _arguments(self) -> Mapping[str, object]:  # type: ignore[override]  # made when it is shown
+        return {"center": self._numbers[0], "axes": self._numbers[1:3]}
+
+    @classmethod
+    @np.errstate(all="ignore")
+    def many(cls, center: Floats, axes: Floats, closed: Sequence[bool]) -> list[Ellipse | None]:
+        """Return many ellipses, which cost less than one by one; None where an argument is wrong.
+
+        Parameters
+        ----------
+        center : (n, 3) float64 array
+        axes : (n, 2, 3) float64 array
+        closed : sequence of bool
+
+        """
+        numbers = np.stack((center, *axes.transpose(1, 0, 2), np.zeros_like(center)), axis=1)
+        return from_columns(cls, are_moderate(numbers), _numbers=numbers, closed=closed)
 
 
 class Circle(_Helical):
@@ -182,24 +201,18 @@ class Circle(_Helical):
         closed : sequence of bool
 
         """
-        u, v, good = orthonormal_bases(normal)
-        good &= (radius > 0) & (radius <= arguments.MAX_MAGNITUDE)
-        for points in center, normal:
-            good &= (np.abs(points) <= arguments.MAX_MAGNITUDE).all(axis=1)
-        size = radius[:, None]
-        numbers = np.stack((center, size * u, size * v, np.zeros_like(center)), axis=1)
-        circles: list[Circle | None] = []
-        rows = zip(numbers, radius.tolist(), normal, closed, good.tolist(), strict=True)
-        for row, own_radius, own_normal, is_closed, is_good in rows:
-            if not is_good:
-                circles.append(None)
-                continue
-            circle = cls.__new__(cls)
-            circle._numbers, circle._radius, circle._normal = row, own_radius, own_normal
-            if not is_closed:
-                circle.closed = False
-            circles.append(circle)
-        return circles
+        numbers, good = _circular_numbers(center, radius, normal)
+        columns = {"_numbers": numbers, "_radius": radius.tolist(), "_normal": normal}
+        return from_columns(cls, good, closed=closed, **columns)
+
+
+def _circular_numbers(center: Floats, radius: Floats, normal: Floats) -> tuple[Floats, Bools]:
+    """Return ``_numbers`` of many circles, (n, 4, 3), and where all arguments are good, (n,)."""
+    u, v, good = orthonormal_bases(normal)
+    good &= (radius > 0) & (radius <= arguments.MAX_MAGNITUDE)
+    good &= are_moderate(center) & are_moderate(normal)
+    size = radius[:, None]
+    return np.stack((center, size * u, size * v, np.zeros_like(center)), axis=1), good
 
 
 class Arc(_Helical):
@@ -233,14 +246,55 @@ class Arc(_Helical):
         turn = math.copysign(1.0, end - start)  # clockwise: t is minus the angle
         t_range = arguments.parameter_range("angle", turn * start, turn * end)
         super().__init__(center, radius * u, turn * radius * v, t_range=t_range, closed=closed)
-        self._arguments = {
-            "center": self._center[:, 0],
-            "radius": radius,
+        self._radius, self._normal, self._turn = radius, normal, turn
+
+    @cached_property
+    def _arguments(self) -> Mapping[str, object]:  # type: ignore[override]  # made when it is shown
+        start, end = (self._turn * angle for angle in self.t_range)
+        return {
+            "center": self._numbers[0],
+            "radius": self._radius,
             "start": start,
             "end": end,
-            "normal": normal,
-            "closed": closed,
+            "normal": self._normal,
+            "closed": self.closed,
         }
+
+    @classmethod
+    @np.errstate(all="ignore")
+    def many(
+        cls,
+        center: Floats,
+        radius: Floats,
+        angles: Floats,
+        normal: Floats,
+        closed: Sequence[bool | None],
+    ) -> list[Arc | None]:
+        """Return many arcs, which cost less than one by one; None where an argument is wrong.
+
+        Parameters
+        ----------
+        center, normal : (n, 3) float64 array
+        radius : (n,) float64 array
+        angles : (n, 2) float64 array
+            Starts and ends.
+        closed : sequence of bool or None
+
+        """
+        numbers, good = _circular_numbers(center, radius, normal)
+        good &= are_moderate(angles) & (angles[:, 0] != angles[:, 1])
+        turn = np.where(angles[:, 1] < angles[:, 0], -1.0, 1.0)
+        numbers[:, 2] *= turn[:, None]  # to the bit, as it is the sign alone
+        return from_columns(
+            cls,
+            good,
+            _numbers=numbers,
+            _radius=radius.tolist(),
+            _normal=normal,
+            _turn=turn.tolist(),
+            t_range=map(tuple, (turn[:, None] * angles).tolist()),
+            closed=closed,
+        )
 
 
 class Helix(_Helical):

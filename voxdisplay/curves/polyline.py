@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from voxdisplay.compute.array_types import Evaluate, Floats
 from voxdisplay.curves import arguments
+from voxdisplay.curves.columns import are_moderate, from_columns
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.span_bounds import Box, enclose_spans
 from voxdisplay.expressions.interval import interval
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -44,7 +46,8 @@ class Polyline(Curve):
             vertices = np.concatenate((vertices, vertices[:1]))
         self.closed = closed
         self.t_range = (0.0, len(vertices) - 1.0)
-        self.breaks = np.arange(1.0, len(vertices) - 1)
+        if len(vertices) > 2:
+            self.breaks = np.arange(1.0, len(vertices) - 1)
         self.family = len(vertices)
         self._vertices = vertices.T.copy()
 
@@ -120,8 +123,30 @@ class Segment(Polyline):
 
     """
 
+    family = 2
+    t_range = (0.0, 1.0)
+
     def __init__(self, start: ArrayLike, end: ArrayLike, *, closed: bool | None = None) -> None:
         begin, stop = arguments.vector("start", start), arguments.vector("end", end)
-        super().__init__((begin, stop))
         self.closed = closed
-        self._arguments = {"start": begin, "end": stop, "closed": closed}
+        self._vertices = np.stack((begin, stop), axis=1)
+
+    @cached_property
+    def _arguments(self) -> Mapping[str, object]:  # type: ignore[override]  # made when it is shown
+        start, end = self._vertices.T
+        return {"start": start, "end": end, "closed": self.closed}
+
+    @classmethod
+    def many(
+        cls, start: Floats, end: Floats, closed: Sequence[bool | None]
+    ) -> list[Segment | None]:
+        """Return many segments, which cost less than one by one; None where an argument is wrong.
+
+        Parameters
+        ----------
+        start, end : (n, 3) float64 array
+        closed : sequence of bool or None
+
+        """
+        vertices = np.stack((start, end), axis=2)
+        return from_columns(cls, are_moderate(vertices), _vertices=vertices, closed=closed)

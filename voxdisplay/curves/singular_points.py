@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -94,6 +94,7 @@ class _Side:
             points[self.row, near] = self.at_limit + share * (self.at_end - self.at_limit)
 
 
+@final
 class CompletedCurve(Curve):
     """A curve with isolated singular parameters, where it takes the limits of its sides.
 
@@ -167,7 +168,8 @@ class CompletedCurve(Curve):
 
 def singular_points(curve: Curve) -> tuple[SingularPoint, ...]:
     """Return the singular parameters of a curve that `complete` returned, ascending."""
-    return curve.singular_points if isinstance(curve, CompletedCurve) else ()
+    # isinstance takes longer for abstract classes, and there may be many curves.
+    return curve.singular_points if type(curve) is CompletedCurve else ()
 
 
 @np.errstate(all="ignore")

@@ -13,12 +13,13 @@ import numpy as np
 from voxdisplay.compute.array_types import Evaluate, Floats
 from voxdisplay.compute.kernel_backend import with_kernel
 from voxdisplay.curves import arguments
+from voxdisplay.curves.columns import are_moderate, from_columns
 from voxdisplay.curves.curve import Curve
 from voxdisplay.curves.span_bounds import Box, control_box, enclose_spans
 from voxdisplay.expressions.interval import Interval, interval
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -52,7 +53,33 @@ class Bezier(Curve):
         self._points = arguments.points("points", points, least=2)
         _check_degree("points", len(self._points) - 1)
         self.family = len(self._points)
-        self._arguments = {"points": self._points, "closed": closed}
+
+    @cached_property
+    def _arguments(self) -> Mapping[str, object]:  # type: ignore[override]  # made when it is shown
+        return {"points": self._points, "closed": self.closed}
+
+    @classmethod
+    def many(cls, points: Floats, closed: Sequence[bool | None]) -> list[Bezier | None]:
+        """Return many curves of one degree, which cost less than one by one.
+
+        Parameters
+        ----------
+        points : (m, n, 3) float64 array
+            The control points of each.
+        closed : sequence of bool or None
+
+        Returns
+        -------
+        list of Bezier or None
+            None where an argument is wrong.
+
+        """
+        size = points.shape[1]
+        if not 2 <= size <= MAX_DEGREE + 1:
+            return [None] * len(points)
+        families = [size] * len(points)
+        good = are_moderate(points)
+        return from_columns(cls, good, _points=points, closed=closed, family=families)
 
     @cached_property
     def _slopes(self) -> Floats:

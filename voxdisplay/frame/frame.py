@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from voxdisplay import voxelization
 from voxdisplay.argument_checks import wrong_kind
 from voxdisplay.bodies.body import Body
+from voxdisplay.compute.garbage_collection import collecting_between
 from voxdisplay.curves.curve import Curve
 from voxdisplay.frame.drawing import Drawing
 from voxdisplay.frame.framebuffer import Framebuffer
@@ -174,7 +175,7 @@ class Frame(Framebuffer):
         """
         items: list[DrawnVoxels] = []
         drawings: list[Drawing] = []
-        for batch in batches:
+        for batch in collecting_between(batches):
             for _, members in groupby(batch, key=_is_set):
                 same = list(members)
                 sets = [(v, c) for v, c in same if isinstance(v, voxelization.VoxelSet)]

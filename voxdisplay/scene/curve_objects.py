@@ -5,13 +5,14 @@ it must not know files. In angles, ``deg`` is a constant: ``"90*deg"``.
 """
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Annotated, ClassVar
 
-import numpy as np
 from msgspec import Meta, field
 
 from voxdisplay import bodies, curves
 from voxdisplay.bodies import Body
+from voxdisplay.scene.columns import curves_in_columns
 from voxdisplay.scene.evaluation_context import EvaluationContext
 from voxdisplay.scene.point_keys import Gaps, InlinePoints, PointsFile, points_of
 from voxdisplay.scene.scene_object import Axis, Center, Normal, Radius, SceneObject
@@ -96,6 +97,17 @@ class Segment(CurveObject, tag="segment", frozen=True):
             context.numbers("from", self.start), context.numbers("to", self.end), closed=self.closed
         )
 
+    @classmethod
+    def build_plain(cls, objects: Sequence["Segment"]) -> list[curves.Curve | None]:
+        """Return many segments: `SceneObject.build_plain`."""
+        return curves_in_columns(
+            objects,
+            lambda each: (*each.start, *each.end),
+            lambda table, some: curves.Segment.many(
+                table[:, :3], table[:, 3:], [each.closed for each in some]
+            ),
+        )
+
 
 class Polyline(CurveObject, tag="polyline", frozen=True):
     """Straight lines from point to point, and back to the first if closed is true."""
@@ -130,6 +142,17 @@ class Arc(CurveObject, tag="arc", frozen=True):
             closed=self.closed,
         )
 
+    @classmethod
+    def build_plain(cls, objects: Sequence["Arc"]) -> list[curves.Curve | None]:
+        """Return many arcs: `SceneObject.build_plain`."""
+        return curves_in_columns(
+            objects,
+            lambda each: (*each.center, *each.normal, each.radius, each.start, each.end),
+            lambda table, some: curves.Arc.many(
+                table[:, :3], table[:, 6], table[:, 7:], table[:, 3:6], [o.closed for o in some]
+            ),
+        )
+
 
 class Circle(CurveObject, tag="circle", frozen=True):
     """A circle in the plane across normal."""
@@ -150,19 +173,16 @@ class Circle(CurveObject, tag="circle", frozen=True):
     @classmethod
     def build_plain(cls, objects: Sequence["Circle"]) -> list[curves.Curve | None]:
         """Return many circles: `SceneObject.build_plain`."""
-        rows = [
-            (*each.center, *each.normal, each.radius) if each.thickness is None else ("",)
-            for each in objects
-        ]
-        found: list[curves.Curve | None] = [None] * len(objects)
-        plain = [i for i, row in enumerate(rows) if set(map(type, row)) == {float}]
-        if plain:
-            table = np.array([rows[i] for i in plain])
-            closed = [objects[i].closed is not False for i in plain]
-            circles = curves.Circle.many(table[:, :3], table[:, 6], table[:, 3:6], closed)
-            for i, circle in zip(plain, circles, strict=True):
-                found[i] = circle
-        return found
+        return curves_in_columns(
+            objects,
+            lambda each: (*each.center, *each.normal, each.radius),
+            lambda table, some: curves.Circle.many(
+                table[:, :3],
+                table[:, 6],
+                table[:, 3:6],
+                [each.closed is not False for each in some],
+            ),
+        )
 
 
 class Ellipse(CurveObject, tag="ellipse", frozen=True):
@@ -184,6 +204,19 @@ class Ellipse(CurveObject, tag="ellipse", frozen=True):
             context.numbers("center", self.center),
             context.points("axes", self.axes),
             closed=self.closed is not False,
+        )
+
+    @classmethod
+    def build_plain(cls, objects: Sequence["Ellipse"]) -> list[curves.Curve | None]:
+        """Return many ellipses: `SceneObject.build_plain`."""
+        return curves_in_columns(
+            objects,
+            lambda each: (*each.center, *each.axes[0], *each.axes[1]),
+            lambda table, some: curves.Ellipse.many(
+                table[:, :3],
+                table[:, 3:].reshape(-1, 2, 3),
+                [each.closed is not False for each in some],
+            ),
         )
 
 
@@ -281,6 +314,17 @@ class Bezier(CurveObject, tag="bezier", frozen=True):
     def build_curve(self, context: EvaluationContext) -> curves.Bezier:
         """Return the curve."""
         return curves.Bezier(context.points("points", self.points), closed=self.closed)
+
+    @classmethod
+    def build_plain(cls, objects: Sequence["Bezier"]) -> list[curves.Curve | None]:
+        """Return many curves: `SceneObject.build_plain`."""
+        return curves_in_columns(
+            objects,
+            lambda each: tuple(chain.from_iterable(each.points)),
+            lambda table, some: curves.Bezier.many(
+                table.reshape(len(table), -1, 3), [each.closed for each in some]
+            ),
+        )
 
 
 class BSpline(CurveObject, tag="bspline", frozen=True):

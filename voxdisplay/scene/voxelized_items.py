@@ -86,12 +86,12 @@ def voxelized_batches(
 
     Voxels of curves that are not held on to need no memory when the next ones come.
     """
+    kinds = [type(item.shape) for item in items]
+    are_bodies = {kind for kind in set(kinds) if issubclass(kind, Body)}
     bodies = {
-        i: _voxelize_body(item, clip, {})
-        for i, item in enumerate(items)
-        if isinstance(item.shape, Body)
+        i: _voxelize_body(items[i], clip, {}) for i, kind in enumerate(kinds) if kind in are_bodies
     }
-    sequences = _sequences([item for item in items if not isinstance(item.shape, Body)])
+    sequences = _sequences([item for i, item in enumerate(items) if i not in bodies])
     together: list[tuple[SceneItem, Sequence | VoxelSet]] = []
     for i, item in enumerate(items):
         together.append((item, bodies.pop(i) if i in bodies else next(sequences)))

@@ -15,6 +15,7 @@ from typing import Any, overload
 
 from voxdisplay.argument_checks import choice, flag, instance, whole_number, wrong_kind
 from voxdisplay.bodies.body import Body
+from voxdisplay.compute.garbage_collection import collecting_between
 from voxdisplay.curves.curve import Curve
 from voxdisplay.voxelization.body_voxelization import MAX_SPAN, box_of, voxelize_body
 from voxdisplay.voxelization.digitise import digitise
@@ -164,7 +165,7 @@ def voxelize_many(
     if method == "grid-plane":
         if pitch is not None or reach is not None:
             raise ValueError("pitch and reach are the march's: they go with method='march'")
-        return list(chain.from_iterable(digitise(curves, certified=certified)))
+        return list(chain.from_iterable(collecting_between(digitise(curves, certified=certified))))
     if certified:
         raise ValueError("nothing is proven of the march: certified goes with 'grid-plane'")
     # Curves that are drawn take the other method, and start sooner without this one.
@@ -204,6 +205,7 @@ def _as_curves(curves: Any) -> list[Curve]:
     if not isinstance(curves, Iterable) or getattr(curves, "ndim", 1) == 0:
         raise wrong_kind("curves", "an iterable of curves", curves)
     listed = list(curves)
-    for curve in listed:
-        instance("curve", curve, Curve, "a Curve")
+    if not all(issubclass(kind, Curve) for kind in set(map(type, listed))):
+        for curve in listed:
+            instance("curve", curve, Curve, "a Curve")
     return listed

@@ -55,6 +55,89 @@ def test_many_objects_are_those_that_each_is_alone() -> None:
     assert [item.path for item in many[:3]] == [f"$.objects[{i}]" for i in range(3)]
 
 
+def arc(rng):
+    start, end = rng.uniform(-9, 9, 2).tolist()
+    normal = rng.normal(size=3).round(1).tolist()
+    return {"center": vector(rng), "radius": 3.5, "start": start, "end": end, "normal": normal}
+
+
+def vector(rng):
+    return rng.uniform(-9, 9, 3).round(2).tolist()
+
+
+KINDS = {
+    "arc": arc,
+    "ellipse": lambda rng: {"center": vector(rng), "axes": [vector(rng), vector(rng)]},
+    "segment": lambda rng: {"from": vector(rng), "to": vector(rng)},
+    "bezier": lambda rng: {"points": [vector(rng) for _ in range(rng.integers(2, 5))]},
+}
+WRONG = {
+    "arc": [
+        {"start": 1.5, "end": 1.5},
+        {"end": 1e101},
+        {"radius": 0},
+        {"normal": [0, 0, 0]},
+    ],
+    "ellipse": [{"axes": [[1, 0, 0], [0, -1e101, 0]]}, {"center": [1e101, 0, 0]}],
+    "segment": [{"to": [0, 0, 1e101]}, {"from": ["nope", 0, 0]}],
+    "bezier": [{"points": []}, {"points": [[1, 2, 3]]}, {"points": [[1, 2, 3]] * 66}],
+}
+
+
+def of_kind(kind):
+    rng = np.random.default_rng(7)
+    found = [{"type": kind} | KINDS[kind](rng) for _ in range(COUNT)]
+    found[1] |= {"thickness": 2}
+    found[2] |= {"color": ["red", "blue"]}
+    found[3] |= {"closed": False}
+    number = next(each for each in found[4].values() if isinstance(each, list))
+    number[0] = "1 + 2" if isinstance(number[0], float) else ["1 + 2", 3, 4]
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_of_a_kind_are_those_that_each_is_alone(kind: str) -> None:
+    many = read(of_kind(kind)).items
+    alone = [item for each in of_kind(kind) for item in read([each]).items]
+    assert len(many) == len(alone) == COUNT
+    for one, other in zip(many, alone, strict=True):
+        assert (one.type, repr(one.shape)) == (other.type, repr(other.shape))
+        if isinstance(one.shape, vd.Curve):
+            first, second = one.curve, other.curve
+            assert (first.closed, first.t_range) == (second.closed, second.t_range)
+            assert (first.family, first.degree) == (second.family, second.degree)
+            t = np.linspace(*first.t_range, 9)
+            assert np.array_equal(first.position(t), second.position(t))
+            found = vd.voxelize(first)
+            assert np.array_equal(found.voxels, vd.voxelize(second).voxels)
+
+
+@pytest.mark.parametrize(("kind", "wrong"), [(k, each) for k, of in WRONG.items() for each in of])
+def test_the_first_wrong_object_of_a_kind_is_named(kind: str, wrong: dict[str, object]) -> None:
+    objects = of_kind(kind)
+    place = COUNT - 5
+    objects[place] |= wrong
+    objects[-1] |= WRONG[kind][0]
+    with pytest.raises(vd.SceneError) as alone:
+        read([objects[place]])
+    with pytest.raises(vd.SceneError) as many:
+        read(objects)
+    assert many.value.path.startswith(f"$.objects[{place}]")
+    assert (
+        str(many.value).replace(f"[{place}]", "[0]", 1).partition(":")[2:]
+        == str(alone.value).partition(":")[2:]
+    )
+    assert many.value.hint == alone.value.hint
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_of_many_is_pickled_alone(kind: str) -> None:
+    curve = read(of_kind(kind)).items[-1].curve
+    alone = pickle.loads(pickle.dumps(curve))  # noqa: S301 - our own
+    assert repr(alone) == repr(curve)
+    assert len(pickle.dumps(curve)) < 1000
+
+
 def test_a_circle_of_many_is_pickled_alone() -> None:
     curve = read(circles()).items[-1].curve
     alone = pickle.loads(pickle.dumps(curve))  # noqa: S301 - our own
