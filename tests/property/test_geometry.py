@@ -2,7 +2,7 @@
 
 import numpy as np
 from guarantees import check
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from space_curves import Function, backwards, chain, fourier_curve, moved, turned
 
@@ -73,12 +73,14 @@ def test_turning_the_axes_turns_the_voxels(
 
 
 @given(fouriers | polylines)  # at a cusp, only rounding tells one side from the other
+@example(chain(np.array([[0, -1e-38, 1], [0, 0, 0], [0, 0, 1]])))  # its ends are in two voxels
 @settings(max_examples=80, deadline=None)
 def test_reversing_a_curve_reverses_the_voxels(curve: Curve) -> None:
     here, there = voxelize(curve), voxelize(backwards(curve))
     assert here.closed == there.closed
     order = np.arange(len(here))[::-1]
-    if here.closed:  # both begin with the same voxel
+    # Both begin with the same voxel, unless a face of voxels lies between the ends.
+    if here.closed and np.array_equal(here.voxels[0], there.voxels[0]):
         order = np.roll(order, 1)
     assert np.array_equal(here.voxels[order], there.voxels)
 
