@@ -150,6 +150,7 @@ def test_push_imports_nothing_heavy(tmp_path):
     assert "firmware_sim.device" in loaded
     heavy = {"PIL", "scipy", "numba", "jsonschema", "usb", "websockets", "trimesh", "nibabel"}
     heavy |= {"nrrd", "pydicom", "uharfbuzz", "cmap", "dask", "asyncio", "multiprocessing"}
+    heavy |= {"anywidget", "ipywidgets", "traitlets", "IPython"}
     assert not heavy & {name.split(".")[0] for name in loaded}
     assert "tomllib" not in loaded
     assert "numpy.ma" not in loaded, "it takes as long to import as a small scene to draw"

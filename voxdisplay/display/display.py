@@ -6,6 +6,7 @@ Blocks in the caller's thread, and needs no other. Must not know bytes, threads 
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NoReturn, overload
@@ -31,10 +32,12 @@ __all__ = ["Display", "Receipt"]
 
 if TYPE_CHECKING:
     from voxdisplay.display.player import Late, Pacing, Player
+    from voxdisplay.display.shown_pictures import Shown
     from voxdisplay.frame import Fit
     from voxdisplay.frame.output_transform import OutputTransform
     from voxdisplay.shows.play_report import PlayReport
     from voxdisplay.shows.playable import Playable
+    from voxdisplay.view.notebook.live_view import LiveView
 
 
 class Display(PacedDisplay):
@@ -66,6 +69,7 @@ class Display(PacedDisplay):
     # Of a display with a profile: see `set_output`.
     _output: OutputTransform | None = None
     _user_info: tuple[DeviceInfo, DeviceInfo] | None = None
+    _view: LiveView | None = None  # in a notebook
     _limited = False  # it was noted that the current limit dims a picture
 
     def __repr__(self) -> str:
@@ -82,6 +86,51 @@ class Display(PacedDisplay):
         """Return a picture for notebooks of the frame last proved; None without one, or Pillow."""
         frame = self._operations.queue.displayed
         return frame._repr_png_() if frame else None
+
+    def show(self) -> None:
+        """Show what is displayed: in a notebook a live view, else in the picture viewer.
+
+        The live view follows the frames that this handle has shown, and stays as it is when the
+        display is closed. Another call shows the same view once more.
+
+        Raises
+        ------
+        MissingExtra
+            If Pillow is not installed.
+        VoxDisplayError
+            If there is no screen, or no picture viewer.
+
+        """
+        from voxdisplay.display.shown_pictures import ShownPictures, live_view  # noqa: PLC0415
+
+        if self._view is None:
+            first = self._first_shown()
+            source = ShownPictures(self.port, weakref.WeakMethod(self._shown))
+            self._view = live_view(source, first, self.port)
+            if self._view is None:
+                first.show()
+                return
+        self._view.display()
+
+    def _shown(self) -> Shown:
+        """Return what is displayed, or was before the display was closed; without a turn."""
+        from voxdisplay.display.shown_pictures import Shown  # noqa: PLC0415
+
+        is_open, info = not self._connection.closed, self._connection.info
+        picture = self._operations.queue.latest  # after `is_open`: there is no later one
+        return Shown(picture, info.grid, info.format, self._output, is_open)
+
+    def _first_shown(self) -> Frame:
+        """Return what is displayed, read back if need be; a blank frame if it cannot be."""
+        with self._turn() as operations:
+            operations.flush()
+            frame = self._shown().frame()
+        if frame is not None:
+            return frame
+        try:
+            return self.frame(keep=True)
+        except IncompatibleDevice:
+            return self.frame()
 
     @property
     def info(self) -> DeviceInfo:

@@ -203,6 +203,11 @@ class FrameQueue:
     # -- displayed
 
     @property
+    def latest(self) -> Picture | None:
+        """Picture that was displayed last, proved or not; must not be changed."""
+        return self._last
+
+    @property
     def displayed(self) -> Frame | None:
         """Frame that is displayed, if that is proved; must not be changed."""
         if self._displayed and self._displayed[1] == self._link.displayed:

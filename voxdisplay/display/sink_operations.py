@@ -64,6 +64,11 @@ class SinkQueue:
         self._ticket = 0
 
     @property
+    def latest(self) -> Frame | None:
+        """Frame that was sent last."""
+        return self.displayed
+
+    @property
     def has_unwaited(self) -> bool:
         """True if a frame waits to be sent."""
         return self._pending is not None

@@ -286,6 +286,8 @@ class Frame(Framebuffer):
     def show(self) -> None:
         """Show a picture of the frame: in a notebook's output, else in the picture viewer.
 
+        In a notebook it turns, with the extra ``notebook``.
+
         Raises
         ------
         MissingExtra

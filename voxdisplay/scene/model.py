@@ -14,6 +14,7 @@ import numpy as np
 from voxdisplay.argument_checks import choice, distances, instance, whole_number
 from voxdisplay.frame import FITS, Drawing, Fit, Frame
 from voxdisplay.raster.grid import Grid
+from voxdisplay.raster.pixel_map import PixelMap
 from voxdisplay.scene.best_view import BestView
 from voxdisplay.scene.content_fit import content_placement
 from voxdisplay.scene.item import PartSpan, SceneItem
@@ -29,6 +30,7 @@ Pitch: TypeAlias = tuple[float, float, float]
 
 DEFAULT_FPS = 30.0
 
+_MAX_FILM_FRAMES = 300  # of a view in a notebook
 _MAX_TYPES = 5  # of objects that a repr names
 
 
@@ -126,6 +128,33 @@ class Scene:
         frame = Frame(self.size or DEFAULT_SIZE)
         self.draw_on(frame)
         return frame._repr_png_()
+
+    def show(self) -> None:
+        """Show the scene: in a notebook a view that turns, and plays a scene that moves.
+
+        Outside a notebook, its picture in the picture viewer, of a moving scene at time 0. Of a
+        long one the view has fewer frames per second.
+
+        Raises
+        ------
+        MissingExtra
+            If Pillow is not installed.
+        VoxDisplayError
+            If there is no screen, or no picture viewer.
+        SceneError
+            As of `voxelize`.
+
+        """
+        from voxdisplay.view.film import LazyPages  # noqa: PLC0415 - needs an extra
+        from voxdisplay.view.rich_display import show_film  # noqa: PLC0415
+
+        blank = Frame(self.size or DEFAULT_SIZE)
+        film = self.show_on(blank, fit="none")
+        step = -(-self.frame_count // _MAX_FILM_FRAMES)
+        pages = LazyPages(
+            -(-self.frame_count // step), lambda number: PixelMap(*film.frame(number * step).lit())
+        )
+        show_film(pages, blank.grid, blank.format, fps=self.fps / step, view=self.view)
 
     def fitted(
         self, grid: Grid, mode: Fit = "contain", pitch: Pitch = (1.0, 1.0, 1.0)

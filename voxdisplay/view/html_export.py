@@ -12,7 +12,7 @@ import html
 import json
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -88,17 +88,34 @@ def save_html(
         )
         for number, one in enumerate(pages, 1)
     ]
-    packed = [zlib.compress(encode(frame), _LEVEL) for frame in frames]
-    data = json.dumps({"fps": fps, "frames": [base64.b64encode(f).decode() for f in packed]})
+    text = page_with({"fps": fps, "frames": [packed_text(frame) for frame in frames]}, title)
+    with atomic_write(Path(path)) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def packed_text(snapshot: Snapshot, level: int = _LEVEL) -> str:
+    """Return a snapshot's message, deflated at a level of zlib, in base64."""
+    return base64.b64encode(zlib.compress(encode(snapshot), level)).decode()
+
+
+def page_with(embedded: Mapping[str, object], title: str) -> str:
+    """Return the page with what is embedded in it, and a policy that lets it load nothing.
+
+    Parameters
+    ----------
+    embedded : mapping
+        ``frames``: list of `packed_text`, and ``fps``, their rate. ``cell``: true for the page in
+        a cell of a notebook; without frames, it takes those that the widget around it sends.
+    title : str
+
+    """
     text = page_html()
     for mark, more in (
         (
             _HEAD,
             f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy()}">\n',
         ),
-        (_PLACE, data),  # base64 and numbers: nothing in it ends the script
+        (_PLACE, json.dumps(embedded)),  # base64, numbers and words: nothing ends the script
     ):
         text = text.replace(mark, mark + more, 1)
-    text = text.replace(_TITLE, f"<title>{html.escape(printable(title))}</title>", 1)
-    with atomic_write(Path(path)) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
+    return text.replace(_TITLE, f"<title>{html.escape(printable(title))}</title>", 1)

@@ -8,9 +8,12 @@ for; without Pillow notebooks get none.
 from __future__ import annotations
 
 import io
+import math
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,11 @@ from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.palette import Colors
 from voxdisplay.raster.pixel_format import PixelFormat
 from voxdisplay.raster.pixel_map import PixelMap
+
+if TYPE_CHECKING:
+    from voxdisplay.view.camera import Camera
+    from voxdisplay.view.film import FilmJob
+    from voxdisplay.view.pillow import Image
 
 _MAX_SIDE = 65535  # of a grid that the camera takes
 
@@ -47,9 +55,7 @@ def page_png(
         from voxdisplay.view.picture import render_page  # noqa: PLC0415 - needs an extra
     except MissingExtra:
         return None
-    file = io.BytesIO()
-    render_page(page, grid, format, palette=palette).save(file, format="PNG")
-    return file.getvalue()
+    return png_file(render_page(page, grid, format, palette=palette))
 
 
 def voxels_png(voxels: NDArray[np.integer]) -> bytes | None:
@@ -79,9 +85,7 @@ def voxels_png(voxels: NDArray[np.integer]) -> bytes | None:
         return None
     positions = np.unique(voxels - low, axis=0).astype(np.uint16)
     lit = LitVoxels(positions, np.full(positions.shape, 255, dtype=np.uint8))
-    file = io.BytesIO()
-    render_voxels(lit, Grid(*sides), RenderOptions()).save(file, format="PNG")
-    return file.getvalue()
+    return png_file(render_voxels(lit, Grid(*sides), RenderOptions()))
 
 
 def save_page(
@@ -146,14 +150,52 @@ def show_page(
         If there is no screen, or no picture viewer.
 
     """
-    from voxdisplay.view.picture import render_page  # noqa: PLC0415 - needs an extra
+    show_film([page], grid, format, palette)
+
+
+def show_film(
+    pages: Sequence[NDArray[np.integer] | PixelMap],
+    grid: Grid,
+    format: PixelFormat,  # noqa: A002
+    palette: Colors | None = None,
+    *,
+    fps: float = 30.0,
+    view: tuple[float, float, float] | None = None,
+) -> None:
+    """Show pages that follow each other; outside a notebook, the first.
+
+    In a notebook that is a view that turns and plays, with the extra ``notebook``; without it, the
+    picture of the first page.
+
+    Parameters
+    ----------
+    pages : sequence of ndarray or PixelMap
+        At least one; each as of `page_png`.
+    grid, format, palette
+        As of `page_png`.
+    fps : float
+        Pages per second.
+    view : (yaw, pitch, zoom), optional
+        From where they are seen first: angles in degrees, as of `RenderOptions.with_view`.
+
+    Raises
+    ------
+    MissingExtra, VoxDisplayError
+        As of `show_page`.
+
+    """
+    from voxdisplay.view.film import FilmJob  # noqa: PLC0415
+    from voxdisplay.view.picture import RenderOptions, render_page  # noqa: PLC0415 - an extra
     from voxdisplay.view.pillow import ImageShow  # noqa: PLC0415
 
-    image = render_page(page, grid, format, palette=palette)
-    if _in_notebook():
-        from IPython.display import display  # noqa: PLC0415 - loaded already
-
-        display(image)
+    options = RenderOptions()
+    if view:
+        yaw, pitch, zoom = view
+        options = options.with_view((math.radians(yaw), math.radians(pitch)), zoom)
+    image = render_page(pages[0], grid, format, options, palette)
+    if in_notebook():
+        film = FilmJob(pages, grid, format, options, "voxdisplay", fps, palette)
+        _show_in_cell(image, film, options.camera if view else None)
         return
     hint = "save it: frame.save('picture.png')"
     if not _has_screen():
@@ -162,7 +204,25 @@ def show_page(
         raise VoxDisplayError("this system has no picture viewer", hint=hint)
 
 
-def _in_notebook() -> bool:
+def _show_in_cell(image: Image.Image, film: FilmJob, camera: Camera | None) -> None:
+    from IPython.display import display  # noqa: PLC0415 - loaded already
+
+    try:
+        from voxdisplay.view.notebook.film_view import film_widget  # noqa: PLC0415 - an extra
+    except MissingExtra:
+        display(image)
+        return
+    display(film_widget(film, camera, lambda: png_file(image)))
+
+
+def png_file(image: Image.Image) -> bytes:
+    """Return an image as a PNG file."""
+    file = io.BytesIO()
+    image.save(file, format="PNG")
+    return file.getvalue()
+
+
+def in_notebook() -> bool:
     """Return whether code runs in a kernel of Jupyter, whose output takes pictures."""
     ipython = sys.modules.get("IPython")
     shell = ipython and ipython.get_ipython()

@@ -104,6 +104,15 @@ def test_show_opens_a_viewer(frame, monkeypatch):
     assert "frame.save" in caught.value.hint
 
 
+@pytest.mark.parametrize("moves", [False, True])
+def test_show_of_a_scene_is_that_of_its_first_frame(frame, monkeypatch, moves):
+    shown = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(ImageShow, "show", lambda image: shown.append(image) or True)
+    vd.read_scene(SCENE.replace("{", '{"duration": 9, ', 1) if moves else SCENE).show()
+    assert (np.asarray(shown[0]) == pixels(frame._repr_png_())).all()
+
+
 def test_show_without_a_screen_is_an_error(frame, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
@@ -115,7 +124,10 @@ def test_show_without_a_screen_is_an_error(frame, monkeypatch):
 
 
 @pytest.mark.parametrize("in_kernel", [True, False])
-def test_show_in_a_notebook_is_its_output(frame, monkeypatch, in_kernel):
+def test_show_in_a_notebook_without_widgets_is_its_output(frame, monkeypatch, in_kernel):
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    for name in [name for name in sys.modules if name.startswith("voxdisplay.view.notebook.")]:
+        monkeypatch.delitem(sys.modules, name)
     shown = []
     shell = types.SimpleNamespace(kernel=None) if in_kernel else types.SimpleNamespace()
     ipython = types.ModuleType("IPython")
@@ -128,3 +140,4 @@ def test_show_in_a_notebook_is_its_output(frame, monkeypatch, in_kernel):
     monkeypatch.setattr(ImageShow, "show", lambda _image: True)
     frame.show()
     assert len(shown) == in_kernel
+    assert all((np.asarray(each) == pixels(frame._repr_png_())).all() for each in shown)

@@ -58,6 +58,7 @@ listen("pointerleave", () => setPointer(null));
 listen("contextmenu", event => event.preventDefault());
 listen("dblclick", () => setCamera());
 listen("wheel", event => {
+  if (inCell && !document.hasFocus()) return;  // it scrolls the notebook
   event.preventDefault();
   zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)));
 }, { passive: false });

@@ -35,20 +35,18 @@ function refusal(why) {
 
 async function unpack() {
   const { fps, frames } = embedded;
-  for (const text of frames) {
-    const packed = Uint8Array.from(atob(text), c => c.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-    push(await new Response(stream).arrayBuffer());
-  }
+  for (const text of frames) push(await inflate(Uint8Array.from(atob(text), c => c.charCodeAt(0))));
   setPlaying(frames.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
   setInterval(() => playing && seek((cursor + 1) % history.length), 1000 / fps);
 }
 
-if (embedded = JSON.parse($("embedded").textContent || null)) {
+if (given?.frames) {
+  embedded = given;
   setState("recording");
   unpack();
-} else connect();
+} else if (inCell) followWidget();
+else connect();
 new ResizeObserver(schedule).observe(area);
-area.focus({ preventScroll: true });
+if (!inCell) area.focus({ preventScroll: true });  // a notebook keeps the focus
 updateStatus();
 schedule();
