@@ -1,71 +1,135 @@
-"""The reference device on a bare Cortex-M3, as qemu emulates it: its UART, its interrupts."""
+"""The reference device on bare Cortex-M boards, as qemu emulates them: UARTs and interrupts.
+
+What is quick is tried on the board whose UART is quick; ``-m "arm and slow"`` is all of it on both.
+"""
 
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from c_device import FIRMWARE, FORMATS, Grid
+from c_device import FIRMWARE, Grid
+from emulated_board import BOARDS, MISSING, EmulatedBoard, FaultyLine
+
+import voxdisplay as vd
 
 ROOT = FIRMWARE.parent
-MAKE, COMPILER, EMULATOR = map(shutil.which, ("make", "arm-none-eabi-gcc", "qemu-system-arm"))
+EXAMPLES = sorted((ROOT / "examples").glob("*.json"))
+QUICK, LEISURELY = BOARDS
+MOVING = {
+    "size": [9, 8, 7],
+    "duration": 1,
+    "fps": 8,
+    "objects": [{"type": "circle", "center": [4.5, 4, "1 + 5*time"], "radius": 3}],
+}
 pytestmark = [
     pytest.mark.arm,
-    pytest.mark.skipif(
-        None in (MAKE, COMPILER, EMULATOR),
-        reason="not all there: make, arm-none-eabi-gcc, qemu-system-arm",
-    ),
+    pytest.mark.skipif(MISSING, reason="not all there: make, arm-none-eabi-gcc, qemu-system-arm"),
 ]
+on_both = pytest.mark.parametrize(
+    "name", [QUICK, pytest.param(LEISURELY, marks=pytest.mark.slow)], ids=str
+)
 
 
 @pytest.fixture
-def board(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[str]:
-    """The port of a board whose grid and format the test gives."""
+def board(tmp_path: Path, request: pytest.FixtureRequest, name: str) -> Iterator[EmulatedBoard]:
+    """A board of the test's name, whose grid and format the test gives."""
     grid: Grid
     grid, pixel_format = request.param
-    options = [f"-DVXD_N{axis}={side}" for axis, side in zip("XYZ", grid, strict=True)]
-    options += [f"-DVXD_FORMAT={FORMATS.index(pixel_format) + 1}"]
-    options += ["-DVXD_MAX_PAYLOAD=1024", "-DVXD_RING=16384"]
-    make = [str(MAKE), "-s", "-C", str(FIRMWARE), "board", f"BUILD={tmp_path}"]
-    subprocess.run([*make, f"OPTIONS={' '.join(options)}"], check=True)
-    machine = [str(EMULATOR), "-M", "mps2-an385", "-nographic", "-monitor", "none"]
-    with subprocess.Popen(
-        [*machine, "-serial", "pty", "-kernel", tmp_path / "mps2-an385.elf"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
+    with EmulatedBoard(name, grid, pixel_format, tmp_path) as board:
+        yield board
+
+
+def with_display(*grid: int, pixel_format: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("board", [(grid, pixel_format)], indirect=True, ids=["display"])
+
+
+def voxdisplay(command: str, port: str, *words: str | Path) -> Any:
+    """Run a command on a port; return its JSON."""
+    done = subprocess.run(
+        [sys.executable, "-m", "voxdisplay", command, "--port", port, "--no-reset", "--json"]
+        + [str(word) for word in words],
+        capture_output=True,
         text=True,
-    ) as process:
-        assert process.stdout is not None
-        found = re.search(r"redirected to (\S+)", process.stdout.readline())
-        assert found is not None
-        yield found[1]
-        assert process.poll() is None
-        process.terminate()
-
-
-def voxdisplay(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "voxdisplay", *words], capture_output=True, text=True, check=False
+        check=False,
     )
-
-
-@pytest.mark.parametrize("board", [((3, 5, 7), "index8")], indirect=True, ids=["index8"])
-def test_all_checks_of_the_kit_hold(board: str) -> None:
-    done = voxdisplay("conformance", "--port", board, "--no-reset", "--json")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert json.loads(done.stdout)["conforms"] is True
+    return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("board", [((33, 31, 29), "rgb888")], indirect=True, ids=["rgb888"])
-def test_pushed_scenes_are_read_back_as_they_were_sent(board: str) -> None:
+@pytest.mark.parametrize("name", BOARDS)
+@with_display(3, 5, 7, pixel_format="index8")
+def test_all_checks_of_the_kit_hold(board: EmulatedBoard) -> None:
+    assert voxdisplay("conformance", board.port)["conforms"] is True
+
+
+@pytest.mark.parametrize("name", [LEISURELY])
+@with_display(33, 31, 29, pixel_format="rgb888")
+def test_pushed_scenes_are_read_back_as_they_were_sent(board: EmulatedBoard) -> None:
     for example in ("trefoil.json", "house.json", "star.json"):
-        done = voxdisplay(
-            "push", "--port", board, "--no-reset", "--verify", str(ROOT / "examples" / example)
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
+        sent = voxdisplay("push", board.port, "--verify", ROOT / "examples" / example)
+        assert sent["verified"] is True
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BOARDS)
+@with_display(65, 63, 61, pixel_format="rgb565")
+def test_every_example_is_read_back_as_it_was_sent(board: EmulatedBoard) -> None:
+    for example in EXAMPLES:
+        assert voxdisplay("push", board.port, "--verify", example)["verified"] is True, example
+
+
+@on_both
+@with_display(9, 8, 7, pixel_format="index8")
+def test_a_recording_is_shown_frame_by_frame(board: EmulatedBoard, tmp_path: Path) -> None:
+    scene, recording = tmp_path / "moving.json", tmp_path / "moving.vxs"
+    scene.write_text(json.dumps(MOVING))
+    command = [sys.executable, "-m", "voxdisplay", "record", scene, "-o", recording]
+    subprocess.run([*command, "--format", "index8", "--quiet"], check=True)
+    played = voxdisplay("play", board.port, "--late", "delay", recording)
+    assert (played["shown"], played["dropped"], played["wrong"]) == (8, 0, 0)
+
+
+def noise(display: vd.Display, seed: int) -> vd.Frame:
+    frame = display.frame()
+    array = frame.array()
+    frame.set(np.random.default_rng(seed).integers(0, 256, array.shape).astype(array.dtype))
+    return frame
+
+
+@on_both
+@with_display(17, 9, 13, pixel_format="index8")
+def test_frames_come_through_a_line_with_faults(board: EmulatedBoard) -> None:
+    faults = repeated = 0
+    for seed in range(4):
+        with (
+            FaultyLine(board.port, seed=seed, error_rate=1 / 1500) as line,
+            vd.open(line.port, no_reset=True, timeout_s=20) as display,
+        ):
+            frame = noise(display, seed)
+            repeated += display.present(frame).retransmitted
+            assert np.array_equal(display.read(), frame.array())
+        faults += line.faults
+    assert faults > 5
+    assert repeated > 0
+
+
+@on_both
+@with_display(33, 31, 29, pixel_format="index8")
+def test_a_board_that_restarts_in_mid_frame_shows_the_whole_frame(board: EmulatedBoard) -> None:
+    with (
+        FaultyLine(board.port, when_sent=(9000, board.restart)) as line,
+        vd.open(line.port, no_reset=True, timeout_s=20) as display,
+    ):
+        boot = display.info.boot
+        frame = noise(display, 0)
+        sent = display.present(frame).wire_bytes
+        assert np.array_equal(display.read(), frame.array())
+        assert display.info.boot != boot
+    assert sent > 33 * 31 * 29 + 9000

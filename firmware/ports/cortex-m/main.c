@@ -1,28 +1,22 @@
 /*
- * The device on a bare Cortex-M3: the board mps2-an385, whose first UART is the line to the host.
+ * The device on a bare Cortex-M: start-up, interrupts and main loop; board.h is the board's part.
  *
- * The UART's interrupt fills the core's ring; SysTick is the refresh. Run it with
- * qemu-system-arm -M mps2-an385 -nographic -monitor none -serial pty -kernel build/mps2-an385.elf
+ * The UART's interrupt fills the core's ring; SysTick is the refresh.
  */
 #include <string.h>
 
 #include "../memory.h"
+#include "board.h"
 
 #ifndef REFRESH_HZ
 #define REFRESH_HZ 50
 #endif
-#define CLOCK_HZ 25000000U
 
-#define REGISTER(address) (*(volatile uint32_t *)(address))
-#define UART_DATA REGISTER(0x40004000U)
-#define UART_STATE REGISTER(0x40004004U) /* bit 0: transmitter full; bit 1: a byte is there */
-#define UART_CTRL REGISTER(0x40004008U)  /* bits 0, 1: enable both ways; bit 3: interrupt */
-#define UART_CLEAR REGISTER(0x4000400CU) /* bit 1: the receive interrupt */
-#define UART_DIVIDER REGISTER(0x40004010U)
 #define SYSTICK_CTRL REGISTER(0xE000E010U)
 #define SYSTICK_LOAD REGISTER(0xE000E014U)
 #define SYSTICK_VALUE REGISTER(0xE000E018U)
 #define INTERRUPTS_ENABLE REGISTER(0xE000E100U)
+#define FIRST_INTERRUPT 16
 
 extern uint8_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
 extern const uint8_t data_image[];
@@ -58,13 +52,10 @@ static void on_systick(void)
     ticks++;
 }
 
-static void on_byte(void)
+static void on_bytes(void)
 {
-    UART_CLEAR = 2;
-    while (UART_STATE & 2U) {
-        vxd_receive((uint8_t)UART_DATA);
-        heard = true;
-    }
+    board_receive();
+    heard = true;
 }
 
 static void on_fault(void)
@@ -75,28 +66,24 @@ static void on_fault(void)
 
 void vxd_send(uint8_t byte)
 {
-    while (UART_STATE & 1U) {
-    }
-    UART_DATA = byte;
+    board_send(byte);
 }
 
 int main(void)
 {
-    static struct vxd_identity identity = {0, 1000U * REFRESH_HZ, "voxdisplay on mps2-an385", "1.0",
-                                           ""};
+    static struct vxd_identity identity = {0, 1000U * REFRESH_HZ, board_name, "1.0", ""};
 
     vxd_start(&identity);
-    UART_DIVIDER = 16;
-    UART_CTRL = 1U | 2U | 8U;
+    board_start_uart();
 #if REFRESH_HZ
-    SYSTICK_LOAD = CLOCK_HZ / REFRESH_HZ - 1U;
+    SYSTICK_LOAD = board_clock_hz / REFRESH_HZ - 1U;
     SYSTICK_VALUE = 0;
     SYSTICK_CTRL = 7;
 #else
     SYSTICK_LOAD = 0xFFFFFF;
     SYSTICK_CTRL = 5;
 #endif
-    INTERRUPTS_ENABLE = 1; /* number 0: the first UART receives */
+    INTERRUPTS_ENABLE = 1U << board_interrupt;
     while (!heard) {
     }
     /* The moment of the first byte is as random as a board without a clock can have it. */
@@ -126,6 +113,9 @@ void reset(void)
     main();
 }
 
-__attribute__((section(".vectors"), used)) static void *const vectors[17] = {
+/* The UART's interrupt has another number on each board: all of them lead to it. */
+#define EIGHT on_bytes, on_bytes, on_bytes, on_bytes, on_bytes, on_bytes, on_bytes, on_bytes
+
+__attribute__((section(".vectors"), used)) static void *const vectors[FIRST_INTERRUPT + 32] = {
     stack_top, reset, on_fault, on_fault, on_fault, on_fault, on_fault, 0, 0, 0, 0,
-    on_fault, on_fault, 0, on_fault, on_systick, on_byte};
+    on_fault, on_fault, 0, on_fault, on_systick, EIGHT, EIGHT, EIGHT, EIGHT};
