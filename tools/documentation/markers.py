@@ -1,8 +1,8 @@
 """What takes the place of a marker in a page: pictures, scenes beside them, keys, names.
 
 Markers are ``picture FILE [OPTIONS]`` (drawn by ``voxdisplay preview``), ``scene FILE [OPTIONS]``
-(its source beside its picture), ``types curve|body|group``, ``common keys`` and ``names``. A file
-is an example, or one that a page shows below ``<!-- file: NAME -->``.
+(its source beside its picture), ``types curve|body|group``, ``common keys``, ``names`` and ``paper
+table|comparison``. A file is an example, or one that a page shows below ``<!-- file: NAME -->``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 from documentation.names import names_by_section
 from documentation.object_keys import common_keys, own_keys, types_of
+from documentation.paper import paper_comparison, paper_table
 from documentation.pictures import draw
 
 _FILE = re.compile(r"^<!-- file: ([\w.-]+) -->\n```json\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -55,6 +56,8 @@ class Inserter:
             return common_keys()
         if what == "names":
             return names_by_section()
+        if what == "paper":
+            return {"table": paper_table, "comparison": paper_comparison}[rest[0]]()
         raise SystemExit(f"no such marker: {marker}")
 
     def check_complete(self) -> None:
