@@ -115,6 +115,7 @@ def play(
 ) -> None:
     """Play each SHOW in turn: a scene that moves, a recording, or a playlist.
 
+    One SHOW that says "loop": true is played for ever; several are, each once, unless --loop.
     On a terminal, space pauses, the arrows seek by 5 and 60 seconds, and q ends it. The digest of
     every frame is known before it is shown, and compared.
     """
