@@ -52,11 +52,10 @@ def find_backend(port: str) -> Any:
         with contextlib.suppress(*LIBRARY_ERRORS):
             backend = usb.backend.libusb1.get_backend()
     if backend is None:
-        raise OpenError(
-            f"{port}: there is no libusb on this machine",
-            port=port,
-            hint="install it: pip install 'voxdisplay[usb]', or apt install libusb-1.0-0",
-        )
+        hint = "install it: pip install 'voxdisplay[usb]', or apt install libusb-1.0-0"
+        if sys.platform.startswith("linux") and not _NODES.exists():  # some do not start then
+            hint += f"\n  without {_NODES}, as in a container, only some versions start: pass it on"
+        raise OpenError(f"{port}: there is no libusb that works here", port=port, hint=hint)
     return backend
 
 

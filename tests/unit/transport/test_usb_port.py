@@ -334,6 +334,15 @@ def test_without_libusb(monkeypatch):
     assert usb_ports() == []
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="has no folder of USB buses")
+@pytest.mark.parametrize("given", [True, False])
+def test_a_machine_without_usb(monkeypatch, tmp_path, given):
+    monkeypatch.setitem(sys.modules, "libusb_package", None)
+    monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda: None)
+    monkeypatch.setattr(usb_access, "_NODES", tmp_path if given else tmp_path / "usb")
+    assert ("pass it on" in refused("usb:")[1]) == (not given)
+
+
 def test_the_systems_libusb_where_there_is_no_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "libusb_package", None)
     monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda: "the system's")
