@@ -18,6 +18,13 @@
 #define VXD_RGB565 3
 #define VXD_RGB888 4
 
+/* Or in a file of this name, where a build has no command line of one's own. */
+#ifdef __has_include
+#if __has_include("voxel_device_config.h")
+#include "voxel_device_config.h"
+#endif
+#endif
+
 #ifndef VXD_NX
 #define VXD_NX 16
 #endif

@@ -22,6 +22,8 @@ import voxdisplay as vd
 ROOT = FIRMWARE.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.json"))
 QUICK, LEISURELY = BOARDS
+# A busy machine may silence a board for seconds.
+PATIENT = ("--timeout", "30")
 MOVING = {
     "size": [9, 8, 7],
     "duration": 1,
@@ -73,7 +75,7 @@ def test_all_checks_of_the_kit_hold(board: EmulatedBoard) -> None:
 @with_display(33, 31, 29, pixel_format="rgb888")
 def test_pushed_scenes_are_read_back_as_they_were_sent(board: EmulatedBoard) -> None:
     for example in ("trefoil.json", "house.json", "star.json"):
-        sent = voxdisplay("push", board.port, "--verify", ROOT / "examples" / example)
+        sent = voxdisplay("push", board.port, *PATIENT, "--verify", ROOT / "examples" / example)
         assert sent["verified"] is True
 
 
@@ -82,7 +84,7 @@ def test_pushed_scenes_are_read_back_as_they_were_sent(board: EmulatedBoard) -> 
 @with_display(65, 63, 61, pixel_format="rgb565")
 def test_every_example_is_read_back_as_it_was_sent(board: EmulatedBoard) -> None:
     for example in EXAMPLES:
-        assert voxdisplay("push", board.port, "--verify", example)["verified"] is True, example
+        assert voxdisplay("push", board.port, *PATIENT, "--verify", example)["verified"], example
 
 
 @on_both
@@ -92,7 +94,7 @@ def test_a_recording_is_shown_frame_by_frame(board: EmulatedBoard, tmp_path: Pat
     scene.write_text(json.dumps(MOVING))
     command = [sys.executable, "-m", "voxdisplay", "record", scene, "-o", recording]
     subprocess.run([*command, "--format", "index8", "--quiet"], check=True)
-    played = voxdisplay("play", board.port, "--late", "delay", recording)
+    played = voxdisplay("play", board.port, *PATIENT, "--late", "delay", recording)
     assert (played["shown"], played["dropped"], played["wrong"]) == (8, 0, 0)
 
 
