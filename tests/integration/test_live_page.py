@@ -40,7 +40,7 @@ def test_a_voxel_lies_where_the_camera_says(renderer, tab, tmp_path):
         exported(tmp_path, [page_of(v) for v in voxels]) + f"?r={renderer}", width=860, height=400
     )
     page.wait(f"painted && history.length === {len(voxels)}")
-    page.run(f"setPlaying(false), {BARE}")
+    page.run(f"setPlaying(false), setShow('spin', false), setCamera(), {BARE}")
     assert (
         page.run("renderer.constructor.name")
         == {"2d": "CpuRenderer", "gl": "GpuRenderer"}[renderer]
@@ -63,8 +63,8 @@ def test_the_page_projects_as_the_camera_does(tab, tmp_path):
             (0.3, -0.2, 1.5, 1, False), (2.0, 1.1, 4.0, 2.5, False), (-3.0, 0.0, 9.0, 0.4, True),
         ):  # fmt: skip
             page.run(
-                f"setCamera({{yaw: {yaw}, pitch: {pitch}, distance: {distance}, zoom: {zoom}, "
-                f"flat: {str(flat).lower()}}})"
+                f"setCamera({{yaw: {yaw}, pitch: {pitch}, distance: {distance}, zoom: {zoom}}}), "
+                f"setShow('flat', {str(flat).lower()})"
             )
             camera = Camera(yaw, pitch, distance, zoom, flat)
             place = f"projection([3, 5, 7], {size[0]}, {size[1]})"
@@ -165,11 +165,11 @@ def test_keys_do_what_they_say(tab, tmp_path):
     assert page.run("[show.glow, show.box, $('glow').ariaPressed]") == [False, False, "false"]
     page.key("v")
     assert "x 1  y 2  z 3" in page.run("$('announcement').textContent")
-    page.run("$('scrub').focus()")
+    page.run("$('exposure').focus()")
     page.key("b")
     assert page.run("show.box") is False  # letters belong to what has the focus
     names = "[...document.querySelectorAll('button, input')]"
-    assert page.run(f"{names}.every(e => e.ariaLabel || e.textContent)")
+    assert page.run(f"{names}.every(e => e.ariaLabel || e.textContent || e.labels[0]?.textContent)")
 
 
 def test_a_slice_is_all_that_is_drawn(tab, tmp_path):
@@ -178,10 +178,16 @@ def test_a_slice_is_all_that_is_drawn(tab, tmp_path):
             exported(tmp_path, [page_of((0, 0, 0), (1, 2, 3), (2, 4, 6))]) + f"?r={renderer}"
         )
         page.wait("painted")
-        page.run(f"{BARE}, setSlice(2, 6, 6)")
+        page.run(f"{BARE}, show.ghost = false, setSlice(2, 6, 6)")
         picture = page.canvas()
         x, y, _ = Camera().project([(2.5, 4.5, 6.5)], SIZE, picture.shape[1::-1])
         assert middle(picture) == pytest.approx((x[0], y[0]), abs=2)
+        page.run("show.ghost = true")
+        ghost = page.canvas()
+        x, y, _ = Camera().project([(0.5, 0.5, 0.5), (2.5, 4.5, 6.5)], SIZE, picture.shape[1::-1])
+        dim, bright = (ghost[int(row), int(column)].max() for column, row in zip(x, y, strict=True))
+        assert picture[int(y[0]), int(x[0])].max() < 16 < dim < 90
+        assert bright > 200
 
 
 def test_the_pointer_turns_moves_zooms_and_names_voxels(tab, tmp_path):
@@ -230,10 +236,121 @@ def test_it_fits_a_telephone(scheme, tab, tmp_path):
     page = tab(exported(tmp_path, [page_of((1, 2, 3))] * 3, title="t" * 80), **look)
     page.wait("painted")
     assert page.run("document.documentElement.scrollWidth") == 360
-    buttons = "[...document.querySelectorAll('button')]"
+    buttons = "[...document.querySelectorAll('button')].filter(b => b.checkVisibility())"
+    assert page.run(f"{buttons}.length") > 15
     assert page.run(f"{buttons}.filter(b => Math.min(b.offsetHeight, b.offsetWidth) < 44)") == []
     ground = page.run("getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
     assert (sum(ground) > 384) == (scheme == "light")
+
+
+# -- ways to look
+
+
+def test_cubes_are_opaque_and_the_same_by_both_renderers(tab, tmp_path):
+    frame = vd.Frame(SIZE)
+    frame.draw(np.array([(2, 4, 6)]), "#ff0000")
+    frame.draw(np.array([(2, 0, 6), (0, 0, 0)]), "#00ff00")
+    pictures = []
+    for renderer in ("2d", "gl"):
+        page = tab(exported(tmp_path, [frame.array()]) + f"?r={renderer}")
+        page.wait("painted")
+        page.key("c")
+        page.run("show.box = false, setCamera({yaw: 0, pitch: 0})")
+        pictures.append(page.canvas())
+        height, width = pictures[-1].shape[:2]
+    assert np.array_equal(*pictures)
+    camera = Camera(0, 0)
+    near, far = ([(2.5, 0.0, 6.5)], [(0.5, 0.0, 0.5)])
+    for point in (near, far):
+        x, y, scale = camera.project(point, SIZE, (width, height))
+        half = int(scale[0] * 0.45)
+        column, row = int(x[0]), int(y[0])
+        face = pictures[0][row - half : row + half, column - half : column + half]
+        assert (face == face[0, 0]).all(), "crisp, and what is behind is hidden"
+        assert face[0, 0, 1] > 100
+        assert face[0, 0, 0] == 0
+
+
+def test_exposure_brightens(tab, tmp_path):
+    page = tab(exported(tmp_path, [page_of((1, 2, 3))]))
+    page.wait("painted")
+    sums = []
+    for stops in (-2, 0, 2):
+        page.run(f"{BARE}, $('exposure').value = {stops}")
+        sums.append(int(page.canvas().sum()))
+    assert sums[0] < sums[1] < sums[2]
+
+
+def test_values_have_a_map_and_a_threshold(tab, tmp_path):
+    array = np.zeros((7, 5, 3), np.uint8)
+    array[0, 0, 0], array[3, 2, 1], array[6, 4, 2] = 10, 120, 255
+    page = tab(exported(tmp_path, [array], format_="index8"))
+    page.wait("painted && !$('coloring').hidden")
+    page.run("$('map').value = 'viridis', $('threshold').value = 100")
+    assert page.run("[visible().n, current().n]") == [2, 3]
+    assert page.run("visible().colors.map(c => c[1])") == [0xFD, 0xE7, 0x25]
+    assert page.run("[visible().value(0), visible().positions.map(p => p[0])]") == [120, [1, 2, 3]]
+    assert page.run("digest(current())") == page.run("digest({...current(), seen: null})")
+    colored = tab(exported(tmp_path, [page_of((1, 2, 3), color="red")]))
+    colored.wait("painted")
+    colored.run("updateStatus()")
+    assert colored.run("$('coloring').hidden")
+
+
+def test_a_link_holds_the_view_and_survives_nonsense(tab, tmp_path):
+    url = exported(tmp_path, [page_of((0, 0, 0), (1, 2, 3))])
+    page = tab(url)
+    page.wait("painted && linked")
+    page.run("setCamera({yaw: 0.5, pitch: -0.3, zoom: 2.5, x: 0.1}), setShow('glow', false)")
+    page.run("setShow('cubes', true), setSlice(1, 1, 3), $('exposure').value = 1.5")
+    page.wait("location.hash.includes('cubes')")
+    other = tab(page.run("location.href"))
+    other.wait("painted && linked")
+    state = "({...camera, ...show, slices, exposure: $('exposure').value})"
+    seen, meant = other.run(state), page.run(state)
+    for key in ("yaw", "pitch", "zoom", "x"):
+        assert seen.pop(key) == pytest.approx(meant.pop(key), abs=0.01)
+    assert seen == meant
+    for nonsense in (
+        "#yaw=NaN&zoom=1e999&pitch=&show=__proto__,x&slice-x=9-&map=constructor",
+        "#" + "%" * 5000,
+        "#zoom=-1&x=1e9&slice-z=99999-0&slice-y=5-2&exposure=a",
+    ):
+        page = tab(url + nonsense)
+        page.wait("painted && linked")
+        numbers = page.run("Object.values(camera)")
+        assert np.isfinite(numbers).all()
+        assert page.run("camera.zoom >= 0.2 && Math.abs(camera.x) <= 6")
+        assert page.run("slices.every(([a, b], k) => 0 <= a && a <= b && b < gridSize[k])")
+
+
+def test_a_still_page_has_no_player_and_a_moving_one_turns(tab, tmp_path):
+    still = tab(exported(tmp_path, [page_of((1, 2, 3))]))
+    still.wait("painted && $('state').textContent === 'still picture'")
+    assert not still.run("$('playback').checkVisibility()")
+    assert still.run("show.spin") is False
+    moving = tab(exported(tmp_path, [page_of((1, 2, n)) for n in range(4)]))
+    moving.wait("painted > 3 && camera.yaw > START.yaw && $('state').textContent === 'playing'")
+    assert moving.run("$('playback').checkVisibility()")
+    moving.mouse("mousePressed", 300, 300, button="left", buttons=1, clickCount=1)
+    moving.mouse("mouseReleased", 300, 300, button="left", clickCount=1)
+    assert moving.run("show.spin") is False
+    moving.key(" ")
+    assert moving.run("$('state').textContent") == "paused"
+
+
+def test_all_keys_are_listed_and_the_picture_fills_the_screen(tab, tmp_path):
+    page = tab(exported(tmp_path, [page_of((1, 2, 3))]))
+    page.wait("painted")
+    page.key("?")
+    assert page.run("$('keys').checkVisibility()")
+    assert page.run("COMMANDS.filter(c => c[1]).length === $('keys').querySelectorAll('dt').length")
+    page.key("?")
+    page.run("$('help').close(), area.focus()")
+    page.key("f")
+    page.wait("document.fullscreenElement === area")
+    page.key("f")
+    page.wait("!document.fullscreenElement")
 
 
 # -- saving

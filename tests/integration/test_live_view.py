@@ -137,7 +137,9 @@ def test_the_page_comes_back_when_the_server_does(tab, unused_port):
     with emulator_with_view(where) as (_, url):
         page = tab(url)
         page.wait("$('state').dataset.is === 'live'")
-    page.wait("$('state').textContent === 'reconnecting'", errors=True)
+    page.wait("$('state').dataset.is === 'ended'", errors=True)
+    assert page.run("$('state').hasAttribute('data-old')"), "the picture is dimmed"
+    assert page.run("getComputedStyle(canvas).opacity") < "1"
     with emulator_with_view(where) as (display, _):
         show(display, (1, 1, 1))
         page.wait("$('state').dataset.is === 'live' && current()?.n === 1", errors=True)

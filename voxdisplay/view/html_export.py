@@ -31,6 +31,7 @@ from voxdisplay.view.live.snapshot_message import Snapshot, encode
 _LEVEL = 9
 _HEAD = '<meta charset="utf-8">\n'
 _TITLE = "<title>voxdisplay</title>"
+_SCRIPT_END = "</script>"
 _PLACE = '<script type="application/octet-stream" id="embedded">'
 
 
@@ -119,3 +120,8 @@ def page_with(embedded: Mapping[str, object], title: str) -> str:
     ):
         text = text.replace(mark, mark + more, 1)
     return text.replace(_TITLE, f"<title>{html.escape(printable(title))}</title>", 1)
+
+
+def embedded_frames(text: str) -> str:
+    """Return the frames in the text of a file that `save_html` wrote: JSON."""
+    return text.partition(_PLACE)[2].partition(_SCRIPT_END)[0]

@@ -131,6 +131,14 @@ def test_only_its_own_names_are_answered():
             assert fetch(url, Host=host)[0] == 200, host
 
 
+def test_a_request_with_two_hosts_is_refused():
+    with served(StaticSource(still())) as url:
+        place = urllib.parse.urlsplit(url)
+        with socket.create_connection((place.hostname, place.port), WAIT) as raw:
+            raw.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: localhost\r\n\r\n")
+            assert b" 403 " in raw.makefile("rb").readline()
+
+
 def test_pages_of_other_sites_get_no_frames():
     with served(StaticSource(still())) as url:
         live = url.replace("http", "ws") + "live"

@@ -16,6 +16,7 @@ from firmware_sim.config import Config
 from firmware_sim.device import Device
 from firmware_sim.tap import Tap
 from voxdisplay.errors import OpenError, TransportClosed
+from voxdisplay.view.live import sources
 from voxdisplay.view.live.address import parse_address
 from voxdisplay.view.live.page import page_html as page_text
 from voxdisplay.view.live.snapshot_message import Snapshot, encode
@@ -61,6 +62,17 @@ def test_the_page_stays_small():
 
 
 # -- sources
+
+
+def test_a_tap_that_stops_in_the_middle_of_a_picture_is_an_error(monkeypatch):
+    monkeypatch.setattr(sources, "_STALL_S", 0.05)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = TapSource(*listener.getsockname(), "a")
+        with listener.accept()[0] as tap:
+            tap.sendall(b"VXT1" + bytes(10))
+            with pytest.raises(TransportClosed, match="in the middle of a picture"):
+                source.next()
+        source.close()
 
 
 def test_a_tap_is_read():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Callable
 from typing import TypeVar
@@ -34,6 +35,8 @@ def main() -> int:
     parser.add_argument("--title", default="voxdisplay-sim")
     parser.add_argument("--allow-origin", type=_argument(parse_origin), action="append", default=[])
     options = parser.parse_args()
+    # Terminated by the emulator, it closes its connections, so that pages say that the view ended.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         (host, port), (at_host, at_port) = options.tap, options.listen
         source = TapSource(host, port, options.title)

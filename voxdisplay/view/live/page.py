@@ -17,6 +17,8 @@ _LINKED = re.compile(
     r'<link rel="(?P<style>stylesheet)" href="(?P<css>[a-z]+\.css)">'
     r'|<script src="(?P<js>[a-z]+\.js)"></script>'
 )
+# Indentation, and lines that are but a comment, are not sent.
+_COMMENTS = re.compile(r"^[ \t]*//.*\n|^[ \t]+|^\n", re.MULTILINE)
 
 
 @functools.cache
@@ -27,7 +29,8 @@ def page_html() -> str:
 
 def _inlined(link: re.Match[str]) -> str:
     tag = "style" if link["style"] else "script"
-    return f"<{tag}>\n{_read(link['css'] or link['js'])}</{tag}>"
+    text = _COMMENTS.sub("", _read(link["css"] or link["js"]))
+    return f"<{tag}>\n{text}</{tag}>"
 
 
 def _read(name: str) -> str:

@@ -11,13 +11,16 @@ import asyncio
 import contextlib
 import io
 import ipaddress
+import json
 import threading
 from collections.abc import AsyncIterator, Hashable, Iterable
 from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
 from voxdisplay.errors import MissingExtra
+from voxdisplay.printable_text import printable
 from voxdisplay.view.camera import Camera
+from voxdisplay.view.live.dropped_files import MAX_FILE_BYTES, DroppedFileError, frames_of_file
 from voxdisplay.view.live.origins import OriginCheck
 from voxdisplay.view.live.page import content_security_policy, page_html
 from voxdisplay.view.live.snapshot_message import Snapshot, encode
@@ -28,6 +31,7 @@ try:
     from websockets.asyncio.server import Server, ServerConnection, serve
     from websockets.datastructures import Headers
     from websockets.exceptions import ConnectionClosed
+    from websockets.frames import CloseCode
     from websockets.http11 import Request, Response
 except ModuleNotFoundError as error:
     raise MissingExtra(
@@ -38,7 +42,8 @@ except ModuleNotFoundError as error:
 _MAX_IN_FLIGHT = 2
 _IDLE_CHECK_S = 1.0  # interval of checks that the source is alive while nobody watches
 _STOP_TIMEOUT_S = 2.0  # for the source's thread to end
-_MAX_MESSAGE_BYTES = 64  # from a browser: acknowledgements
+_MAX_MESSAGE_BYTES = 1 << 16  # from a browser: acknowledgements, and pieces of a dropped file
+_MAX_REASON_BYTES = 120  # of the end of a connection; the protocol allows 123
 _NO_UPGRADE = (
     "the page's WebSocket did not get through: what is between must pass on the headers Upgrade "
     "and Connection, by HTTP/1.1"
@@ -101,14 +106,22 @@ class LiveServer:
         self._source = source
         self._latest = _LatestSnapshot()
         self._closing = False
+        self._browsers: set[ServerConnection] = set()
+        self._reading_file = asyncio.Lock()
         self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._thread = threading.Thread(
             target=self._run_source, args=(asyncio.get_running_loop(),), name="source", daemon=True
         )
 
     async def wait_until_ended(self) -> None:
-        """Wait until the source has no more pictures; raise its error."""
-        await asyncio.shield(self._ended)
+        """Wait until the source has no more pictures; tell browsers why, and raise its error."""
+        try:
+            await asyncio.shield(self._ended)
+        except Exception as error:
+            reason = printable(str(error)).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
+            closing = (each.close(CloseCode.GOING_AWAY, reason) for each in self._browsers)
+            await asyncio.gather(*closing, return_exceptions=True)
+            raise
 
     # -- the source, in its thread
 
@@ -137,7 +150,8 @@ class LiveServer:
 
     async def _handle_request(self, _: ServerConnection, request: Request) -> Response | None:
         """Return the response to an HTTP request; None lets it become a WebSocket."""
-        host = request.headers.get("Host", "")
+        hosts = request.headers.get_all("Host")
+        host = hosts[0] if len(hosts) == 1 else ""
         if refusal := self._origins.host_refusal(host):
             return _text_response(HTTPStatus.FORBIDDEN, refusal)
         url = urlsplit(request.path)
@@ -146,7 +160,7 @@ class LiveServer:
                 return _page_response()
             case "/frame.png":
                 return await self._picture_response()
-            case "/live":
+            case "/live" | "/drop":
                 return self._live_response(request, host, parse_qs(url.query))
         return _text_response(HTTPStatus.NOT_FOUND, "there are / and /frame.png")
 
@@ -159,7 +173,7 @@ class LiveServer:
         has no Origin header, and names its origin in the query.
         """
         asked = query.get("origin", [None])[-1]
-        origin = request.headers.get("Origin", asked)
+        origin = ", ".join(request.headers.get_all("Origin")) or asked
         if refusal := self._origins.origin_refusal(origin, host):
             return _text_response(HTTPStatus.FORBIDDEN, refusal)
         if asked is not None:
@@ -173,18 +187,45 @@ class LiveServer:
         return _response(HTTPStatus.OK, "image/png", await asyncio.to_thread(_png, snapshot))
 
     async def _serve_browser(self, browser: ServerConnection) -> None:
-        """Send frames as the browser acknowledges them."""
+        """Send frames as the browser acknowledges them; answer pings; or take a dropped file."""
+        assert browser.request is not None  # noqa: S101 - it has been answered
+        url = urlsplit(browser.request.path)
+        if url.path == "/drop":
+            with contextlib.suppress(ConnectionClosed):
+                await browser.send(await self._dropped(browser, parse_qs(url.query)))
+            return
         room = asyncio.BoundedSemaphore(_MAX_IN_FLIGHT)
         sending = asyncio.create_task(self._send_snapshots(browser, room))
+        self._browsers.add(browser)
         try:
-            async for _ in browser:
-                room.release()
+            async for message in browser:
+                if message == "ping":
+                    await browser.send("pong")
+                else:
+                    room.release()
         except (ConnectionClosed, ValueError):  # it left, or acknowledged what it was not sent
             pass
         finally:
+            self._browsers.discard(browser)
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
                 await sending
+
+    async def _dropped(self, browser: ServerConnection, query: dict[str, list[str]]) -> str:
+        """Receive a file in pieces, of which an empty one is the end; return its frames as JSON."""
+        if not _is_loopback(browser):
+            return json.dumps({"error": "files are shown for browsers on the view's own computer"})
+        data = bytearray()
+        async for piece in browser:
+            if not piece or len(data) > MAX_FILE_BYTES:
+                break
+            data += piece if isinstance(piece, bytes) else piece.encode()
+        name = query.get("name", ["file"])[0]
+        try:
+            async with self._reading_file:
+                return await asyncio.to_thread(frames_of_file, name, bytes(data))
+        except DroppedFileError as error:
+            return json.dumps({"error": str(error)})
 
     async def _send_snapshots(
         self, browser: ServerConnection, room: asyncio.BoundedSemaphore
@@ -236,6 +277,23 @@ async def open_server(
             await live._stop_source()  # noqa: SLF001
         else:
             source.close()
+
+
+def _is_loopback(browser: ServerConnection) -> bool:
+    """Return whether a browser runs on this computer, and asked for it: not through a proxy."""
+    assert browser.request is not None  # noqa: S101 - it has been answered
+    headers = browser.request.headers
+    asked = urlsplit(f"//{headers['Host']}").hostname or ""
+    origins = [urlsplit(origin).hostname or "" for origin in headers.get_all("Origin")]
+    names = {asked, *origins, str(browser.remote_address[0])}
+    return all(name == "localhost" or _is_loopback_number(name) for name in names)
+
+
+def _is_loopback_number(name: str) -> bool:
+    try:
+        return ipaddress.ip_address(name).is_loopback
+    except ValueError:
+        return False
 
 
 def _url(server: Server) -> str:

@@ -12,7 +12,7 @@ and planes of bytes, all little-endian::
 Lit voxels are in scan order, which deflates well. The JSON has ``number``, ``title``, ``size``,
 ``format``, ``voxels``, ``digest`` (hex, or null), ``counters``, ``bitmap``, ``wide``, ``own``:
 which entries are not those of the default palette; and ``view``: from where it is best seen, [yaw
-and pitch in radians, zoom], or null.
+and pitch in radians, zoom], or null; and ``port``, to which others can push meanwhile, or null.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class Snapshot:
         Of an index8 page; None for the default one.
     camera : Camera or None
         From where it is best seen.
+    port : str or None
+        Where others can show something on the display, while it is watched.
 
     """
 
@@ -70,6 +72,7 @@ class Snapshot:
     counters: Mapping[str, int] = field(default_factory=dict)
     palette: Colors | None = None
     camera: Camera | None = None
+    port: str | None = None
 
 
 def encode(snapshot: Snapshot) -> bytes:
@@ -97,6 +100,7 @@ def encode(snapshot: Snapshot) -> bytes:
             "bitmap": bitmap,
             "wide": wide,
             "own": palette.entries_differing(DEFAULT).tolist(),
+            "port": None if snapshot.port is None else printable(snapshot.port),
             "view": [camera.yaw, camera.pitch, camera.zoom] if camera else None,
         }
     ).encode()

@@ -26,6 +26,7 @@ _POLL_S = 0.05
 # A display without a digest is read whole to find out whether it shows something else.
 _FULL_READ_POLL_S = 0.5
 _CONNECT_S = 5.0
+_STALL_S = 10.0  # without a byte, in the middle of a picture
 
 
 class Source(Protocol):
@@ -99,7 +100,10 @@ class TapSource:
         """See `Source.next`."""
         try:
             self._socket.sendall(self._QUESTION.pack(*self._last_seen))
-            header = self._HEADER.unpack(self._receive(self._HEADER.size))
+            self._socket.settimeout(None)  # it answers when something else is on display
+            first = self._receive(1)
+            self._socket.settimeout(_STALL_S)
+            header = self._HEADER.unpack(first + self._receive(self._HEADER.size - 1))
             magic, boot, _frame, nx, ny, nz, number, swaps, digest, *counts = header
             format_ = PixelFormat.from_wire(number)
             if magic != self._MAGIC or format_ is None:
@@ -111,6 +115,8 @@ class TapSource:
             palette = None
             if format_ is PixelFormat.INDEX8:
                 palette = np.frombuffer(self._receive(DEFAULT.size), "u1").reshape(DEFAULT.shape)
+        except TimeoutError as error:
+            raise TransportClosed(f"{self._name} stopped in the middle of a picture") from error
         except OSError as error:
             raise TransportClosed(f"{self._name} is gone: {error}") from error
         page = np.frombuffer(data, "<u2" if format_ is PixelFormat.RGB565 else "u1")
@@ -124,6 +130,7 @@ class TapSource:
             digest,
             dict(zip(self._COUNTED, counts, strict=True)),
             palette,
+            port=self._title,
         )
 
     def check_alive(self) -> None:

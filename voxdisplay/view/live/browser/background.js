@@ -33,7 +33,7 @@ function outlineAxes(size, width, height, of = projection(size, width, height)) 
 }
 
 function drawStage(size, width, height, pixel) {
-  const key = JSON.stringify([size, width, height, pixel, camera, show.box]);
+  const key = JSON.stringify([size, width, height, pixel, camera, show, slices]);
   if (key === stageKey) return;
   stageKey = key;
   resizeCanvas(stageCanvas, width, height);
@@ -58,6 +58,11 @@ function drawStage(size, width, height, pixel) {
   while (longest > 8 * step) step *= 2;
   for (let x = step; x < size[0]; x += step) line([x, 0, 0], [x, size[1], 0], "#3c465c", 0.9);
   for (let y = step; y < size[1]; y += step) line([0, y, 0], [size[0], y, 0], "#3c465c", 0.9);
+  slices.forEach((ends, axis) => ends.forEach((at, end) => {
+    if (at !== (end ? size[axis] - 1 : 0))
+      for (const [a, b] of EDGES.filter(([a, b]) => !((a ^ b) >> axis & 1) && !(a >> axis & 1)))
+        line(...[a, b].map(c => corner(c, size).map((v, k) => k === axis ? at + end : v)), AXIS_COLORS[axis], 1.2);
+  }));
   const axes = outlineAxes(size, width, height, of), nearest = [0, 1, 2, 3, 4, 5, 6, 7]
     .reduce((best, c) => project(corner(c, size), of)[3] < project(corner(best, size), of)[3] ? c : best, 0);
   for (const before of [false, true])

@@ -20,6 +20,10 @@ function beginView(view) {
   if (view) [START.yaw, START.pitch, START.zoom] = view;
   setCamera();
 }
+function setShow(what, on) {
+  $(what).ariaPressed = show[what] = on;
+  schedule();
+}
 const setCamera = changes => { Object.assign(camera, START, changes); schedule(); };
 
 const area = $("stage"), touches = new Map();
@@ -35,6 +39,7 @@ function setPointer(place) {
 }
 listen("pointerdown", event => {
   area.setPointerCapture(event.pointerId);
+  setShow("spin", false);
   touches.set(event.pointerId, [event.clientX, event.clientY]);
   setPointer(event);
 });
@@ -67,13 +72,13 @@ const hideProbe = () => { $("probe").hidden = true; return probed = null; };
 
 // Find the nearest lit voxel under a position of the stage.
 function probe(left, top) {
-  const frame = current();
+  const frame = visible();
   if (!frame) return null;
   const of = projection(frame.size, area.clientWidth, area.clientHeight), seen = projectAll(frame, of);
   let found = -1, best = Infinity;
   for (let i = 0, o = 0; i < frame.n; i++) {
     const x = seen[o++], y = seen[o++], depth = seen[o++], reach = Math.max(3, of.k / depth / of.L * 0.6);
-    if (depth < best && Math.abs(x - left) <= reach && Math.abs(y - top) <= reach) { found = i; best = depth; }
+    if (depth > 0 && depth < best && Math.abs(x - left) <= reach && Math.abs(y - top) <= reach) { found = i; best = depth; }
   }
   const tip = $("probe");
   if (found < 0) return hideProbe();
@@ -93,14 +98,16 @@ for (const [axis, name] of [...AXES].entries()) {
       end ? setSlice(axis, Math.min(slices[axis][0], to), to) : setSlice(axis, to, Math.max(slices[axis][1], to)),
   }));
   $("slices").append(make("div", { className: `slice ${name}`, role: "group", ariaLabel: `Slice along ${name}` },
-    make("b", { textContent: name }), ...ends, make("output")));
+    make("b", { textContent: name }), make("div", { className: "span" }, ...ends), make("output")));
 }
 let activeSlice = 2, gridSize = [0, 0, 0];
 function setSlice(axis, low = 0, high = Infinity) {
   const top = gridSize[axis] - 1;
   slices[axis] = [clamp(low, 0, top), clamp(high, 0, top)];
   for (const end of [0, 1]) $(AXES[axis] + end).value = slices[axis][end];
-  const [from, to] = slices[axis];
+  const [from, to] = slices[axis], { style } = $(AXES[axis] + 0).parentNode;
+  style.setProperty("--before", `${100 * from / (top || 1)}%`);
+  style.setProperty("--after", `${100 - 100 * to / (top || 1)}%`);
   document.querySelector(`.${AXES[axis]} output`).textContent = !from && to === top ? "all" : from === to ? `${from}` : `${from}–${to}`;
   activeSlice = axis;
   schedule();
@@ -112,6 +119,7 @@ function setGridSize(size) {
     for (const end of [0, 1]) Object.assign($(AXES[axis] + end), { max: gridSize[axis] - 1, disabled: false });
     setSlice(axis);
   }
+  followLink();
 }
 const announceSlice = () => announce(`${AXES[activeSlice]} ${slices[activeSlice].join(" to ")}`);
 function toggleLayer(axis) {
@@ -124,10 +132,8 @@ function moveSlice(by) {
   setSlice(activeSlice, from + d, to + d);
   announceSlice();
 }
-function toggle(what) {
-  $(what).ariaPressed = show[what] = !show[what];
-  schedule();
-}
+const toggle = what => () => setShow(what, !show[what]);
+const fullScreen = () => document.fullscreenElement ? document.exitFullscreen() : area.requestFullscreen();
 
 // Commands: key, description, action, and for a button its group, id, and label or icon.
 const step = by => history.length && setPlaying(false, cursor + by);
@@ -147,8 +153,13 @@ const COMMANDS = [
   [" ", "pause, resume", () => setPlaying(!playing), "playback", "play", PAUSE],
   [".", "next frame", () => step(1), "playback", "next", "M8 5v14l9-7z"],
   ["End", "newest frame", newest, "playback", "last", "M15.5 5H18v14h-2.5zM5 5v14l9-7z"],
-  ["g", "glow", () => toggle("glow"), "view", "glow", "Glow"],
-  ["b", "box and axes", () => toggle("box"), "view", "box", "Box"],
+  ["g", "glow", toggle("glow"), "view", "glow", "Glow"],
+  ["c", "voxels as cubes", toggle("cubes"), "view", "cubes", "Cubes"],
+  ["b", "box and axes", toggle("box"), "view", "box", "Box"],
+  ["a", "turn by itself", toggle("spin"), "view", "spin", "Spin"],
+  ["o", "orthographic: parallels stay parallel", toggle("flat"), "view", "flat", "Flat"],
+  ["h", "what slices cut away, as a ghost", toggle("ghost"), "view", "ghost", "Ghost"],
+  ["f", "full screen", fullScreen, "view", "full", "Full screen"],
   ["0", "reset camera and slices", () => { setCamera(); [0, 1, 2].forEach(axis => setSlice(axis)); }, "view", "reset", "Reset"],
   ["1", "view from the front", () => setCamera({ yaw: 0, pitch: 0 }), "view", "front", "Front"],
   ["2", "view from the side", () => setCamera({ yaw: Math.PI / 2, pitch: 0 }), "view", "side", "Side"],
@@ -164,6 +175,7 @@ const COMMANDS = [
   ["s", "save as PNG", savePng, "saving", "png", "Save PNG"],
   ["r", "record a video", record, "saving", "record", "Record"],
   ["t", "record voxels, as a file for voxdisplay play", recordVoxels, "saving", "voxels", "Record voxels"],
+  ["?", "all keys", () => $("help").open ? $("help").close() : $("help").showModal(), "saving", "all", "Keys"],
 ];
 const KEYS = {};
 for (const [key, text, act, place, id, face] of COMMANDS) {
@@ -179,7 +191,9 @@ for (const [key, text, act, place, id, face] of COMMANDS) {
   }
   $(place).append(button);
 }
-for (const what in show) $(what).ariaPressed = true;
+for (const what in show) $(what).ariaPressed = show[what];
+$("help").onclick = () => $("help").close();
+for (const id of ["exposure", "map", "threshold"]) $(id).oninput = schedule;
 addEventListener("keydown", event => {
   const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   // Keys act only while no control has the focus.

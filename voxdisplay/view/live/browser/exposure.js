@@ -46,7 +46,7 @@ const word = (r, g, b, a = 255) => a << 24 | b << 16 | g << 8 | r;
 // Map light to sRGB, as opaque as it is bright: it stands before the background. Return its averages
 // over cells, for the bloom.
 function toneMap(light, w, h, cell) {
-  const out = sharp.words(w, h), gain = autoExposure(light, w, h), steps = TONES * gain / TOP;
+  const out = sharp.words(w, h), gain = autoExposure(light, w, h) * 2 ** $("exposure").value, steps = TONES * gain / TOP;
   const cw = Math.ceil(w / cell), coarse = new Float32Array(3 * cw * Math.ceil(h / cell)), share = 1 / cell / cell;
   for (let row = 0, i = 0, o = 0; row < h; row++) {
     const base = Math.floor(row / cell) * cw;

@@ -46,10 +46,10 @@ class CpuRenderer {
 
   add(frame, w, h, q, width, height) {
     const light = lightBuffer(w, h).fill(0), of = projection(frame.size, width, height), seen = projectAll(frame, of);
-    const { k, L } = of, D = camera.distance, [R, G, B] = frame.colors, spots = [];
+    const { k, L } = of, D = camera.distance, [R, G, B] = frame.colors, spots = [], ghost = ghostLight(frame.n);
     for (let i = 0, at = 0; i < frame.n; i++) {
-      const px = seen[at++] / q, py = seen[at++] / q, near = D / seen[at++];
-      if (!near) continue;
+      const px = seen[at++] / q, py = seen[at++] / q, cut = seen[at] < 0, near = D / Math.abs(seen[at++]);
+      if (cut && !ghost) continue;
       const alike = near * 20 | 0;
       const { reach, taps, weights } = spots[alike] ??= profile(Math.max(0.42, splatSigma(k * (alike + 0.5) / 20 / D / L) / q));
       const ix = Math.floor(px), iy = Math.floor(py);
@@ -57,7 +57,7 @@ class CpuRenderer {
       const top = Math.max(0, iy - reach), bottom = Math.min(h - 1, iy + reach);
       const wx = ((px - ix) * 8 | 0) * taps + left - ix + reach;
       let wy = ((py - iy) * 8 | 0) * taps + top - iy + reach;
-      const r = LINEAR[R[i]] * near * near, g = LINEAR[G[i]] * near * near, b = LINEAR[B[i]] * near * near;
+      const strength = near * near * (cut ? ghost : 1), r = LINEAR[R[i]] * strength, g = LINEAR[G[i]] * strength, b = LINEAR[B[i]] * strength;
       for (let row = top; row <= bottom; row++) {
         const share = weights[wy++];
         for (let c = left, t = wx, o = 4 * (row * w + left); c <= end; c++, t++, o += 4) {
@@ -75,6 +75,7 @@ const PLACE = `
 in float x, y, z, r, g, b;
 uniform vec4 right, up, depth, lensing, rim;  // k, distance, longest side, q; middle, size
 uniform vec3 low, high;
+uniform float ghost;
 out vec4 spot;
 out float sigma;
 void main() {
@@ -84,9 +85,9 @@ void main() {
   sigma = max(0.42, max(0.42, px * (0.22 + 0.23 / (1.0 + px * px / 36.0))) / lensing.w);
   vec2 place = (rim.xy + k * vec2(dot(right, p), -dot(up, p))) / lensing.w;
   bool cut = any(lessThan(at, low)) || any(greaterThan(at, high));
-  gl_Position = cut ? vec4(2.0, 2.0, 2.0, 1.0) : vec4(place / rim.zw * 2.0 - 1.0, 0.0, 1.0);
+  gl_Position = cut && ghost == 0.0 ? vec4(2.0, 2.0, 2.0, 1.0) : vec4(place / rim.zw * 2.0 - 1.0, 0.0, 1.0);
   gl_PointSize = 2.0 * ceil((sigma > 2.0 ? 3.8 : 2.2) * sigma) + 1.0;
-  spot = vec4(pow(vec3(r, g, b), vec3(2.2)) * near * near, gl_PointSize);
+  spot = vec4(pow(vec3(r, g, b), vec3(2.2)) * near * near * (cut ? ghost : 1.0), gl_PointSize);
 }`;
 const SHINE = `
 in vec4 spot;
@@ -153,6 +154,7 @@ class GpuRenderer {
     for (const name of ["right", "up", "depth"]) set(name, ...of[name]);
     set("lensing", of.k, camera.distance, of.L, q);
     set("rim", of.x, of.y, w, h);
+    set("ghost", ghostLight(frame.n));
     set("low", ...slices.map(s => s[0]));
     set("high", ...slices.map(s => s[1]));
     gl.viewport(0, 0, w, h);

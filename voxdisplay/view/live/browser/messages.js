@@ -10,9 +10,12 @@ const make = (tag, given, ...inside) => {
 
 // -- Messages: see voxdisplay/view/live/snapshot_message.py
 
-function decode(buffer) {
+function headOf(buffer) {
   const start = new DataView(buffer).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, start - 4)));
+  return { start, ...JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, start - 4))) };
+}
+function decode(buffer) {
+  const { start, ...head } = headOf(buffer);
   const { size: [nx, ny, nz], voxels: n, format } = head;
   const frame = { ...head, n };
   let at = start;

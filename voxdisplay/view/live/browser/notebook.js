@@ -12,7 +12,7 @@ function followWidget() {
   let before = null;
   addEventListener("message", ({ source, data: { state, frame } }) => {
     if (source !== parent) return;
-    if (state) setState(state);
+    if (state) setLink(state, state);
     if (frame) before = Promise.all([inflate(frame), before]).then(([buffer]) => push(buffer));
   });
   parent.postMessage("ready", "*");

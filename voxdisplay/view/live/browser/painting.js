@@ -2,8 +2,7 @@
 // -- Painting
 
 const canvas = $("canvas"), context = canvas.getContext("2d", { alpha: false });
-const show = { glow: true, box: true };
-let renderer, probed = null, painted = 0, scheduled = false;
+let renderer, probed = null, painted = 0, scheduled = false, turned = 0;
 const afterPaint = [];  // callbacks for when the next picture is on the screen
 
 function chooseRenderer() {
@@ -18,13 +17,22 @@ function paint() {
   const pixel = Math.min(2, devicePixelRatio || 1), { clientWidth, clientHeight } = $("stage");
   const width = Math.max(1, Math.round(clientWidth * pixel)), height = Math.max(1, Math.round(clientHeight * pixel));
   resizeCanvas(canvas, width, height);
-  const frame = current();
+  const frame = visible();
   renderer ??= chooseRenderer();
   drawStage(frame?.size, width, height, pixel);
   context.globalCompositeOperation = "copy";
   context.drawImage(stageCanvas, 0, 0);
   if (!frame) return;
   setGridSize(frame.size);
+  if (show.cubes && frame.n <= MOST_CUBES) {
+    context.globalCompositeOperation = "source-over";
+    drawCubes(context, frame, width, height);
+  } else drawLight(frame, width, height, pixel);
+  if (probed) outlineProbed(frame, width, height, pixel);
+  painted++;
+}
+
+function drawLight(frame, width, height, pixel) {
   const q = rasterScale(frame, width, height, pixel), w = Math.ceil(width / q), h = Math.ceil(height / q);
   let light;
   try {
@@ -41,8 +49,6 @@ function paint() {
     bloom(cells, 8 * pixel / q / cell);
     scattered.onto(context, q * cell);
   }
-  if (probed) outlineProbed(frame, width, height, pixel);
-  painted++;
 }
 
 function outlineProbed({ size }, width, height, pixel) {
@@ -60,8 +66,13 @@ function outlineProbed({ size }, width, height, pixel) {
 function schedule() {
   if (scheduled) return;
   scheduled = true;
-  requestAnimationFrame(() => {
+  requestAnimationFrame(now => {
     scheduled = false;
+    if (show.spin) {
+      camera.yaw += Math.min(100, now - turned) / 2500;
+      schedule();
+    }
+    turned = now;
     if (pointer) probe(...pointer);
     paint();
     for (const act of afterPaint.splice(0)) act();

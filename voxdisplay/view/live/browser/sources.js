@@ -6,19 +6,31 @@ function connect() {
   const socket = new WebSocket(new URL("live", location.href.replace("http", "ws")));
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => {
-    push(data);
+    heard = performance.now();
+    if (data === "pong") return;
+    if (dropped) dropped.live = [data];
+    else push(data);
     // Acknowledge when it is on the screen; a hidden page does not paint.
     afterPaint.push(() => socket.readyState === 1 && socket.send("shown"));
   };
   let opened = false;
-  socket.onopen = () => { opened = true; tries = 0; refusal(""); setState("live"); };
-  socket.onclose = async () => {
+  // The server answers, even while the display shows the same for long.
+  const asking = setInterval(() => socket.readyState === 1 && socket.send("ping"), 2000);
+  socket.onopen = () => { opened = true; tries = 0; heard = performance.now(); refusal(""); setLink("live", "live"); };
+  socket.onclose = async ({ code, reason: said }) => {
+    clearInterval(asking);
     afterPaint.length = 0;
     const why = opened ? "" : await reason();
     refusal(why);
-    setState(why ? "refused" : "reconnecting");
+    if (why) setLink("refused", "refused");
+    else if (code === 1001 || code === 1011) setLink("ended", `ended${said && `: ${said}`}`);
+    else if (link[0] !== "ended") setLink("disconnected", "disconnected, trying again");
     setTimeout(connect, why ? 5000 : Math.min(2000, 200 * 1.6 ** tries++));
   };
+}
+function setLink(...is) {
+  link = is;
+  updateStatus();
 }
 // Ask why the WebSocket was refused, which a script cannot see; empty if the server is down.
 async function reason() {
@@ -33,16 +45,61 @@ function refusal(why) {
   $("refusal").replaceChildren(...why.split(/(--[\w-]+)/).map((part, i) => i % 2 ? make("b", { textContent: part }) : part));
 }
 
+let film = 0;
 async function unpack() {
-  const { fps, frames } = embedded;
+  const { fps, frames } = embedded, moves = frames.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
   for (const text of frames) push(await inflate(Uint8Array.from(atob(text), c => c.charCodeAt(0))));
-  setPlaying(frames.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
-  setInterval(() => playing && seek((cursor + 1) % history.length), 1000 / fps);
+  setPlaying(moves);
+  if (moves && !location.hash) setShow("spin", true);
+  film = setInterval(() => playing && seek((cursor + 1) % history.length), 1000 / fps);
 }
+
+// A file that is dropped on the page is read by the server; what was live goes on behind it.
+const MOST_DROPPED = 32 << 20, PIECE = 1 << 15;
+let dropped = null;
+function showFile(file) {
+  if (inCell || embedded && !dropped) return refusal("This page is a file: drop it on a page of voxdisplay view.");
+  if (file.size > MOST_DROPPED) return refusal(`${file.name}: larger than ${MOST_DROPPED >> 20} MiB`);
+  const socket = new WebSocket(new URL(`drop?name=${encodeURIComponent(file.name)}`, location.href.replace("http", "ws")));
+  refusal(`${file.name} is read`);
+  socket.onopen = async () => {
+    const data = await file.arrayBuffer();
+    for (let at = 0; at < data.byteLength; at += PIECE) socket.send(data.slice(at, at + PIECE));
+    socket.send("");
+  };
+  socket.onclose = () => refusal(`${file.name} was not read: the server does not answer`);
+  socket.onmessage = ({ data }) => {
+    socket.onclose = null;
+    const { error, ...got } = JSON.parse(data);
+    refusal(error ? `${file.name}: ${error}` : "");
+    if (error) return;
+    clearInterval(film);
+    dropped ??= { live: history.slice(-1) };
+    embedded = got;
+    history.length = 0;
+    cursor = -1;
+    $("back").hidden = false;
+    unpack();
+  };
+}
+$("back").onclick = () => {
+  clearInterval(film);
+  const live = dropped.live;
+  dropped = embedded = null;
+  $("back").hidden = true;
+  history.length = 0;
+  cursor = -1;
+  live.forEach(push);
+  setPlaying(true);
+};
+addEventListener("dragover", event => event.preventDefault());
+addEventListener("drop", event => {
+  event.preventDefault();
+  if (event.dataTransfer.files[0]) showFile(event.dataTransfer.files[0]);
+});
 
 if (given?.frames) {
   embedded = given;
-  setState("recording");
   unpack();
 } else if (inCell) followWidget();
 else connect();
