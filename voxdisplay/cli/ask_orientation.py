@@ -44,6 +44,10 @@ def prepare_profile(name: str) -> tuple[Path, dict[str, Any]]:
     keys = profile_keys(path)
     if keys is None:
         return path, {}
+    if "parts" in keys:
+        raise click.ClickException(
+            f"{path} is made of parts: ask of each with --port and another name, and copy its axes"
+        )
     if _answer(f"{path} exists: replace its axes (yes, no)?", ["yes", "no"]) == "no":
         raise click.ClickException(f"{path} was left as it is")
     return path, keys

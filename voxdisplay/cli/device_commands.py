@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
-from voxdisplay.cli.output import device_json, note, plural, print_json, print_stdout
+from voxdisplay.cli.output import (
+    device_json,
+    exit_if_lost,
+    note,
+    parts_json,
+    plural,
+    print_json,
+    print_stdout,
+)
 from voxdisplay.cli.profile_options import standing_options
 
 if TYPE_CHECKING:
@@ -41,11 +49,17 @@ def info(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> No
             "rx_buffer_bytes": device.rx_buffer_bytes,
             "features": list(device.features),
             "boot": device.boot,
+            **parts_json(display),
         }
     if as_json:
         print_json(facts)
         return
     facts |= {"size": str(device.grid), "features": ", ".join(device.features)}
+    facts |= {
+        f"part {number}": f"{part['name']}: {part['port']}, {'x'.join(map(str, part['size']))} at "
+        f"{','.join(map(str, part['at']))}, axes {','.join(part['axes'])}"
+        for number, part in enumerate(facts.pop("parts", ()), 1)
+    }
     width = max(map(len, facts))
     print_stdout("\n".join(f"{key:<{width}}  {value}" for key, value in facts.items()))
 
@@ -73,11 +87,13 @@ def clear(*, port: str | None, baud: Baud, timeout_s: float, as_json: bool) -> N
                     "wire_bytes": receipt.wire_bytes,
                     "elapsed_s": round(receipt.elapsed_s, 6),
                     "digest": None if receipt.digest is None else f"{receipt.digest:08x}",
+                    **parts_json(display, receipt),
                 }
             )
         else:
             unproved = "" if display.answers else " was sent, not proved: nothing answers there"
             print_stdout(f"{display.port}  dark{unproved}")
+        exit_if_lost(display)
 
 
 @click.command(
@@ -106,7 +122,7 @@ def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_jso
 
     check_suffix(output)
     with open_display(port, baud, timeout_s) as display:
-        array = display.read()
+        array, parts = display.read(), parts_json(display)
         device, name = device_json(display.info), display.port
         format_ = display.info.format
         unknown = format_.value == "index8" and "palette" in display.info.features
@@ -114,6 +130,7 @@ def read(*, port: str | None, baud: Baud, timeout_s: float, output: Path, as_jso
     if unknown and lit and output.suffix.lower() != ".npy":
         note("a palette cannot be read back: colours are those of the default one")
     if as_json:
-        print_json({"port": name, "device": device, "output": str(output), "voxels": lit})
+        facts = {"port": name, "device": device, "output": str(output), "voxels": lit}
+        print_json(facts | parts)
     else:
         note(f"{output}: {'x'.join(map(str, array.shape))}, {plural(lit, 'voxel')} lit")

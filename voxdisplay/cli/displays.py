@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+import textwrap
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from voxdisplay.cli.options import json_option, quiet_option
-from voxdisplay.cli.output import note, print_json, print_stdout
+from voxdisplay.cli.output import note, plural, print_json, print_stdout
+
+if TYPE_CHECKING:
+    from voxdisplay.display.profile import DisplayProfile
 
 
 @click.command(
@@ -49,6 +53,7 @@ def displays(*, as_json: bool) -> None:
                 "limit": None if limit is None else limit._asdict(),
                 "dither": profile.dither,
                 "fit": profile.fit,
+                **_parts_entry(profile),
             }
         found.append(entry)
     if as_json:
@@ -61,11 +66,42 @@ def displays(*, as_json: bool) -> None:
     for entry in found:
         told = f"wrong: {entry['error']}" if "error" in entry else _summary(entry)
         print_stdout(f"{entry['name']:<{width}}  {told}")
+        if drawing := entry.get("layout"):
+            print_stdout(textwrap.indent("\n".join([*entry["layout_faults"], drawing]), "  "))
+
+
+def _parts_entry(profile: DisplayProfile) -> dict[str, Any]:
+    """Return what a profile says of its parts; nothing if it has none."""
+    if not profile.parts:
+        return {}
+    from voxdisplay.display.part_layout import PartLayout  # noqa: PLC0415 - few have parts
+
+    layout = PartLayout(profile.parts)
+    return {
+        "size": list(layout.grid),
+        "parts": [
+            {
+                "name": part.name,
+                "port": part.port,
+                "serial": part.serial,
+                "at": list(part.at),
+                "size": list(part.size),
+                "axes": part.axes.names,
+            }
+            for part in profile.parts
+        ],
+        "layout_faults": layout.faults(),
+        "layout": layout.drawing(),
+    }
 
 
 def _summary(entry: dict[str, Any]) -> str:
     """Return what a profile says beyond the defaults."""
-    parts = [entry["port"] or "any port", f"axes {','.join(entry['axes'])}"]
+    if made_of := entry.get("parts"):
+        size = "x".join(map(str, entry["size"]))
+        parts = [f"{size} of {plural(len(made_of), 'part')}"]
+    else:
+        parts = [entry["port"] or "any port", f"axes {','.join(entry['axes'])}"]
     if entry["mirrored"]:
         parts[-1] += " (mirrored)"
     if entry["serial"]:

@@ -226,8 +226,9 @@ def open_display(
     profile = current_profile()
     if profile and as_memory:
         profile = profile.upright()
+    port = profile_port(port, profile)
     return vd.open(
-        default_port(profile_port(port, profile)),
+        port if profile and profile.parts else default_port(port),
         display=profile,
         baud=baud,
         timeout_s=timeout_s,

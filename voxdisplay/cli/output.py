@@ -21,7 +21,10 @@ from voxdisplay.printable_text import printable_lines
 
 if TYPE_CHECKING:
     from voxdisplay.display.device_info import DeviceInfo
+    from voxdisplay.display.display import Display
+    from voxdisplay.display.receipt import Receipt
 
+EXIT_LOST: Final = 3  # as of a port that fails
 _QUIET: Final = "voxdisplay.cli.quiet"
 
 
@@ -108,6 +111,46 @@ def device_json(info: DeviceInfo) -> dict[str, Any]:
         "protocol": info.protocol,
         "firmware": info.firmware,
     }
+
+
+def parts_json(display: Display, receipt: Receipt | None = None) -> dict[str, Any]:
+    """Return the key of a display that is made of several; none for any other.
+
+    Parameters
+    ----------
+    display : Display
+    receipt : Receipt, optional
+        Of a frame, of which each part is told what became of its share.
+
+    """
+    if not display.parts:
+        return {}
+    found = [part.as_json() for part in display.parts]
+    for entry, part in zip(found, getattr(receipt, "parts", ()), strict=False):
+        entry.update(_receipt_json(part.receipt))
+    return {"parts": found}
+
+
+def _receipt_json(receipt: Receipt | None) -> dict[str, Any]:
+    if receipt is None:
+        return {"shown": False}
+    return {
+        "shown": True,
+        "voxels": receipt.voxels,
+        "packets": receipt.packets,
+        "wire_bytes": receipt.wire_bytes,
+        "retransmitted": receipt.retransmitted,
+        "elapsed_s": round(receipt.elapsed_s, 6),
+        "digest": None if receipt.digest is None else f"{receipt.digest:08x}",
+    }
+
+
+def exit_if_lost(display: Display) -> None:
+    """End the command with the exit code of a port if a part of the display is lost."""
+    lost = [part.profile.name for part in display.parts if part.state == "lost"]
+    if lost:
+        print_stderr(f"voxdisplay: lost, and not shown there: {', '.join(lost)}")
+        raise click.exceptions.Exit(EXIT_LOST)
 
 
 def plural(count: int, noun: str) -> str:

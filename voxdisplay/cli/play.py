@@ -21,7 +21,15 @@ from voxdisplay.cli.options import (
     quiet_option,
     reconnect_option,
 )
-from voxdisplay.cli.output import is_quiet, note, plural, print_json, print_stdout
+from voxdisplay.cli.output import (
+    exit_if_lost,
+    is_quiet,
+    note,
+    parts_json,
+    plural,
+    print_json,
+    print_stdout,
+)
 from voxdisplay.cli.param_types import RangeType, seconds_type
 from voxdisplay.cli.profile_options import picture_options
 
@@ -149,9 +157,10 @@ def play(
                 raise
             raise click.UsageError(str(error)) from error
     if as_json:
-        print_json(report.as_json())
+        print_json(report.as_json() | parts_json(display))
     else:
         print_stdout(_summary(report, answers=display.answers))
+    exit_if_lost(display)
 
 
 def _load(paths: tuple[str, ...]) -> Playable:

@@ -145,9 +145,12 @@ def current_profile() -> DisplayProfile | None:
 
 
 def profile_port(port: str | None, profile: DisplayProfile | None) -> str | None:
-    """Return the port to open: that of the command line, of the profile, or of the environment."""
+    """Return the port to open: that of the command line, of the profile, or of the environment.
+
+    None of a profile with parts, each of which has its own.
+    """
     context = click.get_current_context(silent=True)
-    if profile is None or profile.port is None or context is None:
+    if profile is None or context is None or not (profile.port or profile.parts):
         return port
     typed = context.get_parameter_source("port") is click.core.ParameterSource.COMMANDLINE
     return port if typed else profile.port

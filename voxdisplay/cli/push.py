@@ -23,7 +23,9 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import (
     device_json,
+    exit_if_lost,
     note,
+    parts_json,
     plural,
     print_json,
     print_stdout,
@@ -103,7 +105,7 @@ def push(
             note(f"the display showed something else at first; the frame was sent again: "
                  f"{receipt.repaired}")  # fmt: skip
         page = None
-        if verify or preview:
+        if (verify or preview) and not getattr(receipt, "lost", ()):
             with progress_bar("reading back") as progress:
                 page = (
                     display.verify(frame, progress=progress)
@@ -123,7 +125,8 @@ def push(
                     "elapsed_s": round(receipt.elapsed_s, 6),
                     "digest": None if receipt.digest is None else f"{receipt.digest:08x}",
                     "repaired": receipt.repaired,
-                    "verified": verify or None,
+                    "verified": page is not None if verify else None,
+                    **parts_json(display, receipt),
                 }
             )
         else:
@@ -133,6 +136,7 @@ def push(
             save_page_image(preview, page, display.info, frame.memory.palette)
         if not as_json:
             print_thumbnail(display, frame, page, baud)
+        exit_if_lost(display)
 
 
 def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
@@ -148,8 +152,23 @@ def _summary(display: vd.Display, receipt: vd.Receipt, *, verify: bool) -> str:
     ]
     if not display.answers:
         lines.append("not proved: nothing answers on this port")
+    lines += _parts_lines(receipt)
     if receipt.digest is not None:
         lines.append(f"proved: the display's digest {receipt.digest:08x} is the frame's")
-    if verify:
+    if verify and not getattr(receipt, "lost", ()):
         lines.append(f"verified: all {info.grid.voxels} voxels read back as they were meant")
     return "\n".join(lines)
+
+
+def _parts_lines(receipt: vd.Receipt) -> list[str]:
+    """Return a line on each part of a display that is made of several."""
+    lines = []
+    for part in getattr(receipt, "parts", ()):
+        share = part.receipt
+        if share is None:
+            lines.append(f"  {part.name} ({part.port}): lost: {part.lost}")
+            continue
+        proof = "not proved" if share.digest is None else f"proved by {share.digest:08x}"
+        cost = f"{plural(share.voxels, 'voxel')}, {plural(share.wire_bytes, 'byte')}"
+        lines.append(f"  {part.name} ({part.port}): {cost}, {proof}")
+    return lines

@@ -9,7 +9,15 @@ import click
 
 import voxdisplay as vd
 from voxdisplay.cli.options import json_option, open_display, port_options, quiet_option
-from voxdisplay.cli.output import device_json, note, print_json, print_stdout, progress_bar
+from voxdisplay.cli.output import (
+    device_json,
+    exit_if_lost,
+    note,
+    parts_json,
+    print_json,
+    print_stdout,
+    progress_bar,
+)
 from voxdisplay.cli.param_types import RangeType
 from voxdisplay.cli.profile_options import standing_options
 
@@ -108,6 +116,7 @@ def test_pattern(
                     "pattern": name,
                     "brightness_percent": round(share * 100, 3),
                     "check": check_result.json() if check else None,
+                    **parts_json(display),
                 }
             )
         else:
@@ -118,6 +127,7 @@ def test_pattern(
                 print_stdout(check_result.text())
             if page is not None:
                 print_thumbnail(display, page[0], page[1], baud)
+        exit_if_lost(display)
     if check and not check_result.right:
         raise click.exceptions.Exit(1)
 

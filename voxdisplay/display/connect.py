@@ -15,9 +15,11 @@ from voxdisplay.display.display import Display
 from voxdisplay.display.reconnect import Reconnector, open_when_available
 from voxdisplay.display.shared_display import TIMEOUT_S
 from voxdisplay.display.sink_ports import SinkPortSettings, sink_opener
+from voxdisplay.errors import ProfileError
 from voxdisplay.transport import Transport
 
 if TYPE_CHECKING:
+    from voxdisplay.display.part_profile import PartProfile
     from voxdisplay.display.profile import DisplayProfile
 
 DEFAULT_PORT: Final = "sim:"
@@ -51,7 +53,8 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     display : str, path or mapping, optional
         Profile of the display: how it stands, and what it can show. The name of a file in the
         user's folder of profiles, a path that ends in ``.toml``, or its keys, such as
-        ``{"axes": "x,-z,y", "brightness": 0.6}``. Its ``fit`` is for commands.
+        ``{"axes": "x,-z,y", "brightness": 0.6}``. Its ``fit`` is for commands. With ``parts``,
+        several displays are one: docs/displays.md.
     baud : int or "auto"
         Bits per second of a serial line; ``"auto"`` for the fastest common one at which the device
         answers: see `voxdisplay.display.baud`.
@@ -76,7 +79,7 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     -------
     Display
         For an LED cube a `voxdisplay.display.sink_display.SinkDisplay`: its `Display.answers` is
-        False.
+        False. For several displays a `voxdisplay.display.tiled_display.TiledDisplay`.
 
     Raises
     ------
@@ -101,11 +104,13 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     no_reset = flag("no_reset", no_reset)
     function("note", note)
     note_or_not = _ignore if note is None else note  # a callable may be falsy
-    if not callable(clock):
-        raise wrong_kind("clock", "a callable", clock)
-    binary = isinstance(capture, io.RawIOBase | io.BufferedIOBase)
-    if capture is not None and (binary or not callable(getattr(capture, "write", None))):
-        raise wrong_kind("capture", "a text file or None", capture)
+    _check_clock_and_capture(clock, capture)
+    if profile is not None and profile.parts:
+        _check_alone(port, capture)
+        return _open_parts(
+            profile, note, clock, baud=baud, timeout_s=timeout_s, reconnect_s=reconnect_s,
+            no_reset=no_reset,
+        )  # fmt: skip
 
     def attempt_device() -> Display:
         if isinstance(opened, str):
@@ -139,6 +144,40 @@ def open(  # noqa: A001 - as the built-in: vd.open(port)
     else:
         found = attempt()
     return found if profile is None else profile.applied(found, note_or_not)
+
+
+def _check_clock_and_capture(clock: object, capture: object) -> None:
+    if not callable(clock):
+        raise wrong_kind("clock", "a callable", clock)
+    binary = isinstance(capture, io.RawIOBase | io.BufferedIOBase)
+    if capture is not None and (binary or not callable(getattr(capture, "write", None))):
+        raise wrong_kind("capture", "a text file or None", capture)
+
+
+def _check_alone(port: object, capture: object) -> None:
+    """Raise `ProfileError` if a display of several parts is to be opened by one port."""
+    for name, value in (("port", port), ("capture", capture)):
+        if value is not None:
+            raise ProfileError(
+                f"{name}: this display is made of several parts, each with a port of its own",
+                hint=f"leave {name} out, or open one of the parts by its port",
+            )
+
+
+def _open_parts(
+    profile: DisplayProfile, note: Callable[[str], None] | None, clock: Clock, **settings: Any
+) -> Display:
+    """Open a display that is made of several, with settings of `open` for each of them."""
+    from voxdisplay.display.tiled_display import (  # noqa: PLC0415 - few are
+        open_tiled,
+        part_display_profile,
+    )
+
+    def opener(part: PartProfile, part_note: Callable[[str], None]) -> Display:
+        alone = part_display_profile(profile, profile.parts.index(part))
+        return open(part.port, display=alone, note=part_note, clock=clock, **settings)
+
+    return profile.applied(open_tiled(profile, opener, note, clock), note or _ignore)
 
 
 def _profile_of(display: Any) -> DisplayProfile | None:

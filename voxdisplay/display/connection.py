@@ -64,6 +64,8 @@ class Connection:
     info : DeviceInfo
     reconnects : int
         How often the device was gone and has come back.
+    is_away : bool
+        Whether it is gone, and waited for.
     closed : bool
     serial : str or None
         Serial number without which a device that comes back is another.
@@ -83,6 +85,7 @@ class Connection:
     ) -> None:
         self.port = transport.port
         self.reconnects = 0
+        self.is_away = False
         self.closed = False
         self._owner_pid = os.getpid()
         self._cancelled = False
@@ -184,9 +187,11 @@ class Connection:
         if self._reconnector is None:
             raise error
         self._transport.close()
+        self.is_away = True
         self._pipe = self._reconnector.wait_for_device(
             error, self.info.serial, lambda: self._not_wanted
         )
+        self.is_away = False
         self._transport = self._with_capture(self._pipe)
         self.port = self._transport.port
         self.reconnects += 1

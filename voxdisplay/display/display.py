@@ -33,6 +33,7 @@ __all__ = ["Display", "Receipt"]
 if TYPE_CHECKING:
     from voxdisplay.display.player import Late, Pacing, Player
     from voxdisplay.display.shown_pictures import Shown
+    from voxdisplay.display.tiled_receipt import PartState
     from voxdisplay.frame import Fit
     from voxdisplay.frame.output_transform import OutputTransform
     from voxdisplay.shows.play_report import PlayReport
@@ -65,6 +66,9 @@ class Display(PacedDisplay):
 
     answers = True
     """False if nothing answers on its port: then no receipt is a proof, and nothing can be read."""
+
+    parts: tuple[PartState, ...] = ()
+    """State of each part of a display that is made of several; empty for any other."""
 
     # Of a display with a profile: see `set_output`.
     _output: OutputTransform | None = None

@@ -151,13 +151,29 @@ class DisplayOperations:
 
     # -- frames
 
-    def show(self, frame: Frame, progress: Progress | None) -> Receipt:
-        """Show a frame and compare the digest. See `Display.present`."""
+    def show(
+        self, frame: Frame, progress: Progress | None, hold: Callable[[], None] | None = None
+    ) -> Receipt:
+        """Show a frame and compare the digest. See `Display.present`.
+
+        Parameters
+        ----------
+        frame, progress
+            As of `Display.present`.
+        hold : callable, optional
+            Called when the device has all of the frame but its COMMIT, which is sent when it
+            returns.
+
+        """
         began_s = self._clock()
         before = replace(self._counters)
         frame = frame.copy()
-        ticket = self.queue.enqueue(frame)
+        ticket = self.queue.enqueue(frame, held=hold is not None)
         self.queue.playback.note_presented()
+        if hold is not None:
+            self._wait_until_held(ticket)
+            hold()
+            self.release(ticket)
         digest = self.wait_until_shown(ticket, progress)
         repaired = None
         if digest is not None and digest != frame.digest():
@@ -175,6 +191,30 @@ class DisplayOperations:
             digest=digest,
             repaired=repaired,
         )
+
+    def start_held(self, frame: Frame) -> int:
+        """Start a frame that nobody waits for; return its ticket when only its COMMIT is left.
+
+        Parameters
+        ----------
+        frame : Frame
+            It must not change.
+
+        """
+        ticket = self.queue.start_unwaited(frame, held=True)
+        self._wait_until_held(ticket)
+        return ticket
+
+    def release(self, ticket: int) -> None:
+        """Send the COMMIT of a held frame."""
+        self.queue.release(ticket)
+        self.pump(wait=False)
+
+    def _wait_until_held(self, ticket: int) -> None:
+        while self.queue.encoding:  # at its end, a frame without ops is held without any answer
+            self.pump(wait=False)
+        while not self.queue.is_held(ticket):
+            self.pump()
 
     def wait_until_shown(self, ticket: int, progress: Progress | None = None) -> int | None:
         """Wait until a frame is displayed and return the device's digest."""

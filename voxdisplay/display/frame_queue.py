@@ -62,16 +62,27 @@ class FrameQueue:
         self._displayed: tuple[Frame, PictureId] | None = None
         self._pending: Picture | None = None  # handed over, and not started
         self._encoder: _Encoder | None = None
+        self._held: int | None = None  # ticket of the frame whose COMMIT waits for `release`
         self._wrong_in_a_row = 0  # of unwaited frames
 
     # -- in
 
-    def enqueue(self, frame: Picture) -> int:
+    def enqueue(self, frame: Picture, *, held: bool = False) -> int:
         """Start a frame and return its ticket.
 
         It is sent in full, or as its difference from what is displayed, whichever is shorter. It
         must not change until it is displayed.
+
+        Parameters
+        ----------
+        frame : Picture
+        held : bool
+            Whether the device gets all of it but the COMMIT, in an empty packet, which waits for
+            `release`. No other frame may be started before.
+
         """
+        if held:
+            return self._enqueue_held(frame)
         if isinstance(frame, EncodedFrame):
             return self._link.present(list(frame.payloads))
         link, displayed = self._link, self.displayed
@@ -89,6 +100,38 @@ class FrameQueue:
         self._encoder = _Encoder(ticket, coded)
         return ticket
 
+    def _enqueue_held(self, frame: Picture) -> int:
+        link, displayed = self._link, self.displayed
+        if isinstance(frame, Frame) and displayed and not link.backlog:
+            changed, lit = len(frame.changed_indices(displayed)), len(frame.lit()[0])
+            if 2 * changed < lit:
+                payloads = frame.difference(displayed, link.payload_bytes, self._features)
+                self._held = link.present_difference(
+                    link.displayed,
+                    [*payloads, b""],
+                    lambda: [*self.payloads(frame), b""],
+                    held=True,
+                )
+                return self._held
+        self._held = link.open_frame()
+        coded = (
+            iter([list(frame.payloads)])
+            if isinstance(frame, EncodedFrame)
+            else frame.iter_payloads(link.payload_bytes, self._features, self._bytes_per_s)
+        )
+        self._encoder = _Encoder(self._held, coded)
+        return self._held
+
+    def is_held(self, ticket: int) -> bool:
+        """Return whether the device has all of a held frame, and would show it on COMMIT."""
+        return self._encoder is None and self._link.is_held(ticket)
+
+    def release(self, ticket: int) -> None:
+        """Have the COMMIT of a held frame sent; do nothing if it is not held."""
+        if self._held == ticket:
+            self._held = None
+            self._link.append_payloads(ticket, [], last=True)
+
     def replace_pending(self, frame: Frame) -> None:
         """Have a copy of a frame started when the line needs one, unless a newer one follows."""
         copy = frame.copy()  # before anything changes: it may be interrupted
@@ -97,9 +140,9 @@ class FrameQueue:
         self._pending = copy
         self.playback.note_presented()
 
-    def start_unwaited(self, picture: Picture) -> int:
+    def start_unwaited(self, picture: Picture, *, held: bool = False) -> int:
         """Start a frame that nobody waits for at once, and return its ticket."""
-        ticket = self.enqueue(picture)
+        ticket = self.enqueue(picture, held=held)
         self._unwaited[ticket] = picture
         self.playback.note_presented()
         return ticket
@@ -170,17 +213,23 @@ class FrameQueue:
 
     def encode(self) -> None:
         """Encode a portion of a frame; start the pending one if the line needs it."""
-        if not self._encoder:  # after an interrupt, nobody supplies the rest of an open frame
+        if (
+            not self._encoder and self._held is None
+        ):  # after an interrupt, nobody supplies the rest of an open frame
             self._link.abandon_open_frame()
         if self._pending and not self._encoder and self.may_start:
             frame, self._pending = self._pending, None
             self._unwaited[self.enqueue(frame)] = frame
         if encoder := self._encoder:
             try:
-                payloads = next(encoder.payloads, None)
-                self._link.append_payloads(encoder.ticket, payloads or [], last=payloads is None)
+                payloads, held = next(encoder.payloads, None), encoder.ticket == self._held
+                if payloads is None and held:
+                    self._link.append_payloads(encoder.ticket, [b""], last=False)
+                else:
+                    ends = payloads is None
+                    self._link.append_payloads(encoder.ticket, payloads or [], last=ends)
             except BaseException:
-                self._encoder = None
+                self._encoder = self._held = None
                 raise
             if payloads is None:
                 self._encoder = None
@@ -298,7 +347,7 @@ class FrameQueue:
 
     def note_refusal(self) -> None:
         """Record that the device refused a packet, and that the link has dropped all frames."""
-        self._encoder = None
+        self._encoder = self._held = None
         self.playback.note_dropped(
             sum(frame is not self._last for frame in self._unwaited.values())
         )

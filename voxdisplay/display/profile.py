@@ -21,6 +21,7 @@ from voxdisplay.raster.pixel_format import PixelFormat
 
 if TYPE_CHECKING:
     from voxdisplay.display.display import Display
+    from voxdisplay.display.part_profile import PartProfile
 
 DITHERS: Final = ("none", "ordered")
 _LIMIT_KEYS: Final = ("amps", "ma_per_channel")
@@ -47,6 +48,8 @@ class DisplayProfile:
     fit : {"contain", "none", "content"} or None
     sink : mapping
         Settings of an LED cube, besides those of its port's name.
+    parts : tuple of PartProfile
+        The displays that make it up; empty if it is one.
 
     """
 
@@ -60,6 +63,7 @@ class DisplayProfile:
     dither: str = "none"
     fit: Fit | None = None
     sink: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    parts: tuple[PartProfile, ...] = ()
 
     @property
     def output(self) -> OutputTransform | None:
@@ -122,13 +126,30 @@ def read_profile(keys: Mapping[str, Any], source: str = "") -> DisplayProfile:
         except (ValueError, TypeError) as error:
             text = str(error)
             raise _error(source, text if text.startswith(key) else f"{key}: {text}") from None
-    return DisplayProfile(**found)
+    profile = DisplayProfile(**found)
+    check_parts(profile)
+    return profile
+
+
+def check_parts(profile: DisplayProfile) -> None:
+    """Raise `ProfileError` if a profile with parts has keys that belong to each of them."""
+    if not profile.parts:
+        return
+    for key in ("port", "serial", "axes", "sink"):
+        if getattr(profile, key) != getattr(DisplayProfile(), key):
+            raise _error(
+                profile.source,
+                f"{key}: this display has {len(profile.parts)} parts, and each has its own",
+                f"write {key} into a table [[parts]]",
+            )
 
 
 def with_keys(profile: DisplayProfile, keys: Mapping[str, Any]) -> DisplayProfile:
     """Return a profile in which some keys, such as options of a command, replace others."""
     given = read_profile(keys)
-    return replace(profile, **{key: getattr(given, key) for key in keys})
+    profile = replace(profile, **{key: getattr(given, key) for key in keys})
+    check_parts(profile)
+    return profile
 
 
 def _nearest(key: str, known: Iterable[str]) -> str:
@@ -169,6 +190,18 @@ def _sink(value: Any) -> dict[str, Any]:
     return dict(value)
 
 
+def _parts(value: Any) -> tuple[PartProfile, ...]:
+    from voxdisplay.display.part_layout import PartLayout  # noqa: PLC0415 - few have parts
+    from voxdisplay.display.part_profile import read_parts  # noqa: PLC0415
+
+    parts = read_parts(value)
+    try:
+        PartLayout(parts)
+    except ValueError as error:
+        raise ValueError(f"parts: together they are no display: {error}") from None
+    return parts
+
+
 def _limit(value: Any) -> CurrentLimit:
     if not isinstance(value, Mapping):
         raise wrong_kind("limit", "a table {amps = 8.0, ma_per_channel = 20}", value)
@@ -202,4 +235,5 @@ _READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "dither": _one_of("dither", DITHERS),
     "fit": _one_of("fit", FITS),
     "sink": _sink,
+    "parts": _parts,
 }

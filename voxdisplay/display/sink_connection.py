@@ -63,6 +63,7 @@ class SinkConnection:
     """
 
     reconnects = 0
+    is_away = False
     serial: str | None = None
 
     def __init__(self, sink: Sink) -> None:

@@ -87,6 +87,11 @@ class SinkQueue:
         return left_s if left_s > _EARLY_S else min(left_s, 0.0)
 
     @property
+    def next_ticket(self) -> int:
+        """Ticket of the frame that is handed over next."""
+        return self._ticket + 1
+
+    @property
     def encoding_for(self) -> tuple[int, tuple[str, ...], float]:
         """How another process is to encode frames: in the plainest ops."""
         return self.info.max_payload_bytes, self.info.features, 0.0
@@ -172,6 +177,7 @@ class SinkOperations:
         self._sink = connection.sink
         self._counters = connection.counters
         self._clock, self._sleep = clock, sleep
+        self._held: Frame | None = None
 
     @property
     def wire_bytes(self) -> int:
@@ -215,11 +221,15 @@ class SinkOperations:
             self.pump(within_s=min(left_s, MAX_WAIT_S))
         return True
 
-    def show(self, frame: Frame, progress: Progress | None) -> Receipt:
-        """Send a frame as soon as the sink's rate allows. See `Display.present`."""
+    def show(
+        self, frame: Frame, progress: Progress | None, hold: Callable[[], None] | None = None
+    ) -> Receipt:
+        """Send a frame as soon as the sink's rate allows. See `DisplayOperations.show`."""
         began_s = self._clock()
         while (left_s := self.queue.left_s) > 0:
             self._sleep(left_s)
+        if hold is not None:
+            hold()
         frame = frame.copy()
         self.queue.playback.note_presented()
         packets, wire_bytes = self._send(frame, waited=True)
@@ -234,6 +244,18 @@ class SinkOperations:
             elapsed_s=self._clock() - began_s,
             digest=None,
         )
+
+    def start_held(self, frame: Frame) -> int:
+        """Keep a frame until `release`, and return its ticket."""
+        self._held = frame
+        return self.queue.next_ticket
+
+    def release(self, ticket: int) -> None:
+        """Send the frame that was kept when the sink's rate allows."""
+        frame, self._held = self._held, None
+        if frame is not None and ticket == self.queue.next_ticket:
+            self.queue.start_unwaited(frame)
+            self.pump(wait=False)
 
     def _send(self, frame: Frame, *, waited: bool) -> tuple[int, int]:
         began_s = self._clock()

@@ -145,6 +145,21 @@ class Framebuffer:
         """The picture as the display's memory holds it; it must not be changed."""
         return self if self._output is None else self._to_send(self._output).memory
 
+    def cropped(self, corner: tuple[int, int, int], grid: Grid) -> Self:
+        """Return what the memory holds in a box, as a picture of its own.
+
+        Parameters
+        ----------
+        corner : tuple of int
+            The lowest voxel (x, y, z) of the box.
+        grid : Grid
+            Its sides; it is inside the memory.
+
+        """
+        memory = self.memory
+        palette = memory._palette.copy() if memory._palette else None  # noqa: SLF001 - of its own kind
+        return type(self)._of_raster(memory._raster.cropped(corner, grid), palette)  # noqa: SLF001
+
     def readback(self) -> Pixels:
         """Return what a display reads back that shows the frame, [z, y, x], as its user sees it.
 

@@ -112,6 +112,10 @@ class Link(LinkRequests):
         """Number of those payloads that the device has not acknowledged."""
         return self._frames.unsent_payloads + self._sender.outstanding
 
+    def is_held(self, ticket: int) -> bool:
+        """Return whether the device has all of an open frame but its last payload."""
+        return self._frames.is_held(ticket) and not self._sender.outstanding
+
     @property
     def in_flight_bytes(self) -> int:
         """Bytes of frames that were sent and are neither acknowledged nor lost."""

@@ -48,10 +48,15 @@ class LinkRequests:
         self._frames.abandon_open_frame()
 
     def present_difference(
-        self, base: PictureId, payloads: list[bytes], whole: Callable[[], list[bytes]]
+        self,
+        base: PictureId,
+        payloads: list[bytes],
+        whole: Callable[[], list[bytes]],
+        *,
+        held: bool = False,
     ) -> int:
         """Queue a difference from the displayed picture: see `OutgoingFrames`."""
-        return self._frames.present_difference(base, payloads, whole)
+        return self._frames.present_difference(base, payloads, whole, held=held)
 
     def read(self, start: int, count: int, *, back: bool = False) -> None:
         """Request a range of voxels; `PageReceived` brings it, or its beginning."""

@@ -36,7 +36,7 @@ class OutgoingFrame:
     full_payloads : callable
         Returns payloads that draw the frame from the dark, for a difference without its base.
     open : bool
-        Whether it is still being encoded, so that more payloads follow.
+        Whether it is still being encoded, or is held, so that more payloads may follow.
     frame_id : int
         On the wire; -1 before its first packet.
     packetized : int
@@ -152,7 +152,12 @@ class OutgoingFrames:
         self._queue = deque(frame for frame in self._queue if not frame.open)
 
     def present_difference(
-        self, base: PictureId, payloads: list[bytes], full_payloads: Callable[[], list[bytes]]
+        self,
+        base: PictureId,
+        payloads: list[bytes],
+        full_payloads: Callable[[], list[bytes]],
+        *,
+        held: bool = False,
     ) -> int:
         """Queue a frame as its difference from a displayed picture, and return its ticket.
 
@@ -166,6 +171,8 @@ class OutgoingFrames:
             Returns the payloads that draw the frame from the dark. They are sent instead if, when
             the frame's turn comes, the frame right before it is not the picture, nor is that what
             is displayed while no packet is outstanding; and so if the session ended meanwhile.
+        held : bool
+            Whether the last payload waits until `append_payloads` ends the frame.
 
         """
         return self._add(
@@ -175,6 +182,7 @@ class OutgoingFrames:
                 clear=False,
                 base=base,
                 full_payloads=full_payloads,
+                open=held,
             )
         )
 
@@ -197,6 +205,13 @@ class OutgoingFrames:
     def payload_count(self) -> int:
         """Number of payloads of all frames, as far as they are encoded."""
         return sum(len(frame.payloads) for frame in self._queue)
+
+    def is_held(self, ticket: int) -> bool:
+        """Return whether an open frame is in packets but for its last payload."""
+        return any(
+            frame.ticket == ticket and frame.open and frame.packetized == len(frame.payloads) - 1
+            for frame in self._queue
+        )
 
     @property
     def unsent_payloads(self) -> int:

@@ -6,7 +6,7 @@ not know curves, colours or encodings.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -80,6 +80,23 @@ class SparseRaster:
             self._drawn = DisplayList()
             none = np.zeros(len(pixels), dtype=np.bool_)
             self._drawn.append(DrawnVoxels.of_item(pixels.index, pixels.values, none, Kind.SET))
+
+    def cropped(self, corner: tuple[int, int, int], grid: Grid) -> SparseRaster:
+        """Return the raster of a box, of which ``corner`` is the lowest voxel; order is kept."""
+        found = SparseRaster(grid, self.format)
+        if self.page is not None:
+            x, y, z = corner
+            array = self.page.pixels.reshape(self.format.shape(self.grid.array_shape))
+            box = array[z : z + grid.nz, y : y + grid.ny, x : x + grid.nx]
+            pixels: Pixels = np.array(box, order="C").reshape(self.format.shape((grid.voxels,)))
+            found.set(pixels)
+        if (drawn := self.visible) is not None:
+            voxels = self.grid.voxels_at(drawn.index) - np.array(corner, dtype=np.int32)
+            inside = grid.inside(voxels)
+            if inside.any():
+                index = grid.index_of(voxels[inside])
+                found.draw(replace(drawn.select(inside), index=index))
+        return found
 
     def draw(self, item: DrawnVoxels) -> None:
         """Draw an item over what is there."""
