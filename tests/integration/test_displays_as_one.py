@@ -1,6 +1,5 @@
 """Several displays as one: four emulators in four processes, one of which goes away and is back."""
 
-import json
 import threading
 from itertools import product
 
@@ -17,9 +16,9 @@ AXES = ["x,y,z", "-x,-y,z", "y,-x,z", "z,x,y"]
 class Wall:
     """Four emulators on ptys that keep their names, and the profile that makes them one."""
 
-    def __init__(self, start, folder, *options):
+    def __init__(self, start, folder, *options, count=4):
         self.start, self.folder, self.options = start, folder, options
-        self.emulators = [self.started(number) for number in range(4)]
+        self.emulators = [self.started(number) for number in range(count)]
         self.profile = {
             "parts": [
                 {
@@ -29,7 +28,9 @@ class Wall:
                     "size": [SIDE, SIDE, SIDE],
                     "axes": axes,
                 }
-                for number, (corner, axes) in enumerate(zip(CORNERS, AXES, strict=True))
+                for number, (corner, axes) in enumerate(
+                    list(zip(CORNERS, AXES, strict=True))[:count]
+                )
             ]
         }
 
@@ -50,7 +51,7 @@ class Wall:
 
 @pytest.fixture
 def wall(emulator, tmp_path):
-    return lambda *options: Wall(emulator, tmp_path, *options)
+    return lambda *options, **settings: Wall(emulator, tmp_path, *options, **settings)
 
 
 def noise(frame, seed=1):
@@ -60,7 +61,7 @@ def noise(frame, seed=1):
 
 
 def test_one_scene_is_cut_shown_together_and_read_back(wall):
-    tiles = wall()
+    tiles = wall("--baud", "115200")
     with vd.open(display=tiles.profile) as display:
         assert display.info.grid == (2 * SIDE, 2 * SIDE, SIDE)
         frame = noise(display.frame())
@@ -69,28 +70,22 @@ def test_one_scene_is_cut_shown_together_and_read_back(wall):
         assert [part.receipt.digest for part in receipt.parts].count(None) == 0
         assert np.array_equal(display.read(), frame.array())
         assert np.array_equal(display.verify(frame), frame.array())
+        # No part swaps before all hold the frame: those that get little wait for the one that gets
+        # most, though without waiting they would be done in a tenth of the time.
+        pixels = np.zeros_like(frame.array())
+        pixels[:, :SIDE, :SIDE] = noise(display.frame(), 2).array()[:, :SIDE, :SIDE]
+        pixels[0, SIDE:, :] = 255
+        last = display.frame()
+        last.set(pixels)
+        heavy, *light = [part.receipt for part in display.present(last).parts]
+        assert heavy.wire_bytes > 10 * max(each.wire_bytes for each in light)
+        assert min(each.elapsed_s for each in light) > 0.5 * heavy.elapsed_s
     # Each of them holds its own share, turned as it stands.
     for number, (x, y, _) in enumerate(CORNERS):
-        share = frame.array()[:, y : y + SIDE, x : x + SIDE]
+        share = last.array()[:, y : y + SIDE, x : x + SIDE]
         part = tiles.profile["parts"][number]
         with vd.open(part["port"], display={"axes": part["axes"]}) as alone:
             assert np.array_equal(alone.read(), share)
-
-
-def test_no_part_swaps_before_all_hold_the_frame(wall):
-    tiles = wall("--baud", "57600")
-    with vd.open(display=tiles.profile) as display:
-        # One part gets far more than the others, which wait for it.
-        frame = display.frame()
-        pixels = frame.array()
-        pixels[:, :SIDE, :SIDE] = noise(vd.Frame((SIDE, SIDE, SIDE))).array()
-        pixels[0, SIDE:, :] = 255
-        frame.set(pixels)
-        receipt = display.present(frame)
-        heavy, *light = [part.receipt for part in receipt.parts]
-        assert heavy.wire_bytes > 10 * max(each.wire_bytes for each in light)
-        # Without waiting, they would have been done in a tenth of the time.
-        assert min(each.elapsed_s for each in light) > 0.5 * heavy.elapsed_s
 
 
 def test_one_that_is_killed_in_mid_frame_stops_no_other_and_comes_back(wall):
@@ -119,7 +114,7 @@ def test_one_that_is_killed_in_mid_frame_stops_no_other_and_comes_back(wall):
 
 
 def test_one_that_stays_away_is_named_and_nothing_is_called_proved(wall):
-    tiles = wall("--baud", "57600")
+    tiles = wall("--baud", "115200", count=2)
     notes = []
     with vd.open(display=tiles.profile, note=notes.append) as display:
         frame = noise(display.frame())
@@ -131,22 +126,21 @@ def test_one_that_stays_away_is_named_and_nothing_is_called_proved(wall):
         receipt = display.present(frame, progress=progress)
         assert receipt.digest is None
         assert receipt.lost == ("tile 1",)
-        assert [part.state for part in display.parts] == ["open", "lost", "open", "open"]
+        assert [part.state for part in display.parts] == ["open", "lost"]
         assert display.frame().grid == frame.grid
-        with pytest.raises(vd.TransportError, match="tile 1 .* is lost"):
+        with pytest.raises(vd.TransportError, match=r"tile 1 .* is lost"):
             display.verify(frame)
         # And the next frame goes to those that are left.
         again = display.present(noise(display.frame(), 2))
-        assert [part.receipt is None for part in again.parts] == [False, True, False, False]
+        assert [part.receipt is None for part in again.parts] == [False, True]
         assert again.digest is None
     assert len([note for note in notes if "tile 1 is lost" in note]) == 1
-    for number in (0, 2, 3):
-        with vd.open(str(tiles.folder / f"tty{number}")) as alone:
-            assert alone.read().any()
+    with vd.open(str(tiles.folder / "tty0")) as alone:
+        assert alone.read().any()
 
 
 def test_a_loop_goes_on_while_one_is_away_and_takes_it_back(wall):
-    tiles = wall()
+    tiles = wall(count=2)
     notes = []
     with vd.open(display=tiles.profile, reconnect_s=60, note=notes.append) as display:
         shown = []
@@ -154,57 +148,21 @@ def test_a_loop_goes_on_while_one_is_away_and_takes_it_back(wall):
         def loop(count):
             for number in range(count):
                 frame = display.frame()
-                frame.draw(vd.Segment((0, 0, number % SIDE), (23.9, 23.9, number % SIDE)))
+                frame.draw(vd.Segment((0, 0, number % SIDE), (23.9, 11.9, number % SIDE)))
                 display.present(frame, wait=False)
                 display.wait_until(display._clock() + 0.03)
                 shown.append(display.playback.shown)
             return frame
 
         loop(5)
-        tiles.kill(3)
-        loop(20)
-        assert display.parts[3].state == "away"
-        while_away = shown[-1]
-        assert while_away > 15
-        tiles.restart(3)
-        while display.parts[3].state == "away":
+        tiles.kill(1)
+        loop(10)
+        assert display.parts[1].state == "away"
+        assert shown[-1] > shown[4] + 3
+        tiles.restart(1)
+        while display.parts[1].state == "away":
             loop(5)
         last = loop(5)
         display.flush()
         assert np.array_equal(display.read(), last.array())
-    assert any("tile 3: " in note and "is back after" in note for note in notes)
-
-
-def test_commands_on_a_display_of_four(wall, run, tmp_path):
-    tiles = wall()
-    lines = []
-    for part in tiles.profile["parts"]:
-        lines += ["[[parts]]", *(f"{key} = {json.dumps(value)}" for key, value in part.items())]
-    profile = tmp_path / "wall.toml"
-    profile.write_text("\n".join(lines))
-    scene = tmp_path / "spin.json"
-    scene.write_text(
-        '{"size": [24, 24, 12], "duration": 0.5, "fps": 20, "objects": [{"type": "sphere", '
-        '"center": [12, "12 + time", 6], "radius": 5, "color": "teal"}]}'
-    )
-    pushed = run("push", scene, "--display", profile, "--verify", "--json")
-    assert pushed.returncode == 0, pushed.stderr
-    told = json.loads(pushed.stdout)
-    assert told["verified"]
-    assert told["device"]["size"] == [24, 24, 12]
-    assert [part["shown"] for part in told["parts"]] == [True] * 4
-    assert told["wire_bytes"] == sum(part["wire_bytes"] for part in told["parts"])
-    played = run("play", scene, "--display", profile, "--json")
-    assert played.returncode == 0, played.stderr
-    told = json.loads(played.stdout)
-    assert told["wrong"] == 0
-    assert told["shown"] > 0
-    assert [part["state"] for part in told["parts"]] == ["open"] * 4
-    assert run("test-pattern", "--check", "--display", profile).returncode == 0
-    read = run("read", "-o", tmp_path / "page.npy", "--display", profile, "--json")
-    assert len(json.loads(read.stdout)["parts"]) == 4
-    assert np.load(tmp_path / "page.npy").shape == (12, 24, 24, 3)
-    tiles.kill(0)
-    failed = run("clear", "--display", profile)
-    assert failed.returncode == 3
-    assert "tile 0" in failed.stderr
+    assert any("tile 1: " in note and "is back after" in note for note in notes)

@@ -156,7 +156,7 @@ def test_push_imports_nothing_heavy(tmp_path):
     assert "numpy.ma" not in loaded, "it takes as long to import as a small scene to draw"
     needless = re.compile(
         r"voxdisplay\.(view|files|conformance|annotation|shows|sinks|bodies|voxelization\.surfaces)\."
-        r"|voxdisplay\.(display\.profile|raster\.(orientation|light|dither)|frame\.output)"
+        r"|voxdisplay\.(display\.(profile|part_|tiled_|swap_)|raster\.(orientation|light|dither)|frame\.output)"
     )
     allowed = {"voxdisplay.bodies.body", "voxdisplay.files.suffixes", "voxdisplay.shows.show"}
     assert not {name for name in loaded if needless.match(name)} - allowed

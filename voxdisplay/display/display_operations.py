@@ -171,7 +171,7 @@ class DisplayOperations:
         ticket = self.queue.enqueue(frame, held=hold is not None)
         self.queue.playback.note_presented()
         if hold is not None:
-            self._wait_until_held(ticket)
+            self._wait_until_held(ticket, progress)
             hold()
             self.release(ticket)
         digest = self.wait_until_shown(ticket, progress)
@@ -210,11 +210,15 @@ class DisplayOperations:
         self.queue.release(ticket)
         self.pump(wait=False)
 
-    def _wait_until_held(self, ticket: int) -> None:
+    def _wait_until_held(self, ticket: int, progress: Progress | None = None) -> None:
         while self.queue.encoding:  # at its end, a frame without ops is held without any answer
             self.pump(wait=False)
+        link, total = self._connection.link, 1
         while not self.queue.is_held(ticket):
             self.pump()
+            total = max(total, link.payload_count)
+            if progress:
+                progress(total - link.unacknowledged_payloads, total)
 
     def wait_until_shown(self, ticket: int, progress: Progress | None = None) -> int | None:
         """Wait until a frame is displayed and return the device's digest."""

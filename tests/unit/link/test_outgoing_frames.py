@@ -228,6 +228,38 @@ def test_the_lost_come_before_the_new_and_wait_for_credit_too():
     assert transmit(link, 0.0)[0] == first
 
 
+def test_a_held_frame_has_all_but_its_last_payload_acknowledged():
+    link = open_link()
+    ticket = link.open_frame()
+    link.append_payloads(ticket, [b"\xa0", b""], last=False)
+    assert not link.is_held(ticket)
+    (first,) = transmit(link, 0.0)
+    assert first.ops == b"\xa0"
+    assert not link.is_held(ticket)
+    assert not link.is_held(ticket + 1)
+    receive(link, ack(1, 0), 0.1)
+    assert link.is_held(ticket)
+    assert link.next_timeout(0.1) is None  # it may wait as long as it likes
+    link.append_payloads(ticket, [], last=True)
+    assert not link.is_held(ticket)
+    (commit,) = transmit(link, 0.2)
+    assert (commit.ops, commit.flags) == (b"", spec.DATA_FLAG_CLEAR | spec.DATA_FLAG_COMMIT)
+
+
+def test_a_held_frame_is_sent_again_in_a_new_session_and_held_there():
+    link = open_link()
+    base = show_frame(link)
+    ticket = link.present_difference(base, [b"\x80\xa0", b""], lambda: [b"\xa7", b""], held=True)
+    (packet,) = transmit(link, 0.1)
+    assert (packet.ops, packet.flags) == (b"\x80\xa0", 0)
+    link.receive(packets.encode(packets.Error(code=1, session=SESSION, offset=0)), 0.2)
+    (hello,) = transmit(link, 0.2)
+    receive(link, dataclasses.replace(INFO, session=hello.session), 0.3)
+    assert not link.is_held(ticket)
+    (again,) = transmit(link, 0.3)
+    assert (again.ops, again.flags) == (b"\xa7", spec.DATA_FLAG_CLEAR)
+
+
 # -- frames as differences
 
 
