@@ -233,7 +233,7 @@ class TiledOperations:
             digest=self._connection.whole_digest(frame),
             skew_s=max(times) - min(times),
         )
-        self.queue.note_waited(frame, proved=receipt.digest is not None)
+        self.queue.note_waited(frame, self._clock(), proved=receipt.digest is not None)
         return receipt
 
     def displayed_frame(self, blank: Frame) -> Frame:

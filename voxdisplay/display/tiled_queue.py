@@ -6,7 +6,6 @@ that are present show it. Must not know how a part sends.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -71,6 +70,8 @@ class TiledQueue:
         Called with ticket and time when a frame is displayed that nobody waits for.
     displayed : Frame or None
         The frame that all parts have proved last.
+    latest : Frame or None
+        That which was displayed last, proved or not.
 
     """
 
@@ -83,6 +84,7 @@ class TiledQueue:
         self.playback: PlaybackMeter = TiledMeter(workers)
         self.on_shown: Callable[[int, float], None] = lambda _ticket, _now: None
         self.displayed: Frame | None = None
+        self.latest: Frame | None = None
         self._workers = workers
         self._info = info
         self._pending: Frame | None = None
@@ -164,14 +166,16 @@ class TiledQueue:
             del self._unshown[ticket]
         self.frames += len(done)
         self.playback.note_shown(len(done), now)
+        self.latest = frame
         self.displayed = frame if len(present) == len(self._workers) else None
         self.on_shown(last, now)
 
-    def note_waited(self, frame: Frame, *, proved: bool) -> None:
+    def note_waited(self, frame: Frame, now: float, *, proved: bool) -> None:
         """Record that a frame that was waited for is displayed."""
         self.frames += 1
         self.playback.note_presented()
-        self.playback.note_shown(1, time.monotonic())
+        self.playback.note_shown(1, now)
+        self.latest = frame
         self.displayed = frame if proved else None
 
     def drop_all(self) -> None:
