@@ -110,6 +110,8 @@ def _encode_sets(update: PageUpdate, config: EncoderConfig) -> tuple[list[bytes]
     rest = np.ones(len(index), dtype=np.bool_)
     for number in np.argsort(-counts, kind="stable")[:_MANY_PENS].tolist():
         rows = rank == number
+        if slabs.are_too_sparse(index[rows], config):
+            continue
         coded = slabs.encode_slabs(index[rows], int(pens[number]), config)
         if len(pens) == 1 or _wire_bytes(coded) < bytes_as_set[number]:
             payloads += coded

@@ -27,8 +27,10 @@ _LEAST_PART = 8
 _PARSED_VOXELS = 1 << 17
 # Line rate, bytes/s, from which sets are cut: in one piece, which is shorter, the line would idle.
 _SLABS_FROM = 100_000
-# On a slow line, sets are cut for the sake of memory.
+# On a slow line, sets are cut for the sake of memory: those of which few voxels follow another in
+# its row, and which take several times as much for each, into slabs of so many.
 _HUGE_SET = 1 << 20
+_ISOLATED_SET, _ISOLATED_SLAB, _FEW_ROWS = 1 << 17, 1 << 16, 8
 # Chains are cut into pieces of so many voxels if they have twice as many.
 _CHAINED_VOXELS = 1 << 18
 
@@ -56,8 +58,9 @@ class PageUpdate:
 def partition(update: PageUpdate, config: EncoderConfig) -> Iterator[PageUpdate]:
     """Yield the parts of an update; itself if it is not large."""
     ordered, index = update.ordered, update.unordered
-    if len(index) > (_LARGE_SET if config.bytes_per_s >= _SLABS_FROM else _HUGE_SET):
-        for slab in _slabs(index, update.pixels_at, config):
+    slab_voxels = _slab_voxels(index, config)
+    if slab_voxels:
+        for slab in _slabs(index, update.pixels_at, config, slab_voxels):
             yield PageUpdate(None, slab, update.pixels_at)
         if ordered is None:
             return
@@ -70,13 +73,26 @@ def partition(update: PageUpdate, config: EncoderConfig) -> Iterator[PageUpdate]
     yield update
 
 
-def _slabs(index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig) -> Iterator[Ints]:
+def _slab_voxels(index: Ints, config: EncoderConfig) -> int:
+    """Return how many voxels, at least, the slabs have into which a set is cut; 0: it is not."""
+    if config.bytes_per_s >= _SLABS_FROM:
+        return _SLAB_VOXELS // _LEAST_PART if len(index) > _LARGE_SET else 0
+    if len(index) > _ISOLATED_SET:
+        in_rows = int(np.count_nonzero(index[1:] - index[:-1] == 1))
+        if _FEW_ROWS * in_rows < len(index):
+            return _ISOLATED_SLAB
+    return _SLAB_VOXELS if len(index) > _HUGE_SET else 0
+
+
+def _slabs(
+    index: Ints, pixels_at: spans.PixelLookup, config: EncoderConfig, least: int
+) -> Iterator[Ints]:
     """Yield slabs of voxels, cut along z between bricks; incompressible ones are cut further."""
     layer = config.grid.nx * config.grid.ny
     side = 1 << spec.LIMIT_MAX_LEVEL
-    thick = max(1, _SLAB_VOXELS // (layer * side)) * side
+    most = min(_SLAB_VOXELS, _LEAST_PART * least)
+    thick = max(1, most // (layer * side)) * side
     at = np.searchsorted(index, np.arange(thick, config.grid.nz, thick) * layer).tolist()
-    least = _SLAB_VOXELS if config.bytes_per_s < _SLABS_FROM else _SLAB_VOXELS // _LEAST_PART
     begin = 0
     for end in [*at, len(index)]:
         if end == begin or (end - begin < least and end < len(index)):

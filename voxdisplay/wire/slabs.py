@@ -23,6 +23,9 @@ _COLUMN_CELLS = 1 << spec.SLABS_SIDE_BITS
 _TAIL_BYTES = 3
 # Slabs whose contexts are found at once: at first, and at most.
 _FIRST_SLABS, _MOST_SLABS = 8, 64
+# With more cells than this for each voxel, to code them takes longer than what they save takes on
+# the line. A few cells are always tried.
+_SPARSE_CELLS, _FEW_CELLS = 64, 1 << 15
 # Samples of a curve that take as long to compute without kernels as a voxel takes to code.
 _SAMPLES_PER_VOXEL = 6
 
@@ -51,6 +54,25 @@ def encode_slabs(index: Ints, pen: int, config: EncoderConfig) -> list[bytes]:
     return payloads.finished()
 
 
+def are_too_sparse(index: Ints, config: EncoderConfig) -> bool:
+    """Return whether nearly all cells around a set are dark, which takes long to code.
+
+    Parameters
+    ----------
+    index : (n,) int64 array
+        As of `encode_slabs`.
+    config : EncoderConfig
+
+    """
+    column, order = _column_numbers(index, config)
+    first = np.flatnonzero(np.diff(column, prepend=-1))
+    cells = np.ones(len(first), dtype=np.int64)
+    for axis in config.grid.voxels_at(index).T:
+        place = (axis // CELL)[order]
+        cells *= np.maximum.reduceat(place, first) - np.minimum.reduceat(place, first) + 1
+    return int(cells.sum()) > max(_SPARSE_CELLS * len(index), _FEW_CELLS)
+
+
 @dataclass(frozen=True)
 class _Column:
     """Voxels of a column, sorted by z: coordinates, (n,) each, and cells along its sides."""
@@ -73,14 +95,19 @@ class _Column:
                 yield self.rows(part == number, half)
 
 
-def _columns(index: Ints, config: EncoderConfig) -> Iterator[_Column]:
+def _column_numbers(index: Ints, config: EncoderConfig) -> tuple[Ints, Ints]:
+    """Return the numbers of the columns of voxels, ascending, and their rows in that order."""
     nx, ny, _ = config.grid
     side = _COLUMN_CELLS * CELL
-    row, x = np.divmod(index, nx)
-    z, y = np.divmod(row, ny)
-    number = x // side + -(-nx // side) * (y // side)
+    number = index % nx // side + -(-nx // side) * (index // nx % ny // side)
     order = np.argsort(number, kind="stable")
-    ends = np.flatnonzero(np.diff(number[order], append=-1)) + 1
+    return number[order], order
+
+
+def _columns(index: Ints, config: EncoderConfig) -> Iterator[_Column]:
+    x, y, z = config.grid.voxels_at(index).T
+    number, order = _column_numbers(index, config)
+    ends = np.flatnonzero(np.diff(number, append=-1)) + 1
     begin = 0
     for end in ends.tolist():
         rows = order[begin:end]

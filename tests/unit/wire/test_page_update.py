@@ -45,6 +45,16 @@ def test_what_is_not_large_is_one_part():
     assert part is update
 
 
+@pytest.mark.parametrize("every", [1, 2])
+def test_isolated_voxels_are_cut_sooner_on_a_slow_line(monkeypatch, every):
+    monkeypatch.setattr(page_update, "_ISOLATED_SET", 2000)
+    monkeypatch.setattr(page_update, "_ISOLATED_SLAB", 1000)
+    index = np.arange(0, GRID.voxels, every)
+    parts = [part.unordered for part in parts_of(PageUpdate(None, index, ones), SLOW)]
+    assert np.array_equal(np.concatenate(parts), index)
+    assert [len(part) for part in parts] == ([len(index)] if every == 1 else [2048] * 6)
+
+
 @pytest.mark.usefixtures("small")
 def test_a_long_chain_is_cut_into_pieces():
     for count in (101, 150, 260):

@@ -246,3 +246,21 @@ def test_too_many_colours_are_not_tried(monkeypatch):
     )
     drawn(frame, (*SETS, "slabs"))
     assert len(tried) == 3
+
+
+def test_what_is_nearly_dark_is_not_tried(monkeypatch):
+    def encode(*_given):
+        raise AssertionError
+
+    monkeypatch.setattr(encoding_selection.slabs, "encode_slabs", encode)
+    frame = Frame((256, 256, 256), "mono1")
+    frame.draw(np.random.default_rng(3).integers(0, 256, (2000, 3)), "white")
+    assert drawn(frame, (*SETS, "slabs")) == drawn(frame, SETS)
+
+
+@pytest.mark.parametrize(("side", "sparse"), [(16, False), (64, False), (170, True)])
+def test_dark_cells_are_counted_around_what_is_lit(side, sparse):
+    config = EncoderConfig(Grid(512, 256, 512), PixelFormat.MONO1, 1024, 0)
+    voxels = 300 + np.random.default_rng(4).integers(0, side, (400, 3)) - [0, 200, 0]
+    index = np.unique(config.grid.index_of(voxels))
+    assert slabs.are_too_sparse(index, config) == sparse
