@@ -7,6 +7,8 @@ import signal
 import pytest
 from terminal import Terminal
 
+from voxdisplay.cli.thumbnail import _room
+
 HALF = "\N{UPPER HALF BLOCK}"
 ENTER, LEAVE, SHOWN = "\x1b[?1049h", "\x1b[?25h\x1b[?1049l", "\x1b[?2026l"
 SMALL = "sim:?size=24x16x12"
@@ -163,6 +165,20 @@ def test_a_picture_on_a_line_whose_rate_was_asked_for(terminal):
         code, text = terminal(*command, "--port", SMALL, "--baud", "auto").finish()
         assert code == 0, text
         assert HALF in text
+
+
+@pytest.mark.parametrize(
+    ("size", "picture"),
+    [((40, 110), (34, 85)), ((20, 60), (14, 35)), ((30, 24), (11, 23)), ((90, 400), (44, 110))],
+)
+def test_the_picture_uses_the_room_that_is_there(size, picture):
+    rows, columns = size
+    assert _room(os.terminal_size((columns, rows))) == picture[::-1]
+
+
+@pytest.mark.parametrize("size", [(11, 80), (40, 12)])
+def test_a_terminal_that_is_too_small_gets_no_picture(size):
+    assert _room(os.terminal_size(size[::-1])) is None
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -36,6 +37,7 @@ _FPS: Final = 20.0  # of a film that turns once
       voxdisplay preview curve.json -o curve.gif --pixels 480x360 --seconds 4
       voxdisplay preview spin.json -o spin.mp4
       voxdisplay preview spin.json -o moment.png --at 1.5
+      voxdisplay preview curve.json -o curve.png --watch
       voxdisplay preview curve.json -o small.png --size 16x16x32 --format mono1
     """
 )
@@ -97,6 +99,12 @@ _FPS: Final = 20.0  # of a film that turns once
     "film shows all of it]",
 )
 @click.option("--plain", is_flag=True, help="Draw without box, axes and halo.")
+@click.option(
+    "--watch",
+    is_flag=True,
+    help="Draw again whenever SCENE is saved, until Ctrl-C. What cannot "
+    "be read leaves the last picture as it is.",
+)
 @quiet_option
 def preview(
     *,
@@ -113,11 +121,47 @@ def preview(
     fps: float | None,
     at_s: float | None,
     plain: bool,
+    watch: bool,
 ) -> None:
     """Draw SCENE, a JSON file or - for stdin, or a recording, as a display would show it.
 
     Needs the extra `view`: pip install 'voxdisplay[view]'.
     """
+    from voxdisplay.cli.followed_file import FollowedFile  # noqa: PLC0415 - help starts fast
+
+    if watch and scene == "-":
+        raise click.UsageError("--watch: stdin cannot be followed; name a file")
+    file = FollowedFile(scene)
+
+    def draw() -> None:
+        _draw(
+            scene, output, size_px=size_px, view_angle=view_angle, zoom=zoom, size=size,
+            format_=format_, fit=fit, model=model, seconds=seconds, fps=fps, at_s=at_s, plain=plain,
+        )  # fmt: skip
+
+    draw()
+    if watch:
+        note(f"{scene} is followed: Ctrl-C ends that")
+        file.follow(draw, threading.Event())
+
+
+def _draw(
+    scene: str,
+    output: Path,
+    *,
+    size_px: tuple[int, int],
+    view_angle: tuple[float, float] | None,
+    zoom: float | None,
+    size: Grid | None,
+    format_: str,
+    fit: Fit,
+    model: ModelOptions,
+    seconds: float,
+    fps: float | None,
+    at_s: float | None,
+    plain: bool,
+) -> None:
+    """Draw a scene once, as the options of `preview` say."""
     from voxdisplay.cli.image_output import save_image  # noqa: PLC0415 - help starts fast
     from voxdisplay.cli.scene_drawing import (  # noqa: PLC0415
         best_seen,

@@ -135,7 +135,7 @@ def push(
         if preview and page is not None:
             save_page_image(preview, page, display.info, frame.memory.palette)
         if not as_json:
-            print_thumbnail(display, frame, page, baud)
+            print_thumbnail(display, frame, page, baud, fitted)
         exit_if_lost(display)
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
+import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +23,7 @@ from voxdisplay.cli.options import (
     quiet_option,
     scene_argument,
 )
-from voxdisplay.cli.output import note, print_stdout
+from voxdisplay.cli.output import note, print_stdout, set_quiet
 from voxdisplay.cli.param_types import AddressType, OriginType
 from voxdisplay.cli.profile_options import standing_options
 
@@ -29,8 +32,11 @@ if TYPE_CHECKING:
     from voxdisplay.raster.pixel_format import Pixels
     from voxdisplay.shows.show import Show
     from voxdisplay.view.camera import Camera
+    from voxdisplay.view.lit_voxels import LitVoxels
     from voxdisplay.view.live.sources import Source
     from voxdisplay.view.terminal import TerminalView
+
+_STOP_TIMEOUT_S = 2.0
 
 
 @click.command(
@@ -87,7 +93,8 @@ def view(
 ) -> None:
     """Show a display live, or with SCENE, a JSON file or a recording, what a display would show.
 
-    A scene with a duration is played, again and again.
+    A scene with a duration is played, again and again. When SCENE is saved, what was saved is
+    shown; if it cannot be read, the last picture stays until it is saved again.
 
     The display is read back: it needs the feature READ, and its port to itself. To watch the
     emulator while others draw on it, start it by voxdisplay-sim --view. Ctrl-C ends it.
@@ -138,6 +145,29 @@ def _serve(
 
 @contextlib.contextmanager
 def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
+    """Yield the source of a scene; while it is used, the file is followed."""
+    from voxdisplay.cli.followed_file import FollowedFile, print_failure  # noqa: PLC0415
+    from voxdisplay.view.live.followed_source import FollowedSource  # noqa: PLC0415 - an extra
+
+    file, done = FollowedFile(scene), threading.Event()
+    source = FollowedSource(_scene_pictures(scene, size), print_failure)
+    context = click.get_current_context()
+
+    def follow() -> None:
+        with context.scope(cleanup=False):  # for the thread to be quiet if the command is
+            file.follow(lambda: source.replace(_scene_pictures(scene, size)), done)
+
+    follower = threading.Thread(target=follow, name="followed file", daemon=True)
+    follower.start()
+    try:
+        yield source
+    finally:
+        done.set()
+        follower.join(_STOP_TIMEOUT_S)
+
+
+def _scene_pictures(scene: str, size: vd.Grid | None) -> Source:
+    """Return the source of what a scene shows now."""
     from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
     from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
     from voxdisplay.view.live.moving_source import MovingSource  # noqa: PLC0415
@@ -147,8 +177,9 @@ def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
     (found, camera), title = _scene_show(scene, size), Path(scene).name
     if isinstance(found, vd.Frame):
         lit, digest = PixelMap(*found.lit()), found.digest()
-        yield StaticSource(Snapshot(lit, found.grid, found.format, 1, title, digest, camera=camera))
-        return
+        return StaticSource(
+            Snapshot(lit, found.grid, found.format, 1, title, digest, camera=camera)
+        )
 
     def snapshot(number: int) -> Snapshot:
         frame = found.frame(number)
@@ -158,7 +189,7 @@ def _scene_source(scene: str, size: vd.Grid | None) -> Iterator[Source]:
             page, frame.grid, vd.PixelFormat.RGB888, number + 1, title, digest, camera=camera
         )
 
-    yield MovingSource(found.frame_count, found.fps, snapshot, title)
+    return MovingSource(found.frame_count, found.fps, snapshot, title)
 
 
 @contextlib.contextmanager
@@ -232,35 +263,88 @@ def _scene_show(scene: str, size: vd.Grid | None) -> tuple[vd.Frame | Show, Came
 
 @contextlib.contextmanager
 def _scene_view(scene: str, size: vd.Grid | None) -> Iterator[TerminalView]:
-    from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
-    from voxdisplay.raster.pixel_map import PixelMap  # noqa: PLC0415
-    from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels  # noqa: PLC0415
-    from voxdisplay.view.live.moving_source import due_ordinal  # noqa: PLC0415
+    """Yield the view of a scene, which follows the file; what fails stands in its status line."""
+    from voxdisplay.cli.followed_file import (  # noqa: PLC0415
+        POLL_S,
+        READ_ERRORS,
+        FollowedFile,
+        failure_text,
+        print_failure,
+    )
     from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
-    (found, camera), title = _scene_show(scene, size), Path(scene).name
-    if isinstance(found, vd.Frame):
-        lit = lit_voxels(PixelMap(*found.lit()), found.grid, found.format)
-        still = TerminalView(found.grid, title, lambda: lit, changes=False)
-        still.camera = camera or still.camera
-        yield still
-        return
-    began_s = time.monotonic()
+    file, on_screen = FollowedFile(scene), sys.stderr.isatty()
+    read = _scene_reader(scene, size)
 
-    def read() -> LitVoxels:
-        due = due_ordinal(time.monotonic() - began_s, found.fps)
-        frame = found.frame(due % found.frame_count)
+    def read_saved(view: TerminalView) -> LitVoxels:
+        nonlocal read
+        try:
+            if file.saved():
+                read = _scene_reader(scene, size)
+                view.remark = ""
+            view.read_interval_s = min(POLL_S, read.interval_s)
+            view.grid, lit = read.grid, read()
+        except READ_ERRORS as error:
+            view.remark = failure_text(error).replace(scene, view.title)
+            if not on_screen:
+                print_failure(error)
+            return view.lit
+        return lit
+
+    if on_screen:
+        set_quiet(click.get_current_context())  # notes would stand in the picture
+    view = TerminalView(read.grid, Path(scene).name, read, changes=True)
+    view.read = lambda: read_saved(view)
+    view.read_interval_s = min(POLL_S, read.interval_s)
+    view.camera = read.camera or view.camera
+    yield view
+
+
+class _SceneReader:
+    """Lit voxels of a scene, or of the moment of a moving one that is due.
+
+    Attributes
+    ----------
+    grid : Grid
+    camera : Camera or None
+        From where it is best seen.
+    interval_s : float
+        Seconds from picture to picture.
+
+    """
+
+    def __init__(self, found: vd.Frame | Show, camera: Camera | None) -> None:
+        self._found = found
+        self._began_s = time.monotonic()
+        first = found if isinstance(found, vd.Frame) else found.frame(0)
+        self._still = self._lit(first) if isinstance(found, vd.Frame) else None
+        self.grid, self.camera = first.grid, camera
+        self.interval_s = math.inf if isinstance(found, vd.Frame) else 1 / found.fps
+
+    @staticmethod
+    def _lit(frame: vd.Frame) -> LitVoxels:
+        from voxdisplay.cli.show_films import color_page  # noqa: PLC0415
+        from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
+
         return lit_voxels(color_page(frame), frame.grid, vd.PixelFormat.RGB888)
 
-    grid = found.frame(0).grid
-    moving = TerminalView(grid, title, read, changes=True, read_interval_s=1 / found.fps)
-    moving.camera = camera or moving.camera
-    yield moving
+    def __call__(self) -> LitVoxels:
+        from voxdisplay.view.live.moving_source import due_ordinal  # noqa: PLC0415
+
+        if self._still is not None or isinstance(self._found, vd.Frame):
+            assert self._still is not None  # noqa: S101 - of a frame
+            return self._still
+        due = due_ordinal(time.monotonic() - self._began_s, self._found.fps)
+        return self._lit(self._found.frame(due % self._found.frame_count))
+
+
+def _scene_reader(scene: str, size: vd.Grid | None) -> _SceneReader:
+    return _SceneReader(*_scene_show(scene, size))
 
 
 @contextlib.contextmanager
 def _display_view(port: str | None, baud: Baud, timeout_s: float) -> Iterator[TerminalView]:
-    from voxdisplay.view.lit_voxels import LitVoxels, lit_voxels  # noqa: PLC0415
+    from voxdisplay.view.lit_voxels import lit_voxels  # noqa: PLC0415
     from voxdisplay.view.terminal import TerminalView  # noqa: PLC0415
 
     with open_display(port, baud, timeout_s) as display:

@@ -42,11 +42,14 @@ _FADE_STEPS = 12
 
 
 @functools.lru_cache(maxsize=2)
-def draw_stage(grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool) -> Image.Image:
-    """Return the background. It is cached: do not draw on it."""
+def draw_stage(
+    grid: Grid, camera: Camera, size: tuple[int, int], *, labels: bool, floor: bool = True
+) -> Image.Image:
+    """Return the background, labels and floor lines optional. It is cached: do not draw on it."""
     pen = _Pen(grid, camera, size)
     axes = outline_axes(grid, camera, size)
-    pen.lines(_floor_lines(grid), _FLOOR, 0.9)
+    if floor:
+        pen.lines(_floor_lines(grid), _FLOOR, 0.9)
     covered = {frozenset((axis.start, axis.end)) for axis in axes}
     front = _nearest_corner(grid, camera)
     for before in (False, True):
@@ -121,11 +124,6 @@ def outline_axes(grid: Grid, camera: Camera, size: tuple[int, int]) -> list[Outl
             place, outward = tuple(middle.tolist()), tuple((-across).tolist())
             found[number] = rank, OutlineAxis(number, start, end, place, outward)
     return [found[number][1] for number in sorted(found)]
-
-
-def axis_tips(grid: Grid) -> Floats:
-    """Return the end points of the three axes, (3, 3): rows x, y, z."""
-    return np.diag(np.array(grid) + _AXIS_OVERHANG * max(grid))
 
 
 def _corners(grid: Grid) -> list[Corner]:

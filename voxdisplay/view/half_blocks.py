@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.raster.grid import Grid
-from voxdisplay.view.axes_and_grid import AXIS_COLORS, axis_tips
+from voxdisplay.view.axes_and_grid import AXIS_COLORS, outline_axes
 from voxdisplay.view.camera import Camera
 from voxdisplay.view.lit_voxels import LitVoxels
 from voxdisplay.view.picture import RenderOptions, render_voxels
@@ -22,6 +21,9 @@ RESET = "\x1b[0m"
 _UPPER_HALF = "\N{UPPER HALF BLOCK}"
 # Rendered larger by this factor and reduced: thin lines keep their brightness.
 _SUPERSAMPLING = 2
+# From the middle of an axis to its name: across, and down in half characters.
+_NAME_DISTANCE = (2.0, 2.5)
+_HUE_WEIGHT = 1.5
 # Nearer than for a window: the raster is small.
 CAMERA = Camera(distance=2.2)
 
@@ -64,9 +66,11 @@ def half_blocks(
 
     """
     size = columns * _SUPERSAMPLING, 2 * rows * _SUPERSAMPLING
-    options = RenderOptions(size=size, camera=camera, labels=False)
+    # Of 256 colours few are dark: a halo would be a stain of greys. Floor lines are finer than
+    # characters.
+    options = RenderOptions(size=size, camera=camera, glow=full, labels=False, floor=False)
     pixels = np.asarray(render_voxels(lit, grid, options).reduce(_SUPERSAMPLING))
-    names = _axis_name_cells(grid, replace(options, size=(columns, 2 * rows)))
+    names = _axis_name_cells(grid, camera, columns, rows)
     codes = _color_codes(pixels, full=full)
     return [
         _line(codes[2 * row], codes[2 * row + 1], names.get(row, {}), full=full)
@@ -74,17 +78,16 @@ def half_blocks(
     ]
 
 
-def _axis_name_cells(grid: Grid, options: RenderOptions) -> dict[int, dict[int, int]]:
-    """Return the cells of the axes' names, just beyond each tip: row -> column -> axis."""
-    x, y, _ = options.camera.project(np.vstack((np.zeros(3), axis_tips(grid))), grid, options.size)
-    columns, rows = options.size[0], options.size[1] // 2
+def _axis_name_cells(
+    grid: Grid, camera: Camera, columns: int, rows: int
+) -> dict[int, dict[int, int]]:
+    """Return the cells of the axes' names, outside of the middle of each: row -> column -> axis."""
     found: dict[int, dict[int, int]] = {}
-    for axis in range(3):
-        along = np.array([x[axis + 1] - x[0], y[axis + 1] - y[0]])
-        along = along / max(1.0, float(np.hypot(*along))) * 1.6
-        column = min(max(0, int(x[axis + 1] + along[0])), columns - 1)
-        row = min(max(0, int((y[axis + 1] + along[1]) / 2)), rows - 1)
-        found.setdefault(row, {})[column] = axis
+    for axis in outline_axes(grid, camera, (columns, 2 * rows)):
+        x, y = np.add(axis.middle, np.multiply(axis.outward, _NAME_DISTANCE))
+        column = min(max(0, int(x)), columns - 1)
+        row = min(max(0, int(y / 2)), rows - 1)
+        found.setdefault(row, {})[column] = axis.number
     return found
 
 
@@ -93,9 +96,16 @@ def _color_codes(pixels: NDArray[np.uint8], *, full: bool) -> list[list[str]]:
     if full:
         return [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
     flat, index = np.unique(pixels.reshape(-1, 3), axis=0, return_inverse=True)
-    apart = ((flat[:, None, :].astype(np.int64) - _XTERM) ** 2).sum(axis=2)
+    apart = ((_opponents(flat)[:, None, :] - _opponents(_XTERM)) ** 2).sum(axis=2)
     numbers = (16 + apart.argmin(axis=1))[index.reshape(pixels.shape[:2])]
     return [[f"5;{number}" for number in row] for row in numbers.tolist()]
+
+
+def _opponents(colors: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Return colours, (n, 3), as brightness and two differences of hue, which count more."""
+    red, green, blue = colors.astype(np.float64).T
+    bright = 0.3 * red + 0.59 * green + 0.11 * blue
+    return np.stack((bright, _HUE_WEIGHT * (red - bright), _HUE_WEIGHT * (blue - bright)), axis=1)
 
 
 def _line(upper: list[str], lower: list[str], names: dict[int, int], *, full: bool) -> str:

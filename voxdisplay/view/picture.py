@@ -52,9 +52,9 @@ class RenderOptions:
     size : (W, H)
         In pixels.
     camera : Camera
-    glow, axes, labels : bool
+    glow, axes, labels, floor : bool
         Whether there is bloom; whether the grid's box and axes are drawn; whether the axes have
-        their names and lengths.
+        their names and lengths, and the box lines on its floor.
 
     """
 
@@ -63,6 +63,7 @@ class RenderOptions:
     glow: bool = True
     axes: bool = True
     labels: bool = True
+    floor: bool = True
 
     def with_view(
         self, angle: tuple[float, float] | None, zoom: float | None = None
@@ -160,7 +161,9 @@ def auto_exposure(light: Light) -> float:
 
 def _background(grid: Grid, options: RenderOptions) -> Image.Image:
     if options.axes:
-        return draw_stage(grid, options.camera, options.size, labels=options.labels).copy()
+        return draw_stage(
+            grid, options.camera, options.size, labels=options.labels, floor=options.floor
+        ).copy()
     return Image.new("RGB", options.size, BACKGROUND)
 
 

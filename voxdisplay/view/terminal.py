@@ -64,6 +64,8 @@ class TerminalView:
         True to read again from time to time.
     read_interval_s : float
         How often, at most.
+    remark : str
+        Shown in the place of the status line, until it is empty.
 
     """
 
@@ -75,11 +77,17 @@ class TerminalView:
     camera: Camera = CAMERA
     spins: bool = False
     done: bool = False
+    remark: str = ""
     _lit: LitVoxels = field(init=False)
     _next_read_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.read_page()
+
+    @property
+    def lit(self) -> LitVoxels:
+        """The voxels that are shown."""
+        return self._lit
 
     def read_page(self) -> None:
         """Read the voxels, and schedule the next reading."""
@@ -117,6 +125,8 @@ class TerminalView:
             self._lit, self.grid, columns, max(1, rows - 1), camera=self.camera, full=full
         )
         words = f" {printable(self.title)}  {len(self._lit.positions)} voxels  {_HELP}"
+        if self.remark:
+            words = f" {printable(self.remark)}"
         return [*picture, words[: columns - 1]] if rows > 1 else picture
 
 
@@ -146,7 +156,7 @@ def _event_loop(view: TerminalView, keyboard: int) -> None:
     keys_ready.register(keyboard, selectors.EVENT_READ)
     while not view.done:
         size = os.get_terminal_size(sys.stdout.fileno())
-        shown = size, view.camera, id(view._lit)  # noqa: SLF001
+        shown = size, view.camera, id(view.lit), view.remark
         if shown != drawn and min(size) > 0:
             lines = view.lines(size.columns, size.lines, full=full)
             _write(_BEGIN_UPDATE + "\x1b[K\n".join(lines) + "\x1b[K\x1b[J" + _END_UPDATE)

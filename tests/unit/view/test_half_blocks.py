@@ -8,8 +8,14 @@ import pytest
 
 from voxdisplay.raster.grid import Grid
 from voxdisplay.raster.pixel_format import PixelFormat
-from voxdisplay.view.axes_and_grid import BACKGROUND
-from voxdisplay.view.half_blocks import CAMERA, RESET, half_blocks, has_true_color
+from voxdisplay.view.axes_and_grid import BACKGROUND, outline_axes
+from voxdisplay.view.half_blocks import (
+    CAMERA,
+    RESET,
+    _color_codes,
+    half_blocks,
+    has_true_color,
+)
 from voxdisplay.view.lit_voxels import lit_voxels
 from voxdisplay.view.picture import RenderOptions, render_voxels
 
@@ -60,7 +66,7 @@ def test_a_voxel_is_in_the_cell_that_the_camera_names():
 def test_it_is_the_picture_two_rows_a_line():
     voxels = lit((2, 4, 6), (0, 0, 0))
     characters, pixels = screen(half_blocks(voxels, GRID, COLUMNS, ROWS))
-    look = RenderOptions(size=(2 * COLUMNS, 4 * ROWS), camera=CAMERA, labels=False)
+    look = RenderOptions(size=(2 * COLUMNS, 4 * ROWS), camera=CAMERA, labels=False, floor=False)
     meant = np.asarray(render_voxels(voxels, GRID, look).reduce(2))
     for row, column in np.ndindex(2 * ROWS, COLUMNS):
         if characters[row // 2][column] not in "xyz":
@@ -71,8 +77,12 @@ def test_the_axes_have_their_names():
     characters, _ = screen(half_blocks(lit(), GRID, COLUMNS, ROWS))
     text = "".join(characters)
     assert [text.count(name) for name in "xyz"] == [1, 1, 1]
-    place = {name: divmod(text.index(name), COLUMNS) for name in "xyz"}
-    assert place["x"][0] > place["y"][0] > place["z"][0]
+    place = {name: np.array(divmod(text.index(name), COLUMNS)) for name in "xyz"}
+    for axis in outline_axes(GRID, CAMERA, (COLUMNS, 2 * ROWS)):
+        row, column = place["xyz"[axis.number]]
+        x, y = axis.middle
+        outward = (column + 0.5 - x) * axis.outward[0] + (2 * row + 1 - y) * axis.outward[1]
+        assert 0.5 < outward < 4, "a name is outside of the box, beside its axis"
 
 
 def test_lines_end_without_colour_and_say_nothing_twice():
@@ -88,6 +98,19 @@ def test_256_colours():
     assert found <= set(range(16, 256))
     assert len(found) > 10
     assert pixels[0, 0] == "5;232", f"the darkest grey is nearest to the ground, {BACKGROUND}"
+
+
+def test_256_colours_have_no_stains():
+    """Without a halo, what is far from voxels and the box is ground."""
+    _, pixels = screen(half_blocks(lit((1, 2, 3)), GRID, COLUMNS, ROWS, full=False))
+    assert (pixels == "5;232").mean() > 0.8
+
+
+@pytest.mark.parametrize(("color", "code"), [
+    ((200, 60, 60), 167), ((60, 70, 200), 62), ((128, 128, 128), 244), ((255, 200, 40), 178),
+])  # fmt: skip
+def test_256_colours_keep_their_hue(color, code):
+    assert _color_codes(np.array([[color]], np.uint8), full=False) == [[f"5;{code}"]]
 
 
 @pytest.mark.parametrize(("said", "full"), [("truecolor", True), ("24bit", True), ("", False)])
