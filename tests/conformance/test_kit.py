@@ -20,7 +20,7 @@ from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.announced_device import FEATURES, AnnouncedDevice
 from voxdisplay.conformance.catalogue import HANDSHAKE, SECTIONS
 from voxdisplay.conformance.device_bugs import DEVICE_BUGS
-from voxdisplay.conformance.dialogue import NoResponse, NotApplicable, Violation
+from voxdisplay.conformance.dialogue import Dialogue, NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.conformance.report import as_json, violation_lines
@@ -235,6 +235,19 @@ def test_errors_are_shown_whatever_was_waited_for(monkeypatch):
     assert "something is on" in shown
     assert "NO_SESSION" in shown
     assert result.errors == as_json("port", report)["checks"][0]["errors"]
+
+
+@pytest.mark.parametrize(
+    ("late", "verdict"), [(1, Verdict.HOLDS), (50, Verdict.NOT_APPLICABLE)], ids=["once", "always"]
+)
+def test_a_hold_is_not_blamed_for_late_pauses(late, verdict, monkeypatch):
+    stay, factors = Dialogue.stay_silent, iter([3] * late)
+    monkeypatch.setattr(
+        Dialogue, "stay_silent", lambda probe, seconds: stay(probe, seconds * next(factors, 1))
+    )
+    report = examined(emulated_port(refresh=50_000), ["7.12/held", "7.12/longest-counts"])
+    assert report.results[0].verdict is verdict, explain(report)
+    assert report.results[1].verdict is (Verdict.HOLDS if late == 1 else verdict), explain(report)
 
 
 @pytest.mark.parametrize("checks", ["6", "9.1"])

@@ -1,10 +1,12 @@
 """Checks of section 7.12: frames that are held (op HOLD).
 
 A time is compared with a pause of the kit's own only where that pause is several ticks longer or
-shorter.
+shorter. On a busy computer a pause may take longer than asked: then the check is made once more.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.announced_device import AnnouncedDevice
@@ -15,12 +17,13 @@ from voxdisplay.conformance.catalogue import (
     readable_display,
     refresh_tick,
 )
-from voxdisplay.conformance.packets import CLEAR, COMMIT, data, status
+from voxdisplay.conformance.packets import CLEAR, COMMIT, PENDING, data, status
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.wire import spec
 
 _HELD_S = 0.4  # the round trip of a STATUS has room in half of it
 _LEAST_TICKS = 4
+_TRIES = 5
 
 
 def can_hold(device: AnnouncedDevice) -> str:
@@ -37,17 +40,49 @@ def _ticks(probe: Probe) -> int:
     return ticks
 
 
-def _require_held(probe: Probe, what: str) -> None:
-    """Require that the frame that was sent is still pending after half of its hold."""
-    probe.stay_silent(_ticks(probe) * probe.device.period_s / 2)
-    probe.poll_status()
-    probe.require_ack(probe.state, what, pending=1)
+def _show_held(probe: Probe, what: str, payloads: Callable[[int], Sequence[bytes]]) -> None:
+    """Present a frame that is held; require that it is still pending after half of its hold.
+
+    Parameters
+    ----------
+    probe : Probe
+    what : str
+        The likely cause if it is not.
+    payloads : callable
+        Returns the packets' ops, of which the longest HOLD is the number of ticks it is given.
+    """
+    ticks = _ticks(probe)
+    held_s = ticks * probe.device.period_s
+    for _ in range(_TRIES):
+        began_s = probe.clock()  # the hold counts from a swap behind this
+        probe.show(b"")
+        *first, last = payloads(ticks)
+        for payload in first:
+            probe.draw(payload)
+        probe.draw(last, commit=True)
+        probe.stay_silent(held_s / 2)
+        probe.poll_status()
+        in_time = probe.clock() - began_s < held_s
+        if in_time:
+            probe.require_ack(probe.state, what, pending=1)
+        probe.await_shown(probe.frame, [probe.state])
+        if in_time:
+            return
+        probe.frame += 1
+    probe.skip("this computer is too busy to observe a hold")
 
 
 def _require_shown_soon(probe: Probe, what: str) -> None:
-    """Require that the frame that was sent is on display after two ticks."""
-    probe.wait_two_ticks()
-    probe.poll_status()
+    """Require that the frame that was sent is on display after two ticks.
+
+    A device that is late has half the time for which a frame is held wrongly.
+    """
+    until_s = probe.clock() + _ticks(probe) * probe.device.period_s / 2
+    while True:
+        probe.wait_two_ticks()
+        probe.poll_status()
+        if not probe.state.flags & PENDING or probe.clock() > until_s:
+            break
     probe.require_ack(probe.state, what, pending=0, shown=1, frame=probe.frame)
 
 
@@ -93,20 +128,18 @@ def hold_draws_no_fade(probe: Probe) -> None:
 
 @check("7.12", "held", "a frame stays on display for as many ticks as HOLD says", can_hold)
 def held(probe: Probe) -> None:
-    ticks = _first_frame(probe)
-    probe.draw(ops.hold(ticks), commit=True)
-    _require_held(probe, "the frame was exchanged before its hold was over")
-    probe.await_shown(probe.frame, [probe.state])
+    early = "the frame was exchanged before its hold was over"
+    _show_held(probe, early, lambda ticks: [ops.hold(ticks)])
     _require_shown_soon(probe, "")
 
 
 @check("7.12", "longest-counts", "the longest HOLD of a frame counts, in any packet", can_hold)
 def longest_counts(probe: Probe) -> None:
-    ticks = _first_frame(probe)
-    probe.draw(ops.hold(1) + ops.hold(ticks) + ops.hold(2))
-    probe.draw(ops.hold(0), commit=True)
-    _require_held(probe, "the longest of several HOLD counts, not the last one")
-    probe.await_shown(probe.frame, [probe.state])
+    _show_held(
+        probe,
+        "the longest of several HOLD counts, not the last one",
+        lambda ticks: [ops.hold(1) + ops.hold(ticks) + ops.hold(2), ops.hold(0)],
+    )
 
 
 @check(
