@@ -21,6 +21,7 @@ from websockets.sync.client import connect
 
 import voxdisplay as vd
 from voxdisplay.errors import TransportClosed
+from voxdisplay.view.live import dropped_files
 from voxdisplay.view.live.address import parse_address
 from voxdisplay.view.live.server import open_server
 from voxdisplay.view.live.snapshot_message import Snapshot
@@ -320,3 +321,9 @@ def test_a_bad_address(text):
 def test_addresses():
     assert parse_address("[::1]:80") == ("::1", 80)
     assert parse_address("localhost:0") == ("localhost", 0)
+
+
+def test_a_file_takes_no_longer_than_its_time(monkeypatch):
+    monkeypatch.setattr(dropped_files, "_MAX_SECONDS", 0.01)
+    with pytest.raises(dropped_files.DroppedFileError, match="takes longer"):
+        asyncio.run(dropped_files.frames_of_file("a.json", b"{}"))

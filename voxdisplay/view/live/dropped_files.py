@@ -7,8 +7,9 @@ not know what kinds of file there are.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -40,8 +41,10 @@ class DroppedFileError(Exception):
     """A file cannot be shown; its message is for the page."""
 
 
-def frames_of_file(name: str, data: bytes) -> str:
+async def frames_of_file(name: str, data: bytes) -> str:
     """Return the frames of a file as a page embeds them: JSON with ``fps`` and ``frames``.
+
+    Cancelled, it ends the process that reads the file.
 
     Parameters
     ----------
@@ -59,37 +62,43 @@ def frames_of_file(name: str, data: bytes) -> str:
         raise DroppedFileError(f"the file is larger than {MAX_FILE_BYTES >> 20} MiB")
     plain = re.sub(r"[^\w. -]", "_", name)[-80:].lstrip(". -") or "file"
     with tempfile.TemporaryDirectory(prefix="voxdisplay-") as place:
-        folder = Path(place)
-        (folder / "of").mkdir()  # what the file names beside it is not there
-        (folder / "of" / plain).write_bytes(data)
-        message = _preview(folder / "of", plain)
-        page = folder / "page.html"
-        if not page.exists():
-            raise DroppedFileError(_shortened(message) or f"{plain} cannot be read")
-        return embedded_frames(page.read_text(encoding="utf-8"))
+        page = Path(place, "page.html")
+        await asyncio.to_thread(Path(place, plain).write_bytes, data)
+        message = await _preview(place, plain, page.name)
+        return await asyncio.to_thread(_frames_of_page, page, message, plain)
 
 
-def _preview(folder: Path, name: str) -> str:
-    """Run the command in a folder; return what it writes to stderr."""
-    command = [sys.executable, "-c", _PREVIEW, "preview", "-q", f"./{name}", "-o", "../page.html"]
-    written = folder.parent / "messages"
+async def _preview(folder: str, name: str, page: str) -> str:
+    """Run the command in a folder; return the beginning of what it writes to stderr."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", _PREVIEW, "preview", "-q", f"./{name}", "-o", page,
+        cwd=folder,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stderr is not None  # noqa: S101 - it is a pipe
+    message = b""
     try:
-        with written.open("wb") as messages:
-            subprocess.run(  # noqa: S603 - no shell
-                command,
-                check=False,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=messages,
-                timeout=_MAX_SECONDS,
-            )
-    except subprocess.TimeoutExpired:
+        async with asyncio.timeout(_MAX_SECONDS):
+            while part := await process.stderr.read(1 << 16):
+                message = (message + part)[: 1 << 16]
+            await process.wait()
+    except TimeoutError:
         raise DroppedFileError(
             f"{name} takes longer than {_MAX_SECONDS:.0f} s: draw it by voxdisplay preview"
         ) from None
-    with written.open("rb") as messages:
-        return messages.read(1 << 16).decode(errors="replace")
+    finally:
+        with contextlib.suppress(ProcessLookupError):  # it has ended
+            process.kill()
+        await process.wait()
+    return message.decode(errors="replace")
+
+
+def _frames_of_page(page: Path, message: str, name: str) -> str:
+    if not page.exists():
+        raise DroppedFileError(_shortened(message) or f"{name} cannot be read")
+    return embedded_frames(page.read_text(encoding="utf-8"))
 
 
 def _shortened(message: str) -> str:

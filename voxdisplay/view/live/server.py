@@ -223,7 +223,7 @@ class LiveServer:
         name = query.get("name", ["file"])[0]
         try:
             async with self._reading_file:
-                return await asyncio.to_thread(frames_of_file, name, bytes(data))
+                return await frames_of_file(name, bytes(data))
         except DroppedFileError as error:
             return json.dumps({"error": str(error)})
 

@@ -23,7 +23,7 @@ function connect() {
     const why = opened ? "" : await reason();
     refusal(why);
     if (why) setLink("refused", "refused");
-    else if (code === 1001 || code === 1011) setLink("ended", `ended${said && `: ${said}`}`);
+    else if (code === 1001 || code === 1011) setLink("ended", `ended: ${said || "last picture"}`);
     else if (link[0] !== "ended") setLink("disconnected", "disconnected, trying again");
     setTimeout(connect, why ? 5000 : Math.min(2000, 200 * 1.6 ** tries++));
   };
@@ -47,8 +47,12 @@ function refusal(why) {
 
 let film = 0;
 async function unpack() {
-  const { fps, frames } = embedded, moves = frames.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
-  for (const text of frames) push(await inflate(Uint8Array.from(atob(text), c => c.charCodeAt(0))));
+  const mine = embedded, { fps, frames } = mine, moves = frames.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  for (const text of frames) {
+    const buffer = await inflate(Uint8Array.from(atob(text), c => c.charCodeAt(0)));
+    if (embedded !== mine) return;  // another file has been dropped
+    push(buffer);
+  }
   setPlaying(moves);
   if (moves && !location.hash) setShow("spin", true);
   film = setInterval(() => playing && seek((cursor + 1) % history.length), 1000 / fps);
