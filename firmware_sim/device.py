@@ -106,6 +106,11 @@ class Device:
         return self.session is not None and self.session.state is BackPage.PENDING
 
     @property
+    def ticks_left(self) -> int:
+        """Number of ticks, from the last one that it was told of, to a pending swap."""
+        return self.session.ticks_left if self.session else 1
+
+    @property
     def free_bytes(self) -> int:
         """Free space of the receive ring in bytes: what a carrier may hand over."""
         return self.config.rx_buffer - self._deferred_bytes - len(self._ring)
@@ -154,7 +159,7 @@ class Device:
         Parameters
         ----------
         count
-            How many ticks have come. At those before the last one no frame was pending.
+            How many ticks have come. At those before the last one nothing was to be exchanged.
         """
         if not self.session or not self.session.tick(count):
             return

@@ -62,7 +62,7 @@ class DeviceOnLine:
         self._up = FaultyLine(faults, seed, "up")
         self._clock = clock
         self._epoch = clock()
-        self._swap_tick: int | None = None  # number of the next tick, if a swap waits for one
+        self._swap_tick: int | None = None  # number of the tick that a swap waits for
         self._last_tick = 0  # number of the last tick that the device was told of
 
     def receive(self, data: bytes) -> None:
@@ -117,10 +117,10 @@ class DeviceOnLine:
         self._unplugged = False
 
     def _swap_time(self) -> float:
-        """Return the time of the next tick if a swap waits for one; otherwise infinity.
+        """Return the time of the tick that a swap waits for; infinity if none does.
 
-        Ticks are counted from the start, so that they do not drift. The device is told of the
-        others together, when a frame waits.
+        Ticks are counted from the start, so that they do not drift. The device is told of those
+        between two swaps together.
         """
         if self._swap_tick is None:
             return math.inf
@@ -145,10 +145,9 @@ class DeviceOnLine:
                 self._collect_output(feeds, passed + 1)
                 continue
             if self._swap_tick is not None and tick <= comes:
-                passed, self._last_tick = self._swap_tick - self._last_tick, self._swap_tick
-                self._swap_tick += 1
-                self.device.tick(passed)
-                self._collect_output(tick)
+                count, self._last_tick = self._swap_tick - self._last_tick, self._swap_tick
+                self.device.tick(count)
+                self._collect_output(tick, self._last_tick + 1)
                 continue
             come = self._down.take(comes)
             if isinstance(come, bytes):
@@ -185,6 +184,7 @@ class DeviceOnLine:
             self._up.send(at, data)
         if not self.device.pending:
             self._swap_tick = None
-        elif self._swap_tick is None:  # the frame has just become whole
-            passed = int((at - self._epoch) * self.device.config.refresh / 1000)
-            self._swap_tick = passed + 1 if next_tick is None else next_tick
+            return
+        if next_tick is None:
+            next_tick = int((at - self._epoch) * self.device.config.refresh / 1000) + 1
+        self._swap_tick = max(next_tick, self._last_tick + self.device.ticks_left)

@@ -161,6 +161,11 @@ class Session:
         """Record a hold that a packet of f names (7.12)."""
         self._hold = max(self._hold, ticks)
 
+    @property
+    def ticks_left(self) -> int:
+        """Number of ticks, from the last one that was counted, to the exchange of f."""
+        return max(self._hold - self._since, 1)
+
     def tick(self, count: int) -> bool:
         """Count refresh ticks; return whether f is to be exchanged at the last of them (7.12)."""
         self._since = min(self._since + count, spec.LIMIT_MAX_HOLD)

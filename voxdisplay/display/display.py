@@ -363,7 +363,8 @@ class Display(PacedDisplay):
             says of itself.
         clock : {"device", "host"}
             ``"device"`` gives each refresh tick a frame, so that swaps are as regular as ticks can
-            be; a line that cannot carry that many, or a device without ticks, is paced by the clock
+            be: with the feature HOLD frames stay for some ticks, otherwise they are repeated. A
+            line that cannot carry that many, or a device without ticks, is paced by the clock
             of this machine.
         late : {"drop", "delay"}
             ``"drop"`` leaves frames out when a newer one is due; ``"delay"`` shows every frame, and

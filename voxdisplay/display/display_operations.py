@@ -33,6 +33,7 @@ from voxdisplay.link import (
     StatusReceived,
 )
 from voxdisplay.raster.pixel_format import Pixels
+from voxdisplay.wire import spec
 from voxdisplay.wire.packet import Page
 from voxdisplay.wire.spans import decode_runs
 
@@ -72,6 +73,13 @@ class DisplayOperations:
     def refresh_hz(self) -> float:
         """Refresh ticks per second; 0 if there are none."""
         return self._connection.info.refresh_hz
+
+    @property
+    def max_hold_ticks(self) -> int:
+        """For how many refresh ticks a frame may be held; 0 if the device cannot hold frames."""
+        info = self._connection.info
+        limit = int(info.refresh_hz * spec.LIMIT_MAX_HELD / 1000)
+        return min(limit, spec.LIMIT_MAX_HOLD) if "hold" in info.features else 0
 
     @property
     def reconnects(self) -> int:

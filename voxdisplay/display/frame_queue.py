@@ -140,14 +140,26 @@ class FrameQueue:
         self._pending = copy
         self.playback.note_presented()
 
-    def start_unwaited(self, picture: Picture, *, held: bool = False) -> int:
-        """Start a frame that nobody waits for at once, and return its ticket."""
+    def start_unwaited(self, picture: Picture, hold_ticks: int = 0, *, held: bool = False) -> int:
+        """Start a frame that nobody waits for at once, and return its ticket.
+
+        Parameters
+        ----------
+        picture : Picture
+        hold_ticks : int
+            For how many refresh ticks the frame before it stays on display, if the device has the
+            feature HOLD.
+        held : bool
+            As of `enqueue`.
+
+        """
         ticket = self.enqueue(picture, held=held)
+        self._link.hold(hold_ticks)
         self._unwaited[ticket] = picture
         self.playback.note_presented()
         return ticket
 
-    def repeat(self, ticket: int, picture: Picture) -> int:
+    def repeat(self, ticket: int, picture: Picture, hold_ticks: int = 0) -> int:
         """Start a frame that shows what the one started last shows; return its ticket.
 
         Parameters
@@ -156,10 +168,13 @@ class FrameQueue:
             Of the frame started last.
         picture : Picture
             What it shows.
+        hold_ticks : int
+            As of `start_unwaited`.
 
         """
         base = self._link.counters.sessions, ticket
         again = self._link.present_difference(base, [], partial(self.payloads, picture))
+        self._link.hold(hold_ticks)
         self._unwaited[again] = picture
         self._repeats.add(again)
         return again

@@ -30,6 +30,7 @@ _MIN_WAIT_S: Final = 1e-4  # below, sums of times may not grow
 _MAX_WAIT_S: Final = 0.02  # then the observer has its turn
 _WORKER_WAIT_S: Final = 0.003  # while another process prepares frames
 _FLUSH_S: Final = 30.0
+_LEAST_HOLD: Final = 2  # ticks
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,8 @@ class Player:
         self._observer = observer
         with turn() as operations:
             refresh_hz = operations.refresh_hz
+            # Two frames on their way may be held for as long as the protocol allows together.
+            self._longest_hold = operations.max_hold_ticks // 2
             operations.queue.restart_playback()
             self._bytes_before = operations.wire_bytes
             self._reconnects = operations.reconnects
@@ -212,7 +215,9 @@ class Player:
             if self._ticks and self._ticks.is_overloaded:
                 self._ticks = None
             if self._ticks and not self.paused:
-                wake_s = self._fill_ticks(operations, self._ticks)
+                by_holds = self._longest_hold >= _LEAST_HOLD
+                fill = self._hold_frames if by_holds else self._fill_ticks
+                wake_s = fill(operations, self._ticks)
             else:
                 wake_s = self._start_due(operations)
             if wake_s is None:
@@ -230,13 +235,18 @@ class Player:
         self._source.request(slot, operations.queue.encoding_for, self._period_s(slot))
 
     def _start(
-        self, operations: DisplayOperations, slot: Slot, picture: Picture, tick: int | None
+        self,
+        operations: DisplayOperations,
+        slot: Slot,
+        picture: Picture,
+        tick: int | None,
+        hold_ticks: int = 0,
     ) -> None:
         """Start a frame."""
         due_s = max(self._play.moment(slot.begins_s), self._began_s)
         self._meter.frames += slot.ordinal - self._last.ordinal if self._last else 1
         began_s = time.thread_time()
-        self._last_ticket = operations.queue.start_unwaited(picture)
+        self._last_ticket = operations.queue.start_unwaited(picture, hold_ticks)
         self._swaps[self._last_ticket] = _Swap(tick, due_s)
         self._last, self._last_picture = slot, picture
         operations.send_encoded()
@@ -332,9 +342,53 @@ class Player:
             if queue.backlog > 1 or self._last is None:
                 ticks.put_back()
                 return now + _WORKER_WAIT_S
+        self._repeat(operations, tick)
+        return now
+
+    def _repeat(self, operations: DisplayOperations, tick: int, hold_ticks: int = 0) -> None:
+        """Start a frame that shows what the one before it shows."""
         if self._last_picture is not None:
-            self._last_ticket = queue.repeat(self._last_ticket, self._last_picture)
+            queue = operations.queue
+            self._last_ticket = queue.repeat(self._last_ticket, self._last_picture, hold_ticks)
             self._swaps[self._last_ticket] = _Swap(tick, None)
+
+    def _hold_frames(self, operations: DisplayOperations, ticks: TickClock) -> float | None:
+        """Start the frame that follows, and have the device hold it until its tick.
+
+        Only frames that stay for longer than a hold may last are repeated. Returns when to look
+        again, or None at the end.
+        """
+        queue = operations.queue
+        now = self._clock()
+        step_s = self._play.speed / ticks.refresh_hz
+        due = ticks.next
+        if self._last is not None:
+            ends = (self._last.ends_s - self._tick_position_s) / step_s
+            due = max(due, math.ceil(ends - 1e-6))
+        if ticks.last is not None:
+            due = min(due, ticks.last + self._longest_hold)
+        waiting = [swap.tick for swap in self._swaps.values() if swap.tick is not None]
+        oldest = min(waiting, default=None) if queue.backlog else None
+        is_end = self._due(self._tick_position_s + due * step_s) is None
+        early = ticks.is_early(now, due, oldest) and (queue.backlog > 0 or is_end)
+        most = 2 if ticks.place(now) is None else ticks.ahead
+        if early or queue.backlog >= most or not queue.line_is_free:
+            self._request_next(operations, ticks.next, step_s)
+            return now + _MAX_WAIT_S
+        ticks.next = due
+        tick = ticks.take(now, oldest)
+        slot = self._due(self._tick_position_s + tick * step_s)
+        if slot is None:
+            return None
+        if self._last is not None and slot.ordinal <= self._last.ordinal:
+            self._repeat(operations, tick, ticks.hold(tick))
+            return now
+        self._request(operations, slot)
+        ready = self._source.newest(self._last.ordinal if self._last else -1, slot.ordinal)
+        if ready is None:
+            ticks.put_back()
+            return now + _WORKER_WAIT_S
+        self._start(operations, *ready, tick, ticks.hold(tick))
         return now
 
     def _request_next(self, operations: DisplayOperations, tick: int, step_s: float) -> None:

@@ -162,6 +162,8 @@ class Link(LinkRequests):
 
     def _reopen(self, now: float) -> None:
         """Open a new session; frames of the backlog are sent again, in full."""
+        if self.info and self.info.has(spec.FEATURE_HOLD):  # HELLO waits behind held frames
+            self._timer.held_s = spec.LIMIT_MAX_HELD / 1000
         self._shown_ticket = 0
         self.info = None
         self._sender.close_session()
@@ -201,7 +203,14 @@ class Link(LinkRequests):
             self._timer.check(now)
         else:
             self._timer.note_idle(now)
-        return b"".join(self._sender.outgoing(now, self.displayed)) + self._transmit_poll(now)
+        data = b"".join(self._sender.outgoing(now, self.displayed))
+        self._update_held()
+        return data + self._transmit_poll(now)
+
+    def _update_held(self) -> None:
+        """Tell the timer for how long frames on their way are held."""
+        if self.info and self.info.refresh:
+            self._timer.held_s = self._frames.held_ticks * 1000 / self.info.refresh
 
     def _transmit_hello(self, now: float) -> bytes:
         if now >= self._timer.deadline_s:
@@ -314,7 +323,13 @@ class Link(LinkRequests):
             check_info(info)
         self.info = info
         self.counters.sessions += 1
-        self._sender.open_session(info.rx_buffer - self._opening.unread_bytes)
+        held = spec.LIMIT_MAX_HELD * info.refresh // 1_000_000
+        self._sender.open_session(
+            info.rx_buffer - self._opening.unread_bytes,
+            info.max_payload,
+            held if info.has(spec.FEATURE_HOLD) else 0,
+        )
+        self._timer.held_s = 0.0
         self._timer.open_session(now, info.refresh)
         yield SessionOpened(info)
 
@@ -341,6 +356,7 @@ class Link(LinkRequests):
         if ticket is None:
             return
         self._timer.note_progress(now)
+        self._update_held()
         self._restarts = 0
         self._shown_ticket = ticket
         yield FrameShown(ticket, _digest(info, ack))

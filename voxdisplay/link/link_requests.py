@@ -43,6 +43,14 @@ class LinkRequests:
         """Append payloads to an open frame: see `OutgoingFrames.append_payloads`."""
         self._frames.append_payloads(ticket, payloads, last=last)
 
+    def hold(self, ticks: int) -> None:
+        """Have the frame queued last stay behind the one before it for some refresh ticks.
+
+        Without the feature HOLD it has no effect; nor has a hold of more than a second, which is
+        shortened (protocol.md, section 7.12).
+        """
+        self._frames.hold(ticks)
+
     def abandon_open_frame(self) -> None:
         """Abandon a frame that is still being encoded: see `OutgoingFrames.abandon_open_frame`."""
         self._frames.abandon_open_frame()

@@ -15,6 +15,8 @@ from voxdisplay.wire import packet as packets
 from voxdisplay.wire import spec
 
 _MODULUS = 256
+_HOLD_BYTES = 2
+_LEAST_HOLD = 2  # ticks: below, a frame is exchanged at the next tick anyway
 
 PictureId: TypeAlias = tuple[int, int]
 """Identifies the displayed picture: the number of sessions so far, and its frame's ticket or 0."""
@@ -43,6 +45,8 @@ class OutgoingFrame:
         How many of the payloads have been put into packets.
     unsent_bytes : int
         Bytes of the other payloads.
+    hold : int
+        Refresh ticks for which the frame before it stays on display; at most 1 is none.
 
     """
 
@@ -55,12 +59,15 @@ class OutgoingFrame:
     frame_id: int = -1
     packetized: int = 0
     unsent_bytes: int = field(init=False)
+    hold: int = 0
+    _has_hold_op: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before its first packet."""
+        self._remove_hold_op()
         self.frame_id, self.packetized = -1, 0
         self.unsent_bytes = sum(map(len, self.payloads))
 
@@ -68,6 +75,27 @@ class OutgoingFrame:
         """Append payloads."""
         self.payloads += payloads
         self.unsent_bytes += sum(map(len, payloads))
+
+    def add_hold_op(self, max_payload: int) -> None:
+        """Put HOLD, once, in front of the last payload, or behind it if that is too long.
+
+        In front, because range-coded ops end a payload.
+        """
+        if self.hold < _LEAST_HOLD or self._has_hold_op or self.open:
+            return
+        op = bytes((spec.OP_HOLD, self.hold))
+        if len(self.payloads[-1]) + _HOLD_BYTES <= max_payload:
+            self.payloads[-1] = op + self.payloads[-1]
+        else:
+            self.payloads.append(op)
+        self.unsent_bytes += _HOLD_BYTES
+        self._has_hold_op = True
+
+    def _remove_hold_op(self) -> None:
+        if self._has_hold_op:
+            rest = self.payloads.pop()[_HOLD_BYTES:]
+            self.payloads += [rest] if rest or not self.payloads else []
+            self._has_hold_op = False
 
     @property
     def started(self) -> bool:
@@ -144,6 +172,10 @@ class OutgoingFrames:
                 frame.append(payloads if payloads or frame.payloads or not last else [b""])
                 frame.open = not last
 
+    def hold(self, ticks: int) -> None:
+        """Have the frame queued last held: see `OutgoingFrame.hold`."""
+        self._queue[-1].hold = ticks
+
     def abandon_open_frame(self) -> None:
         """Remove the open frame, if there is one.
 
@@ -217,6 +249,11 @@ class OutgoingFrames:
     def unsent_payloads(self) -> int:
         """Number of payloads that are in no packet yet."""
         return sum(len(frame.payloads) - frame.packetized for frame in self._queue)
+
+    @property
+    def held_ticks(self) -> int:
+        """Sum of the holds of the frames that were started and are not displayed."""
+        return sum(frame.hold for frame in self._queue if frame.started)
 
     @property
     def awaiting_swap(self) -> bool:

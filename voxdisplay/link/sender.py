@@ -59,12 +59,26 @@ class Sender:
         self.all_in_flight_damaged = False
         self._tag = 0
         self._damaged_since_taken = 0  # reported since the device last took anything
+        self._max_payload = self._max_held_ticks = 0
 
     # -- the session
 
-    def open_session(self, credit: int) -> None:
-        """Start a session with a device that has room for ``credit`` bytes."""
+    def open_session(self, credit: int, max_payload: int, max_held_ticks: int) -> None:
+        """Start a session.
+
+        Parameters
+        ----------
+        credit : int
+            Bytes that the device has room for.
+        max_payload : int
+            Bytes of the longest payload that it takes.
+        max_held_ticks : int
+            For how many refresh ticks all frames on their way may be held; 0 without HOLD.
+
+        """
         self._window = SendWindow(credit)
+        self._max_payload = max_payload
+        self._max_held_ticks = max_held_ticks
 
     def close_session(self) -> None:
         """End the session: what is not finished is sent again in the next."""
@@ -133,7 +147,11 @@ class Sender:
     def _new_packets(self, now: float, displayed: PictureId) -> Iterator[bytes]:
         for frame in self._frames:
             if not frame.started:
+                frame.hold = min(frame.hold, self._max_held_ticks)
+                if self._frames.held_ticks + frame.hold > self._max_held_ticks:
+                    return
                 self._frames.resolve_difference(frame, None if self.outstanding else displayed)
+            frame.add_hold_op(self._max_payload)
             while frame.sendable:
                 size = packets.max_wire_bytes(len(frame.next_payload) + spec.LIMIT_OVERHEAD)
                 if (

@@ -24,9 +24,16 @@ class SilenceTimer:
         How long silence may last, besides a refresh period: a device that waits for its refresh
         tick may be unable to answer.
 
+    Attributes
+    ----------
+    held_s : float
+        Time for which frames on their way are held, in which the device may be unable to answer,
+        too.
+
     """
 
     def __init__(self, now: float, timeout_s: float) -> None:
+        self.held_s = 0.0
         self._timeout_s = timeout_s
         self._refresh_period_s = 0.0
         self._initial_timeout_s = INITIAL_TIMEOUT_S
@@ -99,12 +106,13 @@ class SilenceTimer:
             first_s = max(MIN_FIRST_POLL_S, 2 * self._round_trip_s)
             timeout_s = max(MIN_TIMEOUT_S, first_s)
         pause_s = min(timeout_s * self._backoff, self._timeout_s / 8)
-        return max(self._heard_s + first_s + self._refresh_period_s, self._polled_s + pause_s)
+        waits_s = self._refresh_period_s + self.held_s
+        return max(self._heard_s + first_s + waits_s, self._polled_s + pause_s + self.held_s)
 
     @property
     def deadline_s(self) -> float:
         """Time at which silence has lasted too long."""
-        return self._heard_s + self._timeout_s + self._refresh_period_s
+        return self._heard_s + self._timeout_s + self._refresh_period_s + self.held_s
 
     def note_poll(self, tag: int, now: float) -> None:
         """Record that a STATUS is sent."""
@@ -146,7 +154,8 @@ class SilenceTimer:
         """
         if self._outstanding_polls and now >= self.deadline_s:
             raise self.timeout_error(now)
-        if now - self._progress_s > 2 * (self._timeout_s + self._refresh_period_s):
+        longest_s = self._timeout_s + self._refresh_period_s + self.held_s
+        if now - self._progress_s > 2 * longest_s:
             raise TransportTimeout(
                 f"the device answers, but nothing was delivered for {now - self._progress_s:.1f} s",
                 hint="its firmware may be stuck: switch it off and on",

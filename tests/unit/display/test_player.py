@@ -73,12 +73,17 @@ class Watched:
         return [after - before for (_, before), (_, after) in itertools.pairwise(self.changes)]
 
 
+HOLDS = frozenset(("line", "read", "digest", "hold"))
+
+
+@pytest.mark.parametrize("features", [HOLDS, HOLDS - {"hold"}], ids=["holds", "repeats"])
 @pytest.mark.parametrize("baud", [0, 115_200, 12_000_000])
 @pytest.mark.parametrize(
-    ("fps", "refresh", "allowed"), [(30, 60, {2}), (24, 60, {2, 3}), (25, 50, {2}), (60, 60, {1})]
+    ("fps", "refresh", "allowed"),
+    [(30, 60, {2}), (24, 60, {2, 3}), (25, 50, {2}), (60, 60, {1}), (5, 60, {12})],
 )
-def test_by_the_ticks_of_the_device_every_interval_is_right(fps, refresh, allowed, baud):
-    watched = Watched(refresh * 1000, baud)
+def test_by_the_ticks_of_the_device_every_interval_is_right(fps, refresh, allowed, baud, features):
+    watched = Watched(refresh * 1000, baud, features=features)
     show = Moving(fps, 2 * fps)
     report = watched.display.play(show)
     assert [digest for digest, _ in watched.changes] == [
@@ -89,7 +94,10 @@ def test_by_the_ticks_of_the_device_every_interval_is_right(fps, refresh, allowe
     assert all(a != b for a, b in itertools.pairwise(gaps)) or len(allowed) == 1
     assert (report.frames, report.shown, report.dropped) == (2 * fps, 2 * fps, 0)
     assert report.ticks == {str(n): gaps.count(n) for n in sorted(allowed)}
-    assert watched.swaps >= 2 * refresh - 3, "a swap on every tick"
+    if "hold" in features:
+        assert watched.swaps == 2 * fps, "a swap for each frame"
+    else:
+        assert watched.swaps >= 2 * refresh - 3, "a swap on every tick"
 
 
 @pytest.mark.parametrize("refresh", [0, 60_000])
