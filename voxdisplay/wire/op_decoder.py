@@ -6,6 +6,7 @@ not know packets, nor what is on the page below.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
@@ -24,8 +25,7 @@ from voxdisplay.wire.op_encoding import Ints
 from voxdisplay.wire.range_coded_chain_decoder import decode_range_coded
 from voxdisplay.wire.slab_decoder import decode_slabs
 
-# Bits of a mask or of crumbs, by byte: all, and those for the first and for the second other axis.
-_ONES: Final = bytes(byte.bit_count() for byte in range(256))
+# Bits of crumbs, by byte: those for the first and for the second other axis.
 _EVEN: Final = bytes((byte & 0x55).bit_count() for byte in range(256))
 _ODD: Final = bytes((byte & 0xAA).bit_count() for byte in range(256))
 _OPERAND: Final = 0x1F
@@ -177,6 +177,10 @@ class _Parser:
             raise self._error(f"({x}, {y}, {z}) is not on the grid")
         return int(x + nx * (y + ny * z))
 
+    def _place(self, index: int) -> tuple[int, int, int]:
+        nx, ny, _ = self._grid
+        return index % nx, index // nx % ny, index // (nx * ny)
+
     def _cursor_voxel(self) -> int:
         if self._cursor >= self._voxels:
             raise self._error("the cursor is behind the last voxel")
@@ -283,8 +287,8 @@ class _Parser:
     def read_box(self) -> None:
         """Read BOX."""
         begin, self._cursor = self._cursor_voxel(), self._voxel()
-        corners = self._grid.voxels_at(np.array([begin, self._cursor])).astype(np.int64)
-        self._reserve(int((np.abs(corners[1] - corners[0]) + 1).prod()))
+        corners = zip(self._place(begin), self._place(self._cursor), strict=True)
+        self._reserve(math.prod(abs(a - b) + 1 for a, b in corners))
         self._shapes.add_box(self._ops, self._pen, begin, self._cursor)
         self._fade.leave()
 
@@ -373,7 +377,7 @@ class _Parser:
     def _moved(self, index: int, axis: int, count: int) -> int:
         """Return the change of an index by a move; raise if it leaves the grid."""
         nx, ny, nz = self._grid
-        place = (index % nx, index // nx % ny, index // (nx * ny))[axis] + count
+        place = self._place(index)[axis] + count
         if not 0 <= place < (nx, ny, nz)[axis]:
             raise self._error("a chain leaves the grid")
         return count * (1, nx, nx * ny)[axis]
@@ -385,7 +389,7 @@ class _Parser:
         nodes, voxels = 1, 0
         for height in range(level, 0, -1):
             masks.append(self._take(nodes))
-            nodes = sum(masks[-1].translate(_ONES))
+            nodes = int.from_bytes(masks[-1], "little").bit_count()
             voxels += masks[-1].count(0) << 3 * height
             if not nodes:
                 break

@@ -5,6 +5,7 @@ Each class collects ops while they are parsed. Must not know how they are writte
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +19,20 @@ Written = tuple[Ints, Ints, Ints]
 
 def _ints(values: list[int]) -> Ints:
     return np.array(values, dtype=np.int64)
+
+
+# A place packed into one number, x from the lowest bit on, and so the eight children of a cube.
+_SHIFTS = (0, 21, 42)
+_MASK = (1 << 21) - 1
+_PACKED = _ints([1 << shift for shift in _SHIFTS])
+_CHILDREN = np.indices((2, 2, 2))[::-1].reshape(3, 8).T @ _PACKED
+
+
+def _cuboid(grid: Grid, sides: Sequence[int]) -> Ints:
+    """Return the indices, (n,), of a cuboid's voxels, less that of its first one."""
+    x, y, z = map(np.arange, sides)
+    index = x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])
+    return index.reshape(-1)
 
 
 @dataclass
@@ -112,9 +127,9 @@ class Bricks:
     def expand(self, grid: Grid) -> Written:
         """Return the voxels of all bricks; raise ValueError if one is off the grid."""
         brick = np.arange(len(self.op))
-        corner = np.array(self.corner, dtype=np.int64).reshape(-1, 3)
+        corner = np.array(self.corner, dtype=np.int64).reshape(-1, 3) @ _PACKED
         side = np.int64(1) << _ints(self.level)
-        found: list[tuple[Ints, Ints, Ints]] = []  # cubes: brick, corner, side
+        found: list[tuple[Ints, Ints, Ints]] = []  # cubes: brick, packed corner, side
         depth = 0
         while len(brick):
             voxels = side == 1
@@ -124,33 +139,29 @@ class Bricks:
             mask = np.frombuffer(b"".join(present), dtype=np.uint8)
             full = mask == 0
             found.append((brick[full], corner[full], side[full]))
-            node, bit = np.nonzero(np.unpackbits(mask[:, None], axis=1, bitorder="little"))
-            side = side[node] // 2
-            child = np.stack((bit & 1, bit >> 1 & 1, bit >> 2), axis=1)
-            corner = corner[node] + child * side[:, None]
+            child = np.flatnonzero(np.unpackbits(mask, bitorder="little"))
+            node = child >> 3
+            side = side[node] >> 1
+            corner = corner[node] + _CHILDREN[child & 7] * side
             brick = brick[node]
             depth += 1
         owners, corners, sides = (
             np.concatenate(part) if found else np.empty(0, dtype=np.int64)
             for part in (zip(*found, strict=True) if found else ((), (), ()))
         )
-        op, index, pen = [], [], []
-        for each in np.unique(sides).tolist():
-            of_side = sides == each
-            offset = np.stack(np.unravel_index(np.arange(each**3), (each,) * 3), axis=1)
-            voxels = (corners[of_side][:, None, :] + offset).reshape(-1, 3)
-            if not grid.inside(voxels).all():
+        x, y, z = (corners >> shift & _MASK for shift in _SHIFTS)
+        for place, length in zip((x, y, z), grid, strict=True):
+            if (place + sides > length).any():
                 raise ValueError("a brick writes outside the grid")
-            index.append(grid.index_of(voxels))
-            owner = np.repeat(owners[of_side], each**3)
-            op.append(_ints(self.op)[owner])
-            pen.append(_ints(self.pen)[owner])
-        empty = np.empty(0, dtype=np.int64)
-        return (
-            np.concatenate([*op, empty]),
-            np.concatenate([*index, empty]),
-            np.concatenate([*pen, empty]),
-        )
+        index, owner = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+        begin = x + grid.nx * (y + grid.ny * z)
+        for level in range(max(self.level, default=-1) + 1):
+            of_side = np.flatnonzero(sides == 1 << level)
+            offset = _cuboid(grid, (1 << level,) * 3)
+            index.append((begin[of_side, None] + offset).reshape(-1))
+            owner.append(np.repeat(owners[of_side], offset.size))
+        owners = np.concatenate(owner)
+        return _ints(self.op)[owners], np.concatenate(index), _ints(self.pen)[owners]
 
 
 @dataclass
@@ -183,16 +194,19 @@ class Shapes:
             parts.append(np.stack((names[0], index, names[1])))
         if self.lines:
             parts.append(self._expand_lines(grid))
-        for op, pen, begin, end in self.boxes:
-            a, b = grid.voxels_at(np.array([begin, end]))
-            ranges = (
-                np.arange(low, high + 1) for low, high in zip(*np.sort((a, b), 0), strict=True)
-            )
-            x, y, z = ranges
-            index = (x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])).reshape(-1)
-            parts.append(np.stack((np.full_like(index, op), index, np.full_like(index, pen))))
-        op_, index_, pen_ = np.concatenate(parts, axis=1)
-        return op_, index_, pen_
+        if self.boxes:
+            parts.append(self._expand_boxes(grid))
+        op, index, pen = np.concatenate(parts, axis=1)
+        return op, index, pen
+
+    def _expand_boxes(self, grid: Grid) -> Ints:
+        op, pen, begin, end = np.array(self.boxes, dtype=np.int64).T
+        a, b = grid.voxels_at(begin), grid.voxels_at(end)
+        first = grid.index_of(np.minimum(a, b)).tolist()
+        sides = (np.abs(a - b) + 1).tolist()
+        found = [at + _cuboid(grid, each) for at, each in zip(first, sides, strict=True)]
+        counts = list(map(len, found))
+        return np.stack((op.repeat(counts), np.concatenate(found), pen.repeat(counts)))
 
     def _expand_lines(self, grid: Grid) -> Ints:
         op, pen, begin, end = np.array(self.lines, dtype=np.int64).T
