@@ -141,6 +141,8 @@ def _head(info: tuple[int, ...], meta: bytes) -> ShowHead:
     names = [name for name, form in FORMATS.items() if form.code == code]
     if major != spec.VERSION_MAJOR or not names:
         raise ValueError("its INFO is of another protocol, or of an unknown pixel format")
+    if info[13] >> spec.FEATURE_HOLD & 1:
+        raise ValueError("its INFO has the feature HOLD, which recordings must not use")
     nx, ny, nz = grid
     return ShowHead((nx, ny, nz), names[0], info[13], info[10], keys.get("loop") is True)
 

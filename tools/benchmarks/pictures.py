@@ -55,7 +55,7 @@ def of_voxels(
 
 def of_array(name: str, array: NDArray[np.generic], pixels: str, target: float | None) -> Picture:
     """Return the picture of an array; all voxels count if pixels have many values."""
-    frame = Frame(array.shape[::-1], pixels)  # type: ignore[arg-type] - three sides
+    frame = Frame(array.shape[2::-1], pixels)  # type: ignore[arg-type] - three sides
     frame.set(array)
     dense = pixels != "mono1"
     return Picture(name, frame, array.size if dense else len(frame.lit()[0]), target)
@@ -196,6 +196,30 @@ def bumpy(side: int) -> NDArray[np.bool_]:
     return rim(solid)
 
 
+def blurred_noise(side: int, sigma: float, seed: int) -> NDArray[np.uint8]:
+    """Return normal noise under a periodic Gaussian filter of some voxels, from 1 to 255."""
+    noise = np.random.default_rng(seed).normal(size=(side, side, side))
+    one = np.exp(-2 * (np.pi * sigma * np.fft.fftfreq(side)) ** 2)
+    kernel = one[:, None, None] * one[:, None] * one
+    smooth = np.fft.ifftn(np.fft.fftn(noise) * kernel).real
+    low, high = smooth.min(), smooth.max()
+    return np.rint(1 + (smooth - low) / (high - low) * 254).astype(np.uint8)
+
+
+def organs(side: int) -> NDArray[np.uint8]:
+    """Return an ellipsoid with six ellipsoids of soft edges in it, and blurred noise, in 8 bits."""
+    chance = np.random.default_rng(SEED)
+    z, y, x = (np.mgrid[:side, :side, :side] + 0.5) / side * 2 - 1
+    around = (x / 0.8) ** 2 + (y / 0.6) ** 2 + (z / 0.9) ** 2
+    density = 60.0 + 0.1 * blurred_noise(side, 2, SEED)
+    for _ in range(6):
+        a, b, c = chance.uniform(0.1, 0.35, 3)
+        x0, y0, z0 = chance.uniform(-0.4, 0.4, 3)
+        far = np.sqrt(((x - x0) / a) ** 2 + ((y - y0) / b) ** 2 + ((z - z0) / c) ** 2)
+        density += chance.uniform(20, 60) * np.clip((1.15 - far) / 0.3, 0, 1)
+    return np.rint(np.clip(density * (around <= 1), 0, 255)).astype(np.uint8)
+
+
 def phantom(side: int) -> NDArray[np.uint8]:
     """Return the head phantom of Shepp and Logan in 8 bits, with scanner noise in the head.
 
@@ -272,3 +296,8 @@ def pictures(*, quick: bool) -> Iterator[Picture]:
     yield of_voxels("2000 lone voxels", 128, [dots], None)
     for side in (64, 128):
         yield of_array(f"head, 8 bit {side}", phantom(side), "index8", 1.5 if side > 64 else None)
+        yield of_array(f"organs, 8 bit {side}", organs(side), "index8", None)
+        smooth = blurred_noise(side, side / 16, SEED)
+        yield of_array(f"smooth noise {side}", smooth, "index8", None)
+    colors = [blurred_noise(64, 4, SEED + channel) for channel in range(3)]
+    yield of_array("smooth noise rgb888", np.stack(colors, axis=-1), "rgb888", None)

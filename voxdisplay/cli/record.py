@@ -58,7 +58,7 @@ _SUFFIX: Final = ".vxs"
     type=FeaturesType(),
     metavar="NAMES",
     help="Features of the display that may be used, such as line,box; all; none.  "
-    "[default: all that small boards have: all but arc]",
+    "[default: all that small boards have, nothing range-coded, no fades]",
 )
 @click.option(
     "--jobs",

@@ -282,6 +282,11 @@ def _format(info: packet.Info, meta: bytes, path: Path) -> RecordingFormat:
     format_ = PixelFormat.from_wire(info.format)
     if info.major != spec.VERSION_MAJOR or format_ is None or not info.refresh:
         raise RecordingError(f"{path.name}: its INFO is of a display that this program lacks")
+    if info.has(spec.FEATURE_HOLD):
+        raise RecordingError(
+            f"{path.name}: its INFO has the feature HOLD, but its FRAMEs say when frames are due",
+            hint="record it again without HOLD",
+        )
     try:
         grid = Grid.of((info.nx, info.ny, info.nz))
     except (TypeError, ValueError) as error:

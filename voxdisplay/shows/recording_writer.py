@@ -40,12 +40,13 @@ _MAX_TIME = 0xFFFF_FFFF
 _MAX_META_BYTES = spec.LIMIT_MAX_PAYLOAD
 
 
-# Recordings use what version 1.0 has, which is all that small boards play.
-_MINOR = 0
-_DRAWING = ("line", "box", "dots", "oct", "diff", "arc", "palette")
-# ARC saves bytes on slow lines, but small boards lack it and it takes long.
+_FIRST_OF_1_1 = spec.FEATURE_SLABS  # protocol.md, section 15
+# All but HOLD: a frame is due when its FRAME says so.
+_DRAWING = ("line", "box", "dots", "oct", "diff", "arc", "palette", "slabs", "fade", "arc2")
+# Range coding saves bytes on slow lines, but small boards lack it and it takes long.
 _USUAL = ("line", "box", "dots", "oct", "diff", "palette")
 _OF_INDEX8 = ("diff", "palette")
+_NOT_OF_MONO1 = ("fade",)
 
 
 def drawing_features(format_: PixelFormat, wanted: Collection[str] = _USUAL) -> tuple[str, ...]:
@@ -58,10 +59,11 @@ def drawing_features(format_: PixelFormat, wanted: Collection[str] = _USUAL) -> 
         Others are left out. By default those that small boards have, too.
 
     """
-    indexed = format_ is PixelFormat.INDEX8
-    return tuple(
-        name for name in _DRAWING if name in wanted and (indexed or name not in _OF_INDEX8)
-    )
+    unfit = {
+        *(() if format_ is PixelFormat.INDEX8 else _OF_INDEX8),
+        *(_NOT_OF_MONO1 if format_ is PixelFormat.MONO1 else ()),
+    }
+    return tuple(name for name in _DRAWING if name in wanted and name not in unfit)
 
 
 @dataclass(frozen=True)
@@ -119,11 +121,13 @@ class RecordingFormat:
                 hint="leave out the scene, or shorten the texts",
             )
         nx, ny, nz = self.grid
+        bits = feature_bits(self.features)
+        minor = spec.VERSION_MINOR if bits >> _FIRST_OF_1_1 else 0
         info = packet.Info(
             major=spec.VERSION_MAJOR,
             session=SESSION,
             boot=0,
-            minor=_MINOR,
+            minor=minor,
             format=self.format.wire,
             nx=nx,
             ny=ny,
@@ -133,9 +137,9 @@ class RecordingFormat:
             rx_buffer=spec.LIMIT_RESERVE
             + packet.max_wire_bytes(self.max_payload + spec.LIMIT_OVERHEAD),
             refresh=self.millihertz,
-            features=feature_bits(self.features),
+            features=bits,
         )
-        hello = packet.Hello(session=SESSION, minor=_MINOR)
+        hello = packet.Hello(session=SESSION, minor=minor)
         segment = encode_segment(recording_spec.RECORDING_TYPE_META, 0, 0, 0, text)
         return b"\0" + packet.encode(hello) + packet.encode(info) + segment
 

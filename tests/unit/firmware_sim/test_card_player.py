@@ -209,6 +209,7 @@ def changed(data, kind, payload_of):
         (9, lambda info: info[:5], "no recording"),
         (9, lambda info: info[:15] + struct.pack("<H", 2000) + info[17:], "payloads of 2000"),
         (9, lambda info: info[:25] + b"\x20\0\0\0" + info[29:], "features arc"),
+        (9, lambda info: info[:25] + b"\0\x10\0\0" + info[29:], "HOLD, which recordings"),
         (6, lambda _: b"", "no frames"),
     ],
 )

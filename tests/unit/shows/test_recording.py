@@ -16,13 +16,18 @@ import recording_document
 from recordings import FEATURES, Spin, recording_format, write_recording
 
 import voxdisplay as vd
+from voxdisplay.display.plan import EVERY_FEATURE
 from voxdisplay.errors import RecordingError
 from voxdisplay.shows import recording_spec
 from voxdisplay.shows.recording import Recording
 from voxdisplay.shows.recording_copy import copy_whole_frames
 from voxdisplay.shows.recording_packets import encode_segment, segments
-from voxdisplay.shows.recording_writer import RecordingFormat, RecordingWriter
+from voxdisplay.shows.recording_writer import RecordingFormat, RecordingWriter, drawing_features
 from voxdisplay.shows.show import EncodedFrame, EncodedShow
+from voxdisplay.wire.op_encoding import EncoderConfig
+from voxdisplay.wire.op_listing import list_ops
+
+FORMATS = ("mono1", "index8", "rgb565", "rgb888")
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +41,18 @@ def original(show, tmp_path_factory):
     path = tmp_path_factory.mktemp("recording") / "spin.vxs"
     frames = write_recording(path, show)
     return path, path.read_bytes(), frames, Recording(path)
+
+
+class Solids(Spin):
+    """A ball under a circle whose colours lead from one to another."""
+
+    def __init__(self):
+        super().__init__(3)
+
+    def frame(self, number):
+        frame = super().frame(number)
+        frame.draw(vd.Sphere(center=(6, 5, 4), radius=2 + number / 2, fill="solid"), "teal")
+        return frame
 
 
 def named(name):
@@ -129,6 +146,32 @@ class TestWhole:
             payloads = tuple(frame.payloads(64, wanted.features))
             writer.append(EncodedFrame(payloads, frame.digest()))
         assert Recording(tmp_path / "a.vxs").frame(0) == frame
+
+    @pytest.mark.parametrize("feature", ["slabs", "fade", "arc2"])
+    def test_features_of_version_1_1(self, feature, tmp_path):
+        path, repaired = tmp_path / "a.vxs", tmp_path / "b.vxs"
+        frames = write_recording(
+            path, Solids() if feature == "slabs" else Spin(3), features=(feature,), max_payload=1024
+        )
+        data, recording = path.read_bytes(), Recording(path)
+        for kind, at in ((3, 3), (9, 5)):  # HELLO, INFO
+            (head,) = (each for each in segments(data) if each.kind == kind)
+            assert head.payload[at] == 1, "the minor version that has the feature"
+        config = EncoderConfig(vd.Grid(12, 10, 9), vd.PixelFormat.RGB888, 1024)
+        payloads = [each for n in range(3) for each in recording.recorded_frame(n).payloads]
+        assert feature.upper() in {name for each in payloads for name, _ in list_ops(each, config)}
+        assert [recording.frame(number) for number in range(3)] == frames, "it can be decoded"
+        assert recording.encoded_frame(1, 1024, FEATURES) is None, "such a device gets it anew"
+        assert recording.encoded_frame(1, 1024, (feature,)).digest == frames[1].digest()
+        assert copy_whole_frames(recording, repaired).frames == 3
+        assert repaired.read_bytes() == data
+
+    def test_only_what_draws_may_be_used(self):
+        every = set(EVERY_FEATURE)
+        kept = {name: set(drawing_features(vd.PixelFormat(name), every)) for name in FORMATS}
+        assert every - kept["index8"] == {"read", "digest", "hold"}
+        assert kept["index8"] - kept["mono1"] == {"diff", "palette", "fade"}
+        assert kept["index8"] - kept["rgb565"] == {"diff", "palette"}
 
     def test_times_are_computed_from_the_number(self):
         wanted = recording_format(Spin(), meta={})
@@ -245,6 +288,7 @@ class TestHostile:
             ({"info": (0, b"\x02")}, "display"),  # another major
             ({"info": (6, b"\x09")}, "display"),  # an unknown pixel format
             ({"info": (21, bytes(4))}, "display"),  # no frames in any time
+            ({"info": (25, b"\x0f\x10")}, "HOLD.*FRAMEs say when"),
             ({"info": (7, bytes(2))}, "nx|grid|Grid|size"),
         ],
     )
