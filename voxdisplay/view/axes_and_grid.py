@@ -238,6 +238,8 @@ def _draw_label(image: Image.Image, axis: OutlineAxis, side: int) -> None:
     # The text's centre lies outside of the edge by what its box needs in that direction.
     outward = np.array(axis.outward)
     middle = axis.middle + outward * (np.abs(outward) @ box / 2 + 0.7 * height)
+    if (middle < 0).any() or (middle > image.size).any():
+        return  # of a picture that shows a part of the box, it would be moved onto what is inside
     corner = np.clip(middle - box / 2, 2, np.array(image.size) - box - 2) - (left, top)
     draw.text(tuple(corner), name, font=font, fill=AXIS_COLORS[axis.number])
     draw.text((corner[0] + ahead, corner[1]), str(side), font=font, fill=_TEXT)

@@ -151,6 +151,16 @@ def test_axes_and_labels_are_outside_of_the_box(grid, pitch):
         assert np.min(beyond, axis=0).max() < 4.5
 
 
+def test_no_label_is_moved_onto_what_is_inside():
+    grid = Grid(9, 9, 9)
+    camera = Camera(zoom=3)
+    pictures = [
+        np.asarray(render_page(page(grid, []), grid, RGB, RenderOptions(camera=camera, labels=on)))
+        for on in (True, False)
+    ]
+    assert np.array_equal(*pictures)
+
+
 def outline(points):
     """Return the convex hull of points in the plane, by gift wrapping; y grows downwards."""
     ring = [points[np.argmin(points[:, 0])]]

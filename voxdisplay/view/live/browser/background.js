@@ -85,8 +85,9 @@ function drawStage(size, width, height, pixel) {
     pen.fill();
     const name = `${AXES[axis]} `, wide = pen.measureText(name + size[axis]).width;
     const away = (Math.abs(ox) * wide + Math.abs(oy) * high) / 2 + 0.7 * high;
-    const x = clamp(mx + ox * away - wide / 2, 2, width - wide - 2);
-    const y = clamp(my + oy * away, high / 2, height - high / 2);
+    const left = mx + ox * away, top = my + oy * away;
+    if (left < 0 || left > width || top < 0 || top > height) continue;
+    const x = clamp(left - wide / 2, 2, width - wide - 2), y = clamp(top, high / 2, height - high / 2);
     pen.fillText(name, x, y);
     pen.fillStyle = "#96a0b4";
     pen.fillText(size[axis], x + pen.measureText(name).width, y);
