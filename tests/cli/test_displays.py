@@ -11,6 +11,7 @@ import voxdisplay as vd
 from voxdisplay.cli.main import main
 from voxdisplay.display.display import Display
 from voxdisplay.display.test_patterns import arrow_frame
+from voxdisplay.raster.orientation import Orientation
 
 PORT = "sim:?size=3x7x5&refresh=0"
 SCENE = {"type": "segment", "from": [0, 0, 0], "to": [2.5, 4.5, 6.5], "color": ["red", "blue"]}
@@ -177,7 +178,7 @@ def test_ask_writes_how_the_display_stands(at_home, folder, scene):
     done = at_home(*ask, stdin="left\nsideways\nup\nt\n")
     assert done.returncode == 0, done.stderr
     assert "please answer with one of away, towards, up, down" in done.stderr
-    assert "where does it point (away, towards)?" in done.stderr
+    assert "Light 3 of 3: which side is lit (away, towards)?" in done.stderr
     path = folder / "desk.toml"
     # The memory's x points left, its y up, its z towards the user.
     assert tomllib.loads(path.read_text()) == {"port": PORT, "axes": ["-x", "-z", "y"]}
@@ -204,11 +205,55 @@ def test_without_answers_nothing_is_written(at_home, folder):
     assert list(folder.iterdir()) == []
 
 
-def test_a_flat_display_has_no_room_for_arrows(at_home, folder):
-    done = at_home("test-pattern", "--ask", "desk", "--port", "sim:?size=9x9x1")
-    assert done.returncode == 2
-    assert "no room for arrows" in done.stderr
-    assert list(folder.iterdir()) == []
+# Answers by grid, and the axes that they tell, if all three were asked.
+SMALL = {
+    "2x2x2": ("up right away", ["y", "z", "x"]),
+    "3x5x7": ("right towards up", ["x", "-y", "z"]),
+    "9x9x1": ("left away", None),
+    "1x4x3": ("right up", None),
+    "1x1x5": ("left", None),
+    "6x1x1": ("up", None),
+    "6x7x8": ("right away up", ["x", "y", "z"]),
+}
+
+
+@pytest.mark.parametrize(("size", "told"), SMALL.items())
+def test_a_small_display_is_asked_by_lit_sides(size, told, tmp_path, monkeypatch, capsys):
+    answers, axes = told
+    path = tmp_path / "desk.toml"
+    monkeypatch.setattr("sys.stdin", io.StringIO(answers.replace(" ", "\n") + "\n"))
+    port = f"sim:?size={size}&refresh=0"
+    assert main(["test-pattern", "--ask", str(path), "--port", port]) == 0
+    written = Orientation.of(tomllib.loads(path.read_text())["axes"])
+    count = len(answers.split())
+    assert written.names == axes if axes else not written.mirrors
+    directions = {"right": (0, False), "left": (0, True), "away": (1, False),
+                  "towards": (1, True), "up": (2, False), "down": (2, True)}  # fmt: skip
+    asked = [axis for axis, side in enumerate(vd.Grid.parse(size)) if side > 1]
+    for axis, answer in zip(asked, answers.split(), strict=True):
+        user, flips = directions[answer]
+        assert (written.axes[user], written.flips[user]) == (axis, flips)
+    err = capsys.readouterr().err
+    assert ("Arrow 1 of 3: where does it point" in err) == (size == "6x7x8")
+    assert (f"Light 1 of {count}: which side is lit" in err) == (size != "6x7x8")
+
+
+def test_one_voxel_looks_the_same_however_it_stands(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    path = tmp_path / "desk.toml"
+    assert main(["test-pattern", "--ask", str(path), "--port", "sim:?size=1x1x1"]) == 2
+    assert "looks the same however it stands" in capsys.readouterr().err
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("size", ["2x2x2", "3x5x7", "1x4x3", "6x1x1", "5x5x5", "6x7x8"])
+def test_what_is_shown_for_an_axis_looks_otherwise_the_other_way_round(size):
+    grid = vd.Grid.parse(size)
+    for axis, side in enumerate(grid):
+        shown = arrow_frame(axis, grid, vd.PixelFormat.MONO1, 1.0).array()
+        assert shown.any()
+        if side > 1:
+            assert (shown != np.flip(shown, 2 - axis)).any()
 
 
 def test_a_volume_is_dithered_on_demand(run, tmp_path):

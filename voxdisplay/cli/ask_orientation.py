@@ -1,4 +1,4 @@
-"""Questions of ``test-pattern --ask``: how a display stands, by arrows that its owner looks at.
+"""Questions of ``test-pattern --ask``: how a display stands, by lights that its owner looks at.
 
 Writes a display profile. Must not know how an orientation is applied.
 """
@@ -23,7 +23,6 @@ _DIRECTIONS: Final = {
     "away": (1, False), "towards": (1, True),
     "up": (2, False), "down": (2, True),
 }  # fmt: skip
-_SMALLEST: Final = 3
 _LONGEST_ANSWER: Final = 80
 
 
@@ -76,7 +75,10 @@ def _answer(question: str, known: list[str]) -> str:
 
 
 def ask_axes(display: vd.Display, brightness: float) -> list[str]:
-    """Show an arrow for each axis of the memory, and return where the user's axes run in it.
+    """Show where each axis of the memory runs, and return where the user's axes run in it.
+
+    By arrows, or on a small display by layers at the far ends. An axis of one voxel has no
+    direction: it gets what is left, so that nothing is mirrored.
 
     Parameters
     ----------
@@ -88,25 +90,46 @@ def ask_axes(display: vd.Display, brightness: float) -> list[str]:
     Raises
     ------
     click.ClickException
-        If the display is too flat for an arrow.
+        If the display has one voxel, or no more answers come.
 
     """
-    from voxdisplay.display.test_patterns import arrow_frame  # noqa: PLC0415 - help starts fast
+    from voxdisplay.display.test_patterns import (  # noqa: PLC0415 - help starts fast
+        arrow_frame,
+        has_room_for_arrows,
+    )
 
     info = display.info
-    if min(info.grid) < _SMALLEST:
-        raise click.ClickException(
-            f"a display of {info.grid} has no room for arrows: write axes into its profile by hand"
-        )
-    note("Look at the display from where it is usually seen. Three arrows are shown, one by one.")
+    asked = [axis for axis in range(3) if info.grid[axis] > 1]
+    count = len(asked)
+    if not count:
+        raise click.ClickException(f"a display of {info.grid} looks the same however it stands")
+    if has_room_for_arrows(info.grid):
+        shown, question = "Three arrows are shown, one by one.", "Arrow {}: where does it point"
+    else:
+        shown = "It is small: one side of it is lit at a time."
+        question = "Light {}: which side is lit"
+    note(f"Look at the display from where it is usually seen. {shown}")
     found: dict[int, str] = {}
-    for axis in range(3):
+    for number, axis in enumerate(asked, 1):
         display.present(arrow_frame(axis, info.grid, info.format, brightness))
         left = [each for each, (user, _) in _DIRECTIONS.items() if user not in found]
-        text = f"Arrow {axis + 1} of 3: where does it point ({', '.join(left)})?"
+        text = f"{question.format(f'{number} of {count}')} ({', '.join(left)})?"
         user, flips = _DIRECTIONS[_answer(text, left)]
         found[user] = ("-" if flips else "") + "xyz"[axis]
-    return [found[user] for user in range(3)]
+    return _completed(found)
+
+
+def _completed(found: dict[int, str]) -> list[str]:
+    """Return three axes, of which some are known by the user's; the others mirror nothing."""
+    from voxdisplay.raster.orientation import Orientation  # noqa: PLC0415 - help starts fast
+
+    users = [user for user in range(3) if user not in found]
+    known = {each[-1] for each in found.values()}
+    names = dict(zip(users, [each for each in "xyz" if each not in known], strict=True))
+    axes = [(found | names)[user] for user in range(3)]
+    if users and Orientation.of(axes).mirrors:
+        axes[users[0]] = f"-{axes[users[0]]}"
+    return axes
 
 
 def write_profile(

@@ -86,7 +86,6 @@ class PartWorker:
         self._calls: deque[tuple[Callable[[], None], Future[Any]]] = deque()
         self._streamed: _Streamed | None = None
         self._numbers: dict[int, int] = {}  # ticket of the part -> number of the frame
-        self._is_holding = False
         self._closing = False
         self.is_cancelled = False
         self._thread = threading.Thread(
@@ -126,9 +125,9 @@ class PartWorker:
         return self.lost is None and not self._connection.is_away
 
     @property
-    def is_free(self) -> bool:
-        """True if the next streamed frame would be begun at once."""
-        return self._streamed is None and not self._is_holding
+    def is_hungry(self) -> bool:
+        """True if no streamed frame waits to be begun: its line may run idle."""
+        return self._streamed is None
 
     @property
     def reconnects(self) -> int:
@@ -219,8 +218,8 @@ class PartWorker:
                 if self._calls:
                     return self._calls.popleft()[0]
                 if self._streamed is not None:
-                    self._is_holding = True
                     streamed, self._streamed = self._streamed, None
+                    self._wake()  # the next one may be handed over
                     return lambda: self._show_streamed(streamed)
                 if not self._has_unshown:
                     self._changed.wait()
@@ -248,7 +247,6 @@ class PartWorker:
             self._note_error(error, streamed=True)
         finally:
             streamed.barrier.leave(self)
-            self._is_holding = False
             self._wake()
 
     def _start(self, operations: DisplayOperations, streamed: _Streamed) -> None:

@@ -24,6 +24,8 @@ RED, GREEN, BLUE = AXIS_COLORS = ((255, 0, 0), (0, 255, 0), (0, 0, 255))
 _WHITE, _GREY = (255, 255, 255), (96, 96, 96)
 # A side shorter than this has no room for ticks.
 _MIN_SIDE_FOR_TICKS = 8
+# On a shorter one, the head of an arrow is as long as the rest of it, and looks the same both ways.
+_MIN_SIDE_FOR_ARROWS = 5
 
 NAMES = ("axes", "corners", "plane", "all")
 BRIGHTNESS = {"axes": 1.0, "corners": 1.0, "plane": 0.5, "all": 0.05}
@@ -87,8 +89,17 @@ def arrow_frame(
     format: PixelFormat,  # noqa: A002 - as above
     brightness: float,
 ) -> Frame:
-    """Return an arrow along an axis, 0 to 2, of the memory, in the colour of that axis."""
-    return _Painter(grid, format, brightness).arrow(axis)
+    """Return an arrow along an axis, 0 to 2, of the memory, in the colour of that axis.
+
+    On a grid without room for arrows, see `has_room_for_arrows`, it is the layer at the far end.
+    """
+    paint = _Painter(grid, format, brightness)
+    return paint.arrow(axis) if has_room_for_arrows(grid) else paint.plane(axis, grid[axis] - 1)
+
+
+def has_room_for_arrows(grid: Grid) -> bool:
+    """Return whether a line with a pyramid at one end shows a direction on all axes."""
+    return min(grid) >= _MIN_SIDE_FOR_ARROWS
 
 
 def axes_with_ticks(grid: Grid) -> str:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from voxdisplay.display.frame_queue import Picture
     from voxdisplay.display.part_worker import PartWorker
 
-_MAX_UNSHOWN = 2  # as of one display: one at the next tick, and one behind it
+# One at the next tick, one on the lines, and one that its part begins by itself behind it.
+_MAX_UNSHOWN = 3
 
 
 class TiledMeter(PlaybackMeter):
@@ -102,7 +103,7 @@ class TiledQueue:
     def may_start(self) -> bool:
         """True if the lines would run idle without another frame."""
         return len(self._unshown) < _MAX_UNSHOWN and all(
-            worker.is_free for worker in self._workers if worker.is_present
+            worker.is_hungry for worker in self._workers if worker.is_present
         )
 
     @property
