@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from light_receivers import UdpReceiver
 
 from voxdisplay.cli.main import main
 
@@ -169,3 +170,24 @@ def test_displays_lists_and_draws_it(tmp_path, capsys, monkeypatch):
     assert entry["size"] == [8, 5, 7]
     assert [part["name"] for part in entry["parts"]] == ["left", "right"]
     assert entry["layout_faults"] == []
+
+
+def test_an_led_cube_may_be_a_part_and_proves_nothing(command):
+    cube = UdpReceiver()
+    try:
+        part = LEFT | {"at": [4, 0, 0], "name": "cube"}
+        part["port"] = f"artnet://127.0.0.1:{cube.number}?size=4x5x7"
+        code, out, err = command("push", "--json", parts=(LEFT, part))
+        assert code == 0, err
+        told = json.loads(out)
+        assert told["digest"] is None
+        assert [bool(each["digest"]) for each in told["parts"]] == [True, False]
+        assert len(cube.await_count(1)) == 1  # 140 LEDs in one universe
+        code, out, err = command("play", parts=(LEFT, part))
+        assert code == 0, err
+        assert "not proved" in out
+        code, _, err = command("read", "-o", "unwritten.npy", parts=(LEFT, part))
+        assert code == 1
+        assert "cannot" in err or "nothing answers" in err
+    finally:
+        cube.close()
