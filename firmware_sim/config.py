@@ -29,9 +29,10 @@ FEATURES: Final = {
     "fade": spec.FEATURE_FADE,
     "arc2": spec.FEATURE_ARC2,
     "hold": spec.FEATURE_HOLD,
+    "values": spec.FEATURE_VALUES,
 }
 _INDEXED: Final = frozenset(("diff", "palette"))  # section 5: only with the format INDEX8
-_COLORED: Final = frozenset(("fade",))  # not with MONO1
+_COLORED: Final = frozenset(("fade", "values"))  # not with MONO1
 _TICKING: Final = frozenset(("hold",))  # not without refresh ticks
 _FIRST_OF_1_1: Final = 9  # section 15: features from this bit on are of version 1.1
 LIES: Final = ("grid", "credit", "format", "features", "payload", "boot")

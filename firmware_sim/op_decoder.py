@@ -16,6 +16,7 @@ from firmware_sim.operands import OPERAND_MASK, Operands
 from firmware_sim.packet_error import PacketError
 from firmware_sim.range_coded_chains import decode_chains
 from firmware_sim.range_coded_slabs import decode_slabs
+from firmware_sim.range_coded_values import decode_values
 from firmware_sim.shapes import Brick, box, brick_offsets, line
 
 # Tables by byte: its four crumbs, its eight MONO1 pixels, its two differences modulo 256. A byte
@@ -229,6 +230,14 @@ class _PacketDecoder:
         for voxels in decode_slabs(self._operands, self._grid):
             self._page.plot(array("Q", voxels), self._pen)
 
+    def values(self, _: int) -> None:
+        for written in decode_values(self._operands, self._grid, self._format.code):
+            by_pixel: dict[bytes, array[int]] = {}
+            for voxel, pixel in written:
+                by_pixel.setdefault(pixel, array("Q")).append(voxel)
+            for pixel, voxels in by_pixel.items():
+                self._page.plot(voxels, pixel)
+
     def _draw_chain(self, octant: int, count: int, raw: bytes) -> None:
         self._check_cursor()
         crumbs = int.from_bytes(raw, "little")
@@ -346,6 +355,7 @@ def _op_table(features: int) -> list[_Op | None]:
         (spec.FEATURE_ARC, spec.OP_ARC, 0, _PacketDecoder.arc),
         (spec.FEATURE_SLABS, spec.OP_SLABS, 0, _PacketDecoder.slabs),
         (spec.FEATURE_ARC2, spec.OP_ARC2, 0, _PacketDecoder.arc2),
+        (spec.FEATURE_VALUES, spec.OP_VALUES, 0, _PacketDecoder.values),
         (spec.FEATURE_OCT, spec.OP_OCT, spec.LIMIT_MAX_LEVEL, _PacketDecoder.brick),
         (None, spec.OP_SKIP, last, _PacketDecoder.skip),
         (None, spec.OP_RUN, last, _PacketDecoder.run),

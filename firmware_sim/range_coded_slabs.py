@@ -1,9 +1,10 @@
-"""Decoder of range-coded slabs, the op SLABS, into the voxels that it lights (7.11).
+"""Decoder of range-coded slabs, as of the op SLABS, into the voxels that they light (7.11).
 
 Draws nothing. Refuses voxels off the grid group by group, in the order in which they are decoded.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim import spec
@@ -46,19 +47,70 @@ def decode_slabs(operands: Operands, grid: Grid) -> Iterator[list[int]]:
         spec.SLABS_PACE,
         spec.SLABS_ENOUGH,
     )
+    for slab in boxes_of_slabs(operands, bits, grid, spec.SLABS_SIDE_BITS):
+        yield slab.voxels
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A decoded slab.
+
+    Attributes
+    ----------
+    voxels
+        Indices of its voxels, each once, in the order in which they were decoded.
+    first
+        True if a box begins with it.
+    slices
+        Its four slices and, before them, the one below: rows as integers, of which bit x + 1 is
+        voxel x, with a dark row before and behind.
+    """
+
+    voxels: list[int]
+    first: bool
+    slices: list[list[int]]
+
+
+def boxes_of_slabs(
+    operands: Operands, bits: RangeDecoder, grid: Grid, side_bits: int
+) -> Iterator[Slab]:
+    """Decode the boxes of an op to its end.
+
+    Parameters
+    ----------
+    operands
+        Those of the op, for its errors.
+    bits
+        What follows the op byte, or what is left of it.
+    grid
+        That of the page.
+    side_bits
+        Bits of the sides of a box.
+
+    Yields
+    ------
+    Slab
+        What follows its voxels is to be decoded before the next.
+
+    Raises
+    ------
+    PacketError
+        As of `decode_slabs`.
+    """
     cells = [-(-side // _CELL) for side in grid.sides]
     left = _cell_limit(cells)
     while bits.bit(spec.SLABS_MORE):
         x, y, z = (bits.plain_bits((count - 1).bit_length()) for count in cells)
-        width, height = (1 + bits.plain_bits(spec.SLABS_SIDE_BITS) for _ in range(2))
+        width, height = (1 + bits.plain_bits(side_bits) for _ in range(2))
         box = _Box(operands, bits, grid, (_CELL * x, _CELL * y, _CELL * z), width, height)
-        following = 1
+        first, following = True, 1
         while following:
             left -= width * height
             if left < 0:
                 raise operands.error(spec.CODE_OUTSIDE, "more cells than the grid has")
-            yield box.slab()
-            following = bits.bit(spec.SLABS_NEXT)
+            slices = [box.below]
+            yield Slab(box.slab(slices), first, slices)
+            first, following = False, bits.bit(spec.SLABS_NEXT)
     if not bits.exhausted:
         raise operands.error(spec.CODE_PADDING, "bytes behind the last bit")
 
@@ -94,12 +146,18 @@ class _Box:
         """Return blank cells, with a blank one around them: cell (x, y) is at [y + 1][x + 1]."""
         return [[_BLANK] * (self._width + 2) for _ in range(self._height + 2)]
 
-    def slab(self) -> list[int]:
-        """Decode the next slab; return the indices of its voxels."""
+    @property
+    def below(self) -> list[int]:
+        """The last slice so far."""
+        return self._below
+
+    def slab(self, slices: list[list[int]]) -> list[int]:
+        """Decode the next slab, append its slices, and return the indices of its voxels."""
         self._decode_states()
         voxels: list[int] = []
         for a in range(_CELL):
             self._decode_slice(a, voxels)
+            slices.append(self._below)
             self._z += 1
         return voxels
 

@@ -1,4 +1,4 @@
-"""Adaptive binary range decoder (7.7, 7.11).
+"""Adaptive binary range decoder (7.7, 7.11, 7.13).
 
 Knows nothing of what the bits mean.
 """
@@ -29,6 +29,8 @@ class RangeDecoder:
         Bits after which a model adapts more slowly.
     enough
         Where a model stops counting.
+    others
+        The first model of those that adapt at another pace, to the last, and that pace.
     """
 
     def __init__(
@@ -38,12 +40,17 @@ class RangeDecoder:
         models: int,
         pace: int,
         enough: int,
+        others: tuple[int, int] | None = None,
     ) -> None:
         self._data = data + bytes(spec.ARC_BEHIND)
         self._cut_off = cut_off
         self._chances = [spec.ARC_HALF] * models
         self._seen = [0] * models
-        self._shifts = [1 + seen // pace for seen in range(enough + 1)]
+        first, other_pace = others or (models, pace)
+        self._shifts = [
+            [1 + seen // each for seen in range(enough + 1)] for each in (pace, other_pace)
+        ]
+        self._others = first
         self._enough = enough
         self._range = _RANGE
         self._code = int.from_bytes(self._data[:_BEGIN], "big")
@@ -88,7 +95,7 @@ class RangeDecoder:
 
     def _update(self, model: int, chance: int, bit: int) -> None:
         seen = self._seen[model]
-        shift = self._shifts[seen]
+        shift = self._shifts[model >= self._others][seen]
         self._chances[model] = (
             chance - (chance >> shift) if bit else chance + (_ONE - chance >> shift)
         )

@@ -90,7 +90,7 @@ class VectorDevice:
 
 EVERY_FORMAT = {"LINE", "BOX", "DOTS", "OCT", "ARC", "ARC2", "READ", "DIGEST", "SLABS"}
 ONLY_INDEX8 = {"DIFF", "PALETTE"}
-NOT_MONO1 = {"FADE"}
+NOT_MONO1 = {"FADE", "VALUES"}
 
 
 def features_of(vector, otherwise=None):

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, OUTPUT = ROOT / "protocol.md", ROOT / "vectors.json"
 ABOUT = "The vectors of protocol.md, section 17, made by tools/vectors_json.py. Hex is lower case."
 HEX_KEYS = {"decoded", "encoded", "bytes", "crc", "packet", "wire", "ops"}
-OF_INDEX8, NOT_OF_MONO1, WITH_TICKS = {"DIFF", "PALETTE"}, {"FADE"}, "HOLD"  # section 5
+OF_INDEX8, NOT_OF_MONO1, WITH_TICKS = {"DIFF", "PALETTE"}, {"FADE", "VALUES"}, "HOLD"  # section 5
 
 
 def plain_hex(text: str) -> str:

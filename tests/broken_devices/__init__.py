@@ -17,6 +17,7 @@ from broken_devices import (  # noqa: F401 - each registers its own
     planted,
     range_coded_chains,
     range_coded_slabs,
+    range_coded_values,
     reads,
     refusals,
     second_chains,

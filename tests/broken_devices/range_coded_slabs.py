@@ -23,14 +23,14 @@ def slabs_models_go_on_counting(patch):
 
 @mutant(*SHELLS, spreads=True)
 def slabs_forget_the_slab_before(patch):
-    def slab(old, self):
+    def slab(old, self, slices):
         self._states = self._no_cells()
-        return old(self)
+        return old(self, slices)
 
     around(patch, _Box, "slab", slab)
 
 
-@mutant("7.11/slabs-boxes")
+@mutant("7.11/slabs-boxes", "7.13/values-boxes")
 def slabs_go_on_from_the_box_before(patch):
     def boxes(old, self, *args):
         old(self, *args)
@@ -76,7 +76,7 @@ def empty_slabs_refused(patch):
     around(patch, op_decoder, "decode_slabs", slabs)
 
 
-@mutant("7.11/slabs-too-many-cells")
+@mutant("7.11/slabs-too-many-cells", "7.13/values-too-many-cells")
 def slabs_without_a_limit_of_cells(patch):
     patch.setattr(range_coded_slabs, "_cell_limit", lambda _: 1 << 40)
 
@@ -86,7 +86,7 @@ def slabs_limited_to_one_layer(patch):
     patch.setattr(range_coded_slabs, "_cell_limit", lambda cells: cells[0] * cells[1])
 
 
-@mutant("7.11/slabs-off-the-grid")
+@mutant("7.11/slabs-off-the-grid", "7.13/values-off-the-grid")
 def slabs_are_clipped_at_the_grid(patch):
     def add(old, self, x, y, group, voxels):
         for place in range(4):
@@ -100,8 +100,8 @@ def slabs_are_clipped_at_the_grid(patch):
 
 @mutant("7.11/slabs-dot", *DRAWN, spreads=True)
 def slabs_end_a_slice_too_early(patch):
-    def slab(old, self):
+    def slab(old, self, slices):
         self._z += 1
-        return old(self)
+        return old(self, slices)
 
     around(patch, _Box, "slab", slab)

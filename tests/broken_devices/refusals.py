@@ -15,6 +15,11 @@ def _refused(patch, change):
 
 
 @mutant(
+    "7.13/values-cut",
+    "7.13/values-too-many-bytes",
+    "7.13/values-too-many-cells",
+    "7.13/values-off-the-grid",
+    "7.13/values-no-pixel",
     "7.11/slabs-cut",
     "7.11/slabs-too-many-bytes",
     "7.11/slabs-too-many-cells",

@@ -31,7 +31,8 @@ from voxdisplay.wire.page_update import PageUpdate
 from voxdisplay.wire.palette_ops import color_blocks
 from voxdisplay.wire.payload_splitting import PayloadLayout
 from voxdisplay.wire.range_coded_chains import encode_range_coded
-from voxdisplay.wire.slabs import encode_slabs
+from voxdisplay.wire.slab_values import ValueMode
+from voxdisplay.wire.slabs import encode_slabs, encode_values
 from voxdisplay.wire.spans import decode_spans, encode_spans
 
 
@@ -138,7 +139,11 @@ def test_digest_of_the_driver(vector):
 # What a plain reading knows, and what the driver codes: all that is not range-coded.
 not_range_coded = pytest.mark.parametrize(
     "vector",
-    [v for v in document.vectors("ops") if not v.name.startswith(("arc-", "arc2-", "slabs-"))],
+    [
+        v
+        for v in document.vectors("ops")
+        if not v.name.startswith(("arc-", "arc2-", "slabs-", "values-"))
+    ],
     ids=str,
 )
 
@@ -206,7 +211,7 @@ def test_coders_of_the_driver_by_a_plain_reading(vector):
     meant = decode_plainly([vector.hex("ops")], vector.grid, format_)
     pixels = np.array(meant.page)
     content = PageUpdate(None, np.flatnonzero(pixels), lambda index: pixels[index])
-    features = features_of(vector) - {"palette", "read", "digest", "arc", "arc2", "slabs"}
+    features = features_of(vector) - {"palette", "read", "digest", "arc", "arc2", "slabs", "values"}
     bits = sum(1 << getattr(spec, f"FEATURE_{name.upper()}") for name in features)
     config = EncoderConfig(Grid(*vector.grid), format_, 64, bits)
     drawn = decode_plainly(
@@ -268,8 +273,31 @@ def test_slabs_of_the_driver(name):
     assert encode_slabs(index, int.from_bytes(pen, "little"), config) == [vector.hex("ops")]
 
 
+VALUE_MODES = {
+    "values-noise": ValueMode(),
+    "values-noise-rgb888": ValueMode(copies=True),
+    "values-copies": ValueMode(copies=True),
+    "values-weighted": ValueMode(weights=(58, 58, 58, -53, -52, -53, 47)),
+    "values-both": ValueMode(copies=True, weights=(-64, 63, 1, 2, 30, 4, -5)),
+}
+
+
+@pytest.mark.parametrize("name", VALUE_MODES)
+def test_values_of_the_driver(name):
+    """These vectors have the boxes that the document recommends for surfaces."""
+    (vector,) = [v for v in document.vectors("ops") if v.name == name]
+    config = EncoderConfig(Grid(*vector.grid), PixelFormat[vector["format"]], 1024)
+    index = config.grid.index_of(np.array(list(vector.voxels())))
+    values = np.array([int.from_bytes(pixel, "little") for pixel in vector.voxels().values()])
+    order = np.argsort(index)
+    payloads = encode_values(index[order], values[order], VALUE_MODES[name], 8, config)
+    assert payloads == [vector.hex("ops")]
+
+
 @pytest.mark.parametrize(
-    "vector", [v for v in document.vectors("refused") if v.name.startswith("slabs-")], ids=str
+    "vector",
+    [v for v in document.vectors("refused") if v.name.startswith(("slabs-", "values-"))],
+    ids=str,
 )
 def test_refused_slabs_as_the_driver_reads_them(vector):
     if vector["code"] != "OP":  # the driver reads what it is given

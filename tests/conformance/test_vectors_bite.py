@@ -13,7 +13,7 @@ import pytest
 SPEC_MUTATIONS = Path(__file__).parents[1] / "spec_mutations.py"
 
 # No byte on the wire depends on these: the referee compares them with the document.
-RESERVED = {"FEATURE_SLABS", "FEATURE_ARC", "FEATURE_ARC2"}
+RESERVED = {"FEATURE_SLABS", "FEATURE_VALUES", "FEATURE_ARC", "FEATURE_ARC2"}
 MADE_OF_OTHERS = {"LAYOUT_HEADER", "CRC_WIDTH", "CRC_REFIN", "CRC_REFOUT", "CRC_CHECK"}
 # The driver takes these for more voxels than a vector has: unit tests hold them.
 CHOSEN = {
@@ -47,6 +47,9 @@ TOLD_APART = {
 }
 TOLD_APART |= {f"ARC2_{name}" for name in ("NEAR", "FADE", "DELTA", "MODELS")}
 TOLD_APART |= {f"SLABS_{name}" for name in ("FLAG", "FULL", "GROUP", "MODELS")}
+TOLD_APART |= {
+    f"VALUES_{name}" for name in ("COPY", "CHANNEL", "MODELS", "ZERO", "SIGN", "MAGNITUDE", "LONG")
+}
 # Seen 6 times or 7, a model learns as fast; curves are longer than a vector in tests of units only.
 LONGER = {"SLABS_ENOUGH", "ARC_ENOUGH", "ARC_MAX_K", "ARC_MAX_RUN", "ARC2_MAX_DELTA"}
 # The document has no vector for these yet.

@@ -26,6 +26,8 @@ from voxdisplay.wire.op_encoding import EncoderConfig
 
 PAYLOAD = 1024
 FEATURES = ("line", "box", "dots", "oct", "diff")
+# Features of the columns from ARC on; VALUES stands beside SLABS, as both belong to sets.
+RANGE_CODED = (("arc",), ("fade",), ("fade", "arc", "arc2"), ("slabs",), ("slabs", "values"))
 # Bytes a second that a link carries: a UART sends ten bits for a byte; USB as measured by others.
 RATES = {
     "115.2k": 11_520,
@@ -111,7 +113,7 @@ def features_for(frame: Frame) -> tuple[str, ...]:
 def bench_link(repeats: int, *, quick: bool = False) -> None:
     """Print what frames cost on the wire, and how fast they are coded and framed."""
     head = f"{'picture':<24}{'voxels':>9}{'bytes':>9}{'bit/vox':>8}{'target':>7}"
-    head += "".join(f"{name:>7}" for name in ("ARC", "FADE", "ARC2", "SLABS"))
+    head += "".join(f"{name:>7}" for name in ("ARC", "FADE", "ARC2", "SLABS", "VALUES"))
     head += "".join(f"{name:>9}" for name in ("runs", "+LZ4", "+zstd-19", "raw"))
     head += f"{'share':>7}{'code ms':>8}{'MB/s':>7}"
     print(f"bits a voxel by coding; frames a second by link\n{head}", end="")
@@ -129,7 +131,10 @@ def bench_link(repeats: int, *, quick: bool = False) -> None:
         line = f"{picture.name:<24}{picture.voxels:9d}{ops:9d}{bits:8.2f}"
         line += f"{picture.target:7.1f}" if picture.target else f"{'-':>7}"
         # Range-coded, as on a slow line; where that is longer, it is not done.
-        for more in (("arc",), ("fade",), ("fade", "arc", "arc2"), ("slabs",)):
+        for more in RANGE_CODED:
+            if "values" in more and frame.format.value == "mono1":
+                line += f"{'-':>7}"
+                continue
             coded = sum(map(len, frame.payloads(PAYLOAD, (*features, *more))))
             line += f"{coded * 8 / picture.voxels:7.2f}" if coded < ops else f"{'-':>7}"
         for size in others(picture).values():

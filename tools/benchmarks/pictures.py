@@ -172,6 +172,35 @@ def coloured(side: int) -> dict[str, NDArray[np.uint8]]:
     }
 
 
+def painted(side: int) -> Iterator[Picture]:
+    """Yield surfaces with a colour for each voxel, by which the coding of values is judged.
+
+    The contexts of VALUES were chosen on `coloured`, on `phantom` and on blurred noise; the knot's
+    tube and `organs` had no part in that.
+    """
+    rainbow = np.array([(255, 0, 0), (255, 255, 0), (0, 255, 0), (0, 255, 255), (0, 0, 255)])
+    frame = Frame((side, side, side), "mono1")
+    frame.draw(bodies(side)["knot tube"])
+    tube = frame.array() > 0
+    z, y, x = np.mgrid[:side, :side, :side] + 0.5 - side / 2
+    shades = {"height": z / side + 0.5, "angle": np.arctan2(y, x) / (2 * np.pi) + 0.5}
+    for name, shade in shades.items():
+        place = shade[tube] * (len(rainbow) - 1)
+        channels = [np.interp(place, range(len(rainbow)), rainbow[:, k]) for k in range(3)]
+        colors = np.stack(channels, axis=1).round().astype(np.uint8)
+        for pixels in ("index8", "rgb565", "rgb888"):
+            painting = Frame((side, side, side), pixels)
+            form = painting.format
+            values = form.nearest(colors)
+            if pixels == "index8":  # entries of a palette that follows the shade
+                values = (1 + 254 * shade[tube]).astype(np.uint32)
+            page = np.zeros(form.shape(tube.shape), dtype=form.dtype)
+            page[tube] = form.pixels(np.maximum(values, 1))
+            painting.set(page)
+            lit = int(np.count_nonzero(tube))
+            yield Picture(f"knot by {name} {pixels} {side}", painting, lit)
+
+
 def radii(side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the distance of each voxel's centre from the cube's, and that from the z axis."""
     z, y, x = np.mgrid[:side, :side, :side] + 0.5 - side / 2
@@ -294,6 +323,9 @@ def pictures(*, quick: bool) -> Iterator[Picture]:
     yield from gradients("two-colour paper", 128, paper_curve(40, 4), ["blue", "orange"])
     dots = np.random.default_rng(SEED).integers(0, 128, (2000, 3))
     yield of_voxels("2000 lone voxels", 128, [dots], None)
+    yield from painted(128)
+    noise = np.random.default_rng(SEED).integers(1, 256, (32, 32, 32), dtype=np.uint8)
+    yield of_array("white noise 32", noise, "index8", None)
     for side in (64, 128):
         yield of_array(f"head, 8 bit {side}", phantom(side), "index8", 1.5 if side > 64 else None)
         yield of_array(f"organs, 8 bit {side}", organs(side), "index8", None)

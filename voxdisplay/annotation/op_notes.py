@@ -27,6 +27,7 @@ _OPS = {
     spec.OP_ARC: "ARC",
     spec.OP_ARC2: "ARC2",
     spec.OP_SLABS: "SLABS",
+    spec.OP_VALUES: "VALUES",
 }
 # Ops whose low five bits hold an operand.
 _OPS_WITH_OPERAND = {

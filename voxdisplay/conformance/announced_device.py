@@ -58,12 +58,18 @@ class AnnouncedDevice:
         """Return whether a feature is announced, by its name in section 5."""
         if feature == "RAMP":  # an op of two features together
             return self.has("FADE") and self.has("PALETTE")
+        if feature == "VALUES" and self.format == spec.FORMAT_MONO1:  # has none, whatever it says
+            return False
         return bool(self.features >> FEATURES[feature] & 1)
 
     @property
     def grid(self) -> tuple[int, int, int]:
         """Voxels along x, y and z."""
         return self.nx, self.ny, self.nz
+
+    def contains(self, x: int, y: int, z: int) -> bool:
+        """Return whether a voxel is on the grid."""
+        return all(0 <= at < side for at, side in zip((x, y, z), self.grid, strict=True))
 
     @property
     def voxel_count(self) -> int:

@@ -87,6 +87,7 @@ SECTIONS = {
     "7.10": "more range-coded chains",
     "7.11": "range-coded slabs",
     "7.12": "holds",
+    "7.13": "range-coded pixels",
     "8": "the digest",
     "9": "ACK",
     "9.1": "the window",

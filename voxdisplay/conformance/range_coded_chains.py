@@ -27,9 +27,15 @@ class Coder(Protocol):
 
 
 class Models:
-    """Adaptive models: how many, after how many bits one adapts more slowly and stops counting."""
+    """Adaptive models: how many, after how many bits one adapts more slowly and stops counting.
 
-    def __init__(self, count: int, pace: int, enough: int) -> None:
+    Those from ``others[0]`` on adapt at the pace ``others[1]``.
+    """
+
+    def __init__(
+        self, count: int, pace: int, enough: int, others: tuple[int, int] | None = None
+    ) -> None:
+        self.others = others or (count, pace)
         self.p = [spec.ARC_HALF] * count
         self.seen = [0] * count
         self.pace = pace
@@ -37,7 +43,8 @@ class Models:
 
     def learn(self, i: int, bit: int) -> None:
         """Adapt a model to a bit."""
-        shift = 1 + self.seen[i] // self.pace
+        first, other_pace = self.others
+        shift = 1 + self.seen[i] // (self.pace if i < first else other_pace)
         if bit:
             self.p[i] -= self.p[i] >> shift
         else:

@@ -167,10 +167,26 @@ def _cells_of(device: AnnouncedDevice) -> list[int]:
     return [-(-side // _CELL) for side in device.grid]
 
 
+@dataclass(frozen=True, slots=True)
+class PlacedSlab:
+    """A slab as it was decoded: x, y, z of its first voxel, and whether a box begins with it."""
+
+    corner: Voxel
+    first: bool
+    slab: Slab
+
+    def voxels(self) -> Iterator[Voxel]:
+        """Yield its lit voxels: slice by slice, row by row."""
+        x, y, z = self.corner
+        for a, part in enumerate(self.slab.slices):
+            for j, i in sorted((j, i) for i, j in part):
+                yield x + i, y + j, z + a
+
+
 def decode(
     data: bytes, device: AnnouncedDevice, refusal: Callable[[int], Exception]
 ) -> Iterator[Voxel]:
-    """Yield the voxels of a SLABS; one may lie off the grid: the caller must not go on then.
+    """Yield the voxels of a SLABS.
 
     Parameters
     ----------
@@ -181,22 +197,32 @@ def decode(
         Takes a code of section 11 and returns the exception to raise.
     """
     coder = Decoder(data, refusal, slabs_models())
+    for placed in decode_boxes(coder, device, refusal, spec.SLABS_SIDE_BITS):
+        yield from placed.voxels()
+
+
+def decode_boxes(
+    coder: Decoder, device: AnnouncedDevice, refusal: Callable[[int], Exception], side_bits: int
+) -> Iterator[PlacedSlab]:
+    """Yield the slabs of all boxes to the end of an op; all of their voxels are on the grid."""
     cells = _cells_of(device)
     left = cells[0] * cells[1] * cells[2]
     while coder.bit(spec.SLABS_MORE):
         i, j, k = (coder.plain((count - 1).bit_length()) for count in cells)
-        w, h = (1 + coder.plain(spec.SLABS_SIDE_BITS) for _ in range(2))
-        slab, following = Slab(), 1
+        w, h = (1 + coder.plain(side_bits) for _ in range(2))
+        slab, first, following = Slab(), True, 1
         while following:
             left -= w * h
             if left < 0:
                 raise refusal(spec.CODE_OUTSIDE)
+            corner = (_CELL * i, _CELL * j, _CELL * k)
             for a, (x, y), now in code_slab(coder, w, h, slab, Slab()):
                 if a < 0:
                     slab = now
-                else:
-                    yield _CELL * i + x, _CELL * j + y, _CELL * k + a
-            k += 1
+                elif not device.contains(corner[0] + x, corner[1] + y, corner[2] + a):
+                    raise refusal(spec.CODE_OUTSIDE)
+            yield PlacedSlab(corner, first, slab)
+            k, first = k + 1, False
             following = coder.bit(spec.SLABS_NEXT)
     coder.end()
 
@@ -214,12 +240,25 @@ class Box:
 def encode(device: AnnouncedDevice, voxels: set[Voxel], boxes: list[Box]) -> bytes:
     """Return the op SLABS that draws the voxels that are in boxes."""
     coder = Encoder(slabs_models())
+    for _ in encode_boxes(coder, device, voxels, boxes, spec.SLABS_SIDE_BITS):
+        pass
+    return bytes((spec.OP_SLABS,)) + coder.end()
+
+
+def encode_boxes(
+    coder: Encoder,
+    device: AnnouncedDevice,
+    voxels: set[Voxel],
+    boxes: list[Box],
+    side_bits: int,
+) -> Iterator[PlacedSlab]:
+    """Encode the voxels that are in boxes; yield each slab, after which more may be encoded."""
     for box in boxes:
         coder.bit(spec.SLABS_MORE, want=1)
         for place, count in zip(box.cell, _cells_of(device), strict=True):
             coder.plain((count - 1).bit_length(), place)
         for side in (box.w, box.h):
-            coder.plain(spec.SLABS_SIDE_BITS, side - 1)
+            coder.plain(side_bits, side - 1)
         i, j, k = box.cell
         before = Slab()
         for number in range(box.slabs):
@@ -229,7 +268,7 @@ def encode(device: AnnouncedDevice, voxels: set[Voxel], boxes: list[Box]) -> byt
             want = Slab.of(voxels, corner, box.w, box.h)
             for _ in code_slab(coder, box.w, box.h, before, want):
                 pass
+            yield PlacedSlab(corner, not number, want)
             before = want
         coder.bit(spec.SLABS_NEXT)
     coder.bit(spec.SLABS_MORE)
-    return bytes((spec.OP_SLABS,)) + coder.end()

@@ -8,7 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from voxdisplay.conformance import range_coded_chains, range_coded_slabs, second_chains
+from voxdisplay.conformance import (
+    range_coded_chains,
+    range_coded_slabs,
+    range_coded_values,
+    second_chains,
+)
 from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
 from voxdisplay.conformance.fades import Fade, blend, color_bytes
 from voxdisplay.conformance.reference_page import Page, rgb
@@ -196,7 +201,7 @@ class ReferenceDecoder:
 
     def require_on_grid(self, place: Voxel) -> Voxel:
         """Return the voxel; raise `Refused` if it is off the grid."""
-        if not all(0 <= at < side for at, side in zip(place, self.device.grid, strict=True)):
+        if not self.device.contains(*place):
             raise self.refusal(spec.CODE_OUTSIDE)
         return place
 
@@ -256,6 +261,11 @@ class ReferenceDecoder:
         """SLABS: draw range-coded slabs."""
         for voxel in range_coded_slabs.decode(self.rest(), self.device, self.refusal):
             self.write_voxels([voxel])
+
+    def op_values(self, _: int) -> None:
+        """VALUES: draw range-coded voxels with their pixels."""
+        for voxel, value in range_coded_values.decode(self.rest(), self.device, self.refusal):
+            self.page.write(self.device.index(*voxel), value)
 
     def op_pen(self, _: int) -> None:
         """PEN: set the pen."""
@@ -435,6 +445,7 @@ _OPS: tuple[tuple[int, int, str, Callable[[ReferenceDecoder, int], None]], ...] 
     (spec.OP_ARC, 0, "ARC", ReferenceDecoder.op_arc),
     (spec.OP_ARC2, 0, "ARC2", ReferenceDecoder.op_arc2),
     (spec.OP_SLABS, 0, "SLABS", ReferenceDecoder.op_slabs),
+    (spec.OP_VALUES, 0, "VALUES", ReferenceDecoder.op_values),
     (spec.OP_OCT, spec.LIMIT_MAX_LEVEL, "OCT", ReferenceDecoder.op_brick),
     (spec.OP_SKIP, 31, "", ReferenceDecoder.op_skip),
     (spec.OP_RUN, 31, "", ReferenceDecoder.op_run),

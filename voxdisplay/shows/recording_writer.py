@@ -42,11 +42,14 @@ _MAX_META_BYTES = spec.LIMIT_MAX_PAYLOAD
 
 _FIRST_OF_1_1 = spec.FEATURE_SLABS  # protocol.md, section 15
 # All but HOLD: a frame is due when its FRAME says so.
-_DRAWING = ("line", "box", "dots", "oct", "diff", "arc", "palette", "slabs", "fade", "arc2")
+_DRAWING = (
+    *("line", "box", "dots", "oct", "diff", "arc", "palette"),
+    *("slabs", "fade", "arc2", "values"),
+)
 # Range coding saves bytes on slow lines, but small boards lack it and it takes long.
 _USUAL = ("line", "box", "dots", "oct", "diff", "palette")
 _OF_INDEX8 = ("diff", "palette")
-_NOT_OF_MONO1 = ("fade",)
+_NOT_OF_MONO1 = ("fade", "values")
 
 
 def drawing_features(format_: PixelFormat, wanted: Collection[str] = _USUAL) -> tuple[str, ...]:

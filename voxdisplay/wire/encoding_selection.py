@@ -2,15 +2,14 @@
 
 Ordered voxels are encoded as chains, sets of voxels as bricks, dots and boxes, or as spans in scan
 order. Each candidate is laid out and its bytes are counted, unless a lower bound rules it out.
-Range coding is slow: for a fast link ARC and SLABS are left out of the features (`features`). Each
-voxel has one pixel value here, so that op blocks may come in any order; for a fast line dense sets
-are encoded in independent parts, so that the first can be sent at once. Must not know frames or
-links.
+Range coding is slow: for a fast link it is left out of the features (`features`). Each voxel has
+one pixel value here, so that op blocks may come in any order; for a fast line dense sets are
+encoded in independent parts, so that the first can be sent at once. Must not know frames or links.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,8 +59,9 @@ def encode_update(
         At most ``config.max_payload`` bytes each, none of them empty.
 
     """
-    known = _with_known_order(update, config) if config.has(spec.FEATURE_SLABS) else update
-    if config.has(spec.FEATURE_SLABS) and len(known.unordered):
+    range_coded = config.has(spec.FEATURE_SLABS) or config.has(spec.FEATURE_VALUES)
+    known = _with_known_order(update, config) if range_coded else update
+    if range_coded and len(known.unordered):
         yield from _encode_with_slabs(update, known, config, first)
     else:
         yield from _encode_parts(update, config, first)
@@ -72,21 +72,49 @@ def _encode_with_slabs(
 ) -> Iterator[list[bytes]]:
     """Yield the payloads of an update, its sets range-coded if that takes fewer bytes on the wire.
 
-    Both are counted before anything is yielded: range coding is for slow lines.
+    All ways are counted before anything is yielded: range coding is for slow lines.
     """
-    best: list[bytes] = []
-    for portion in _encode_parts(update, config, first):
-        best += portion
-        yield []
+    best = yield from _collect(update, config, first)
+    yield []
     in_slabs, index = _encode_sets(known, config)
-    if in_slabs:
-        rest = PageUpdate(known.ordered, index, known.pixels_at)
-        for portion in _encode_parts(rest, config, first):
-            in_slabs += portion
+    yield []
+    ways = [(in_slabs, index)] if in_slabs else []
+    if config.has(spec.FEATURE_VALUES):
+        for before, some in (([], known.unordered), (in_slabs, index))[: 2 if in_slabs else 1]:
+            of_values, left = _encode_values(some, known, best, config)
+            ways += [(before + of_values, left)] if of_values else []
             yield []
-        if _wire_bytes(in_slabs) < _wire_bytes(best):
-            best = in_slabs
+    for coded, left in ways:
+        if _wire_bytes(coded) < _wire_bytes(best):
+            rest = PageUpdate(known.ordered, left, known.pixels_at)
+            whole = coded + (yield from _collect(rest, config, first))
+            best = min(best, whole, key=_wire_bytes)
     yield best
+
+
+def _collect(
+    update: PageUpdate, config: EncoderConfig, first: OpBlocks | None
+) -> Generator[list[bytes], None, list[bytes]]:
+    """Return the payloads of an update without range-coded sets, incrementally."""
+    payloads: list[bytes] = []
+    for portion in _encode_parts(update, config, first):
+        payloads += portion
+        yield []
+    return payloads
+
+
+def _encode_values(
+    index: Ints, update: PageUpdate, best: list[bytes], config: EncoderConfig
+) -> tuple[list[bytes], Ints]:
+    """Return voxels range-coded with their values, if that may be the shortest, and the others."""
+    values = update.pixels_at(index)
+    lit = values > 0
+    some, of_some = index[lit], values[lit]
+    if not len(some) or (config.has(spec.FEATURE_SLABS) and (of_some == of_some[0]).all()):
+        return [], index  # SLABS codes what has one value
+    if slabs.are_too_sparse(some, config):
+        return [], index
+    return slabs.encode_values_best(some, of_some, _wire_bytes(best), config), index[~lit]
 
 
 def _wire_bytes(payloads: list[bytes]) -> int:
@@ -100,7 +128,7 @@ def _encode_sets(update: PageUpdate, config: EncoderConfig) -> tuple[list[bytes]
     An op has one pen: of many values the most frequent are tried.
     """
     index, values = update.unordered, update.pixels_at(update.unordered)
-    if is_incompressible(index, values):
+    if not config.has(spec.FEATURE_SLABS) or is_incompressible(index, values):
         return [], index
     pens, rank, counts = np.unique(values, return_inverse=True, return_counts=True)
     bytes_as_set = counts

@@ -11,7 +11,7 @@ from typing import Final
 from voxdisplay.argument_checks import choice, wrong_kind
 from voxdisplay.wire import spec
 
-RANGE_CODED: Final = ("arc", "arc2", "slabs")
+RANGE_CODED: Final = ("arc", "arc2", "slabs", "values")
 # Range-coded chains save about one bit a voxel and take some 5 us for it, slabs save three bits and
 # take 23 us on a Cortex-M0+: both pay below this rate.
 SLOW_BYTES_PER_S: Final = 25_000

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from voxdisplay.compute.kernel_backend import jit
+from voxdisplay.wire.value_kernels import decode_values, value_decisions
+
+__all__ = ["code_bits", "decode_slab", "decode_values", "slab_decisions", "value_decisions"]
 
 _CELL = 4  # voxels along the side of a cell: as the shape of the contexts, no parameter
 

@@ -24,6 +24,7 @@ from voxdisplay.wire.fades import FadedPens
 from voxdisplay.wire.op_encoding import Ints
 from voxdisplay.wire.range_coded_chain_decoder import decode_range_coded
 from voxdisplay.wire.slab_decoder import decode_slabs
+from voxdisplay.wire.slab_value_decoder import decode_valued_slabs
 
 # Bits of crumbs, by byte: those for the first and for the second other axis.
 _EVEN: Final = bytes((byte & 0x55).bit_count() for byte in range(256))
@@ -358,6 +359,18 @@ class _Parser:
         except ValueError as error:
             raise self._error(str(error)) from error
 
+    def read_values(self) -> None:
+        """Read VALUES, which takes the rest."""
+        if self._format is PixelFormat.MONO1:
+            raise self._error("VALUES is no op of mono1")
+        raw = self._take(len(self._data) - self._at)
+        try:
+            for index, values in decode_valued_slabs(raw, self._grid, self._format):
+                self._reserve(len(index))
+                self._shapes.add_dots(self._ops, values, index)
+        except ValueError as error:
+            raise self._error(str(error)) from error
+
     def _chain(self, octant: int, begin: int, *, again: bool = False) -> None:
         steps = self._take(1)[0] + 1
         crumbs = self._take(-(-steps // 4))
@@ -456,6 +469,7 @@ _SIMPLE: Final = {
     spec.OP_ARC: _Parser.read_arc,
     spec.OP_SLABS: _Parser.read_slabs,
     spec.OP_ARC2: _Parser.read_arc2,
+    spec.OP_VALUES: _Parser.read_values,
 }
 _COUNTED: Final = {
     spec.OP_SKIP: _Parser.read_skip,

@@ -170,7 +170,7 @@ class Shapes:
 
     lines: list[tuple[int, int, int, int]] = field(default_factory=list)
     boxes: list[tuple[int, int, int, int]] = field(default_factory=list)
-    dots: list[tuple[int, int, Ints]] = field(default_factory=list)
+    dots: list[tuple[int, int | Ints, Ints]] = field(default_factory=list)
 
     def add_line(self, op: int, pen: int, begin: int, end: int) -> None:
         """Add a line between the voxels of two indices."""
@@ -180,8 +180,8 @@ class Shapes:
         """Add a box between the voxels of two indices."""
         self.boxes.append((op, pen, begin, end))
 
-    def add_dots(self, op: int, pen: int, index: Ints) -> None:
-        """Add voxels by their indices, (n,)."""
+    def add_dots(self, op: int, pen: int | Ints, index: Ints) -> None:
+        """Add voxels by their indices, (n,), of one pen or each of its own, (n,)."""
         self.dots.append((op, pen, index))
 
     def expand(self, grid: Grid) -> Written:
@@ -189,9 +189,10 @@ class Shapes:
         parts = [np.empty((3, 0), dtype=np.int64)]
         if self.dots:
             counts = [len(index) for _, _, index in self.dots]
-            names = np.repeat([(op, pen) for op, pen, _ in self.dots], counts, axis=0).T
+            ops = np.repeat([op for op, _, _ in self.dots], counts)
+            pens = [np.broadcast_to(pen, len(index)) for _, pen, index in self.dots]
             index = np.concatenate([index for _, _, index in self.dots])
-            parts.append(np.stack((names[0], index, names[1])))
+            parts.append(np.stack((ops, index, np.concatenate(pens))))
         if self.lines:
             parts.append(self._expand_lines(grid))
         if self.boxes:

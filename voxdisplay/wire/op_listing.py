@@ -133,6 +133,7 @@ _OPS: Final[dict[str, tuple[int, int, Callable[[bytes, int, EncoderConfig], int]
     "ARC": (spec.OP_ARC, 0xFF, _rest),
     "SLABS": (spec.OP_SLABS, 0xFF, _rest),
     "ARC2": (spec.OP_ARC2, 0xFF, _rest),
+    "VALUES": (spec.OP_VALUES, 0xFF, _rest),
     "FROM": (spec.OP_FROM, 0xE0, _chain),
     "OCT": (spec.OP_OCT, 0xE0, _brick),
     "SKIP": (spec.OP_SKIP, 0xE0, _counted),

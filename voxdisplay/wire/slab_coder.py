@@ -1,4 +1,4 @@
-"""Adaptive binary range coder of slabs, one model a bit (protocol.md, sections 7.7 and 7.11).
+"""Adaptive binary range coder of slabs, one model a bit (protocol.md, sections 7.7, 7.11, 7.13).
 
 Must not know what the bits mean.
 """
@@ -16,10 +16,11 @@ from voxdisplay.wire.op_encoding import Bytes, Ints
 from voxdisplay.wire.slab_contexts import Models
 
 # Model of the bits that have none: its state never changes.
-PLAIN = spec.SLABS_MODELS
+PLAIN = spec.VALUES_MODELS
 _ONE = 4096
 _LEAST_RANGE = 1 << 24
 _FIXED = _ONE << 3
+_FIRST_OF_VALUES = _FIXED + 1  # states of the models of pixel values follow those of the others
 _LOW, _RANGE, _SIZE = PLAIN + 1, PLAIN + 2, PLAIN + 3
 
 
@@ -27,17 +28,25 @@ _LOW, _RANGE, _SIZE = PLAIN + 1, PLAIN + 2, PLAIN + 3
 def state_table() -> NDArray[np.int32]:
     """Return twice the chance of a 0 in each state of a model, and the states after a 0 and a 1.
 
-    A state is 8 times the chance, in parts of 4096, plus the bits seen, up to SLABS_ENOUGH.
+    A state is 8 times the chance, in parts of 4096, plus the bits seen, up to SLABS_ENOUGH; those
+    of models of pixel values, which adapt at another pace, are _FIRST_OF_VALUES higher.
     """
-    state = np.arange((_ONE << 3) + 1)
+    slabs = _adaptive_states(spec.SLABS_PACE)
+    values = _adaptive_states(spec.VALUES_PACE)
+    values[1:] += _FIRST_OF_VALUES
+    table = np.concatenate((slabs, [[_ONE], [_FIXED], [_FIXED]], values), axis=1)
+    return table.astype(np.int32)
+
+
+def _adaptive_states(pace: int) -> Ints:
+    """Return the table of models that adapt at a pace, (3, 4096 * 8)."""
+    state = np.arange(_ONE << 3)
     p, seen = state >> 3, state & 7
-    shift = 1 + seen // spec.SLABS_PACE
+    shift = 1 + seen // pace
     more = np.minimum(seen + 1, spec.SLABS_ENOUGH)
-    table = np.stack(
+    return np.stack(
         (2 * p, (p + ((_ONE - p) >> shift)) << 3 | more, (p - (p >> shift)) << 3 | more)
     )
-    table[:, _FIXED] = _ONE, _FIXED, _FIXED
-    return table.astype(np.int32)
 
 
 @cache
@@ -50,6 +59,7 @@ def table_lists() -> list[list[int]]:
 def initial_state() -> Ints:
     """Return the state of a coder that has coded nothing."""
     state = np.full(_SIZE + 1, spec.ARC_HALF << 3, dtype=np.int64)
+    state[spec.SLABS_MODELS : PLAIN] += _FIRST_OF_VALUES
     state[PLAIN:] = _FIXED, 0, _LEAST_RANGE, 0
     return state
 

@@ -23,6 +23,7 @@ _CODE, _RANGE, _AT = -3, -2, -1  # places in a state, behind the models
 # Samples of a curve that take as long to compute without kernels as a byte takes to decode.
 _SAMPLES_PER_BYTE = 200
 _BLANK, _MIXED, _FULL = 0, 1, 2
+CUT_OFF = "the payload ends inside the op"
 
 
 def decode_slabs(data: bytes, grid: Grid) -> Iterator[Ints]:
@@ -40,64 +41,95 @@ def decode_slabs(data: bytes, grid: Grid) -> Iterator[Ints]:
         If it is cut off or too long, or leaves the grid.
 
     """
-    kernel_backend.enable_if_worthwhile(_SAMPLES_PER_BYTE * len(data))
-    stream = _Stream(data)
-    cells = [-(-side // CELL) for side in grid]
-    left = cells[0] * cells[1] * cells[2]
-    while stream.bit(spec.SLABS_MORE):
-        i, j, k = (stream.plain((count - 1).bit_length()) for count in cells)
-        w, h = (1 + stream.plain(spec.SLABS_SIDE_BITS) for _ in range(2))
-        states = np.zeros((h + 2, w + 2), dtype=np.int64)
-        below = np.zeros((CELL * h + 2, CELL * w + 2), dtype=np.int64)
-        lit = np.empty((CELL, CELL * h, CELL * w), dtype=np.bool_)
-        z, y, x = (np.arange(size) for size in lit.shape)
-        y, x = y + CELL * j, x + CELL * i
-        index = x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])
-        outside = (x >= grid.nx) | (y >= grid.ny)[:, None]
-        following = 1
-        while following:
-            left -= w * h
-            if left < 0:
-                raise ValueError("SLABS has more cells than the grid")
-            stream.slab(states, below, lit)
-            base = CELL * k
-            if (outside.any() and lit[:, outside].any()) or lit[max(0, grid.nz - base) :].any():
-                raise ValueError("SLABS leaves the grid")
-            yield index.reshape(-1)[np.flatnonzero(lit)] + grid.nx * grid.ny * base
-            k += 1
-            following = stream.bit(spec.SLABS_NEXT)
-    if not stream.finished:
-        raise ValueError("bytes behind the last bit of SLABS")
+    stream = SlabStream(data)
+    for index, _, _ in stream.slabs(grid, spec.SLABS_SIDE_BITS):
+        yield index
 
 
-class _Stream:
-    """Coded bits, and the state of their decoder."""
+class SlabStream:
+    """Coded bits of an op, and the state of their decoder.
+
+    Attributes
+    ----------
+    data : uint8 array
+        With the bytes that are read behind the op.
+    state : (models + 4,) int64 array
+        As in `decode_slab`.
+
+    """
 
     def __init__(self, data: bytes) -> None:
-        self._data = np.frombuffer(data + bytes(spec.ARC_BEHIND), dtype=np.uint8)
-        self._state = slab_coder.initial_state()
-        self._state[_CODE] = int.from_bytes(self._data[:_BEGIN_BYTES].tobytes(), "big")
-        self._state[_AT] = _BEGIN_BYTES
+        kernel_backend.enable_if_worthwhile(_SAMPLES_PER_BYTE * len(data))
+        self.data = np.frombuffer(data + bytes(spec.ARC_BEHIND), dtype=np.uint8)
+        self.state = slab_coder.initial_state()
+        self.state[_CODE] = int.from_bytes(self.data[:_BEGIN_BYTES].tobytes(), "big")
+        self.state[_AT] = _BEGIN_BYTES
 
-    @property
-    def finished(self) -> bool:
-        """True if all bytes have been read."""
-        return int(self._state[_AT]) == len(self._data)
+    def slabs(self, grid: Grid, side_bits: int) -> Iterator[tuple[Ints, Bools, bool]]:
+        """Yield the slabs of all boxes; what follows a slab is to be read before the next.
+
+        Parameters
+        ----------
+        grid : Grid
+        side_bits : int
+            Bits of the sides of a box.
+
+        Yields
+        ------
+        index : (n,) int64 array
+            Scan-order indices of the lit voxels, ascending.
+        lit : (4, 4 h, 4 w) bool array
+            The voxels, until the next slab.
+        first : bool
+            True if a box begins.
+
+        Raises
+        ------
+        ValueError
+            If it is cut off or too long, or leaves the grid.
+
+        """
+        cells = [-(-side // CELL) for side in grid]
+        left = cells[0] * cells[1] * cells[2]
+        while self.bit(spec.SLABS_MORE):
+            i, j, k = (self.plain((count - 1).bit_length()) for count in cells)
+            w, h = (1 + self.plain(side_bits) for _ in range(2))
+            states = np.zeros((h + 2, w + 2), dtype=np.int64)
+            below = np.zeros((CELL * h + 2, CELL * w + 2), dtype=np.int64)
+            lit = np.empty((CELL, CELL * h, CELL * w), dtype=np.bool_)
+            z, y, x = (np.arange(size) for size in lit.shape)
+            y, x = y + CELL * j, x + CELL * i
+            index = x + grid.nx * (y[:, None] + grid.ny * z[:, None, None])
+            outside = (x >= grid.nx) | (y >= grid.ny)[:, None]
+            first, following = True, 1
+            while following:
+                left -= w * h
+                if left < 0:
+                    raise ValueError("more cells than the grid has")
+                self._slab(states, below, lit)
+                base = CELL * k
+                if (outside.any() and lit[:, outside].any()) or lit[max(0, grid.nz - base) :].any():
+                    raise ValueError("a voxel leaves the grid")
+                yield index.reshape(-1)[np.flatnonzero(lit)] + grid.nx * grid.ny * base, lit, first
+                k += 1
+                first, following = False, self.bit(spec.SLABS_NEXT)
+        if int(self.state[_AT]) != len(self.data):
+            raise ValueError("bytes behind the last bit")
 
     def bit(self, model: int) -> int:
         """Return a bit by a model."""
-        code, span, at = self._state[_CODE:].tolist()
-        now = int(self._state[model])
+        code, span, at = self.state[_CODE:].tolist()
+        now = int(self.state[model])
         chance, *after = slab_coder.state_table()
         bound = (span >> 13) * int(chance[now])
         bit = int(code >= bound)
         code, span = (code - bound, span - bound) if bit else (code, bound)
         while span < _LEAST_RANGE:
-            if at == len(self._data):
-                raise ValueError("the payload ends inside SLABS")
-            code, span, at = code << 8 | int(self._data[at]), span << 8, at + 1
-        self._state[model] = after[bit][now]
-        self._state[_CODE:] = code, span, at
+            if at == len(self.data):
+                raise ValueError(CUT_OFF)
+            code, span, at = code << 8 | int(self.data[at]), span << 8, at + 1
+        self.state[model] = after[bit][now]
+        self.state[_CODE:] = code, span, at
         return bit
 
     def plain(self, count: int) -> int:
@@ -107,11 +139,11 @@ class _Stream:
             value = value << 1 | self.bit(slab_coder.PLAIN)
         return value
 
-    def slab(self, states: Ints, below: Ints, lit: Bools) -> None:
+    def _slab(self, states: Ints, below: Ints, lit: Bools) -> None:
         """Decode a slab: see `decode_slab`."""
         table = slab_coder.state_table()
-        if not decode_slab(self._state, self._data, states, below, lit, table, MODEL_BASES):
-            raise ValueError("the payload ends inside SLABS")
+        if not decode_slab(self.state, self.data, states, below, lit, table, MODEL_BASES):
+            raise ValueError(CUT_OFF)
 
 
 @with_kernel
@@ -145,7 +177,7 @@ def decode_slab(
 
     """
     del table  # as lists, which are faster here
-    source = _Source(state, data.tobytes())
+    source = BitSource(state, data.tobytes())
     try:
         _decode_states(source, states, below, bases)
         _decode_voxels(source, states, below, lit, bases)
@@ -155,8 +187,8 @@ def decode_slab(
     return True
 
 
-class _Source:
-    """A decoder's state as lists, for many bits."""
+class BitSource:
+    """A decoder's state as lists, for many bits; raises EOFError behind the last."""
 
     def __init__(self, state: Ints, data: bytes) -> None:
         self._models = state.tolist()
@@ -165,10 +197,12 @@ class _Source:
         self._chance, *self._after = slab_coder.table_lists()
 
     def save(self, state: Ints) -> None:
+        """Save the state in an array."""
         self._models[_CODE:] = self._code, self._range, self._at
         state[:] = self._models
 
     def bit(self, model: int) -> int:
+        """Return a bit by a model."""
         now = self._models[model]
         bound = (self._range >> 13) * self._chance[now]
         bit = int(self._code >= bound)
@@ -188,7 +222,7 @@ class _Source:
 
 
 def _decode_states(
-    source: _Source, states: Ints, below: Ints, bases: tuple[int, int, int, int]
+    source: BitSource, states: Ints, below: Ints, bases: tuple[int, int, int, int]
 ) -> None:
     flag, full, *_ = bases
     height, width = states.shape[0] - 2, states.shape[1] - 2
@@ -212,7 +246,7 @@ def _decode_states(
 
 
 def _decode_voxels(
-    source: _Source, states: Ints, below: Ints, lit: Bools, bases: tuple[int, int, int, int]
+    source: BitSource, states: Ints, below: Ints, lit: Bools, bases: tuple[int, int, int, int]
 ) -> None:
     group, shape = bases[2:]
     cells, under = states.tolist(), below.tolist()

@@ -72,6 +72,7 @@ FEATURE_SLABS: Final = 9
 FEATURE_FADE: Final = 10
 FEATURE_ARC2: Final = 11
 FEATURE_HOLD: Final = 12
+FEATURE_VALUES: Final = 13
 
 # Section 6: DATA
 DATA_FLAG_CLEAR: Final = 1
@@ -93,6 +94,7 @@ OP_FROM: Final = 0x40
 OP_ARC: Final = 0x58
 OP_SLABS: Final = 0x59
 OP_ARC2: Final = 0x5A
+OP_VALUES: Final = 0x5B
 OP_OCT: Final = 0x60
 OP_SKIP: Final = 0x80
 OP_RUN: Final = 0xA0
@@ -136,6 +138,22 @@ SLABS_ENOUGH: Final = 6
 SLABS_PACE: Final = 3
 SLABS_CELL: Final = 4
 SLABS_SIDE_BITS: Final = 4
+
+# Section 7.13: range-coded pixel values
+VALUES_COPY: Final = 2434
+VALUES_CHANNEL: Final = 2818
+VALUES_MODELS: Final = 4186
+VALUES_ZERO: Final = 0
+VALUES_SIGN: Final = 8
+VALUES_MAGNITUDE: Final = 16
+VALUES_LONG: Final = 144
+VALUES_SET: Final = 152
+VALUES_PACE: Final = 2
+VALUES_SIDE_BITS: Final = 3
+VALUES_WEIGHT_BITS: Final = 7
+VALUES_MAX_UNARY: Final = 15
+VALUES_MAX_LONG: Final = 7
+VALUES_MAX_CLASS: Final = 7
 
 # Section 8: the digest
 DIGEST_MUL_INDEX: Final = 0x9E3779B1

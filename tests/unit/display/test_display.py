@@ -23,7 +23,8 @@ def test_present_read_and_clear(format_, refresh):
     assert display.info.format.value == format_
     every = {"line", "box", "dots", "oct", "arc", "read", "digest", "arc2", "slabs"}
     every |= {"diff", "palette"} if format_ == "index8" else set()
-    every |= {"fade"} if format_ != "mono1" else set()
+    every |= {"fade", "values"} if format_ != "mono1" else set()
+    every |= {"hold"} if refresh else set()
     assert set(display.info.features) == every
     for number in (1, 2):
         frame = random_frame(display, number)

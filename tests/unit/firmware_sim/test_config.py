@@ -31,15 +31,15 @@ def test_defaults() -> None:
     assert str(config.shape) == "128x128x128"
     assert (config.pixel_format, config.max_payload, config.boot) == ("rgb888", 1024, None)
     assert (config.refresh, config.rx_buffer, config.max_silent_acks) == (30_000, 16_384, 0)
-    assert config.feature_bits == 0b1_1111_1010_1111
+    assert config.feature_bits == 0b11_1111_1010_1111
     assert (config.minor, Config(features=frozenset({"box"})).minor) == (1, 0)
 
 
 def test_the_features_are_those_that_the_format_allows() -> None:
     """MUST NOT announce a reserved feature, nor one that its format does not allow."""
-    assert Config(pixel_format="index8").feature_bits == 0b1_1111_1111_1111
+    assert Config(pixel_format="index8").feature_bits == 0b11_1111_1111_1111
     assert Config(pixel_format="mono1").feature_bits == 0b1_1011_1010_1111
-    assert Config(pixel_format="index8", refresh=0).feature_bits == 0b1111_1111_1111
+    assert Config(pixel_format="index8", refresh=0).feature_bits == 0b10_1111_1111_1111
     assert Config(features=frozenset()).feature_bits == 0
     for name, bit in FEATURES.items():
         config = Config(pixel_format="index8", features=frozenset({name}))

@@ -61,7 +61,7 @@ def test_info_says_what_the_device_is() -> None:
     assert (info.major, info.minor, info.session, info.boot) == (1, 1, SESSION, BOOT)
     assert (info.nx, info.ny, info.nz, info.format, info.pages) == (3, 300, 7, 3, 2)
     assert (info.max_payload, info.rx_buffer, info.refresh) == (1024, 16_384, 29_970)
-    assert (info.features, info.reserved) == (0b1_1111_1010_1111, 0)
+    assert (info.features, info.reserved) == (0b11_1111_1010_1111, 0)
     assert info.payload[29:] == b"\x13voxdisplay emulator\x031.0\x03\xc3\x841"
 
 
@@ -284,7 +284,7 @@ def test_the_frame_of_a_page_is_that_of_an_ack() -> None:
         ("grid", "nx", 4),
         ("grid", "ny", 6),
         ("grid", "nz", 65_534),
-        ("features", "features", 0b1_1111_1111_1111),
+        ("features", "features", 0b11_1111_1111_1111),
     ],
 )
 def test_info_announces_what_the_device_does_not_do(lie: str, field: str, said: int) -> None:

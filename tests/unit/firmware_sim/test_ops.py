@@ -48,7 +48,7 @@ OP, COUNT, TRUNCATED, PADDING, PIXEL, OUTSIDE = range(7, 13)
     [
         *(("index8", f"a0 {op:02x}", OP, 4) for op in (*range(10, 32), *range(0x65, 0x80))),
         *(("rgb565", f"{op:02x}", OP, 3) for op in (6, *range(0xE0, 0x100))),
-        *(("index8", f"{op:02x} 00 00 00 00 00", OP, 3) for op in (*range(0x38, 0x40), 0x5B, 0x5F)),
+        *(("index8", f"{op:02x} 00 00 00 00 00", OP, 3) for op in (*range(0x38, 0x40), 0x5C, 0x5F)),
         ("index8", "9f 80 00", COUNT, 3),
         ("index8", "bf 80 80 00", COUNT, 3),
         ("index8", "df ff ff ff ff 80", COUNT, 3),
@@ -146,6 +146,7 @@ def test_the_first_fault_is_refused(name: str, ops: str, code: int, offset: int)
         ("dots", "05 00 01 02 03"),
         ("arc", "58 00"),
         ("slabs", "59 00"),
+        ("values", "5b 00"),
         ("palette", "06 00 00 01 02 03"),
         *(("oct", f"6{level} 00 00 00 01 01 01 01"[: 11 + 3 * level]) for level in range(3)),
         *(("diff", f"{op:02x}" + " 00" * 16) for op in range(0xE0, 0xFF)),

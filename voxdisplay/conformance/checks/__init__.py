@@ -13,6 +13,7 @@ from voxdisplay.conformance.checks import (  # noqa: F401, I001 - the order is t
     range_coded_chains,
     second_chains,
     range_coded_slabs,
+    range_coded_values,
     holds,
     digests,
     acks,

@@ -47,6 +47,9 @@ def info_fields(probe: Probe) -> None:
     for name in ("DIFF", "PALETTE"):
         fits = not device.has(name) or info.format == spec.FORMAT_INDEX8
         probe.require(fits, f"{name} only with the format INDEX8", info)
+    valued = info.features >> spec.FEATURE_VALUES & 1
+    fits = not valued or info.format != spec.FORMAT_MONO1
+    probe.require(fits, "VALUES not with the format MONO1", info)
     ticks = not device.has("HOLD") or device.refresh > 0
     probe.require(ticks, "HOLD only with refresh ticks", info)
 

@@ -108,6 +108,7 @@ def reserved_ops(probe: Probe) -> None:
         spec.OP_RAMP: "RAMP",
         spec.OP_ARC: "ARC",
         spec.OP_SLABS: "SLABS",
+        spec.OP_VALUES: "VALUES",
         spec.OP_ARC2: "ARC2",
     }
     for op in range(256):
