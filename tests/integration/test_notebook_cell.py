@@ -10,6 +10,7 @@ from live_page import SIZE, page_of
 
 import voxdisplay as vd
 from voxdisplay.view.film import FilmJob
+from voxdisplay.view.html_export import page_with
 from voxdisplay.view.live.snapshot_message import Snapshot
 
 pytest.importorskip("anywidget", reason="needs the extra notebook")
@@ -68,8 +69,9 @@ def lit(page):
 def cell(tab, tmp_path):
     """Open a notebook of one cell with a widget's traits."""
 
-    def open_cell(traits):
+    def open_cell(traits, patience_ms=10000):
         code = files("voxdisplay.view.notebook").joinpath("widget.js").read_text(encoding="utf-8")
+        code = code.replace("= 10000;", f"= {patience_ms};")
         safe = {"<": "\\u003c"}
         texts = [json.dumps(each).translate(str.maketrans(safe)) for each in (traits, code)]
         path = tmp_path / "notebook.html"
@@ -102,7 +104,7 @@ def test_a_frame_turns_in_its_cell(cell):
 
 
 def test_a_live_view_follows_and_says_how_things_are(cell, monkeypatch):
-    monkeypatch.setattr(LiveView, "_end", lambda _view: None)
+    monkeypatch.setattr(LiveView, "_end", lambda view: view._ended.set())
 
     class Ended:
         def next(self):
@@ -125,3 +127,21 @@ def test_a_live_view_follows_and_says_how_things_are(cell, monkeypatch):
     page.wait(f"{STATE} === 'no kernel: last picture'")
     assert lit(page), "the last picture stays"
     page.run("end()")
+
+
+def test_a_live_view_notices_that_its_kernel_has_fallen_silent(cell):
+    page = cell(
+        {
+            "page": page_with({"cell": True}, "a"),
+            "height": 400,
+            "latest": text(snapshot(1)),
+            "state": "live",
+        },
+        200,
+    )
+    page.run("window.beating = setInterval(() => fire('msg:custom'), 20)")
+    page.wait(f"{STATE} === 'live'")
+    page.run("clearInterval(beating)")
+    page.wait(f"{STATE} === 'no kernel: last picture'")
+    page.run("fire('msg:custom')")
+    page.wait(f"{STATE} === 'live'")

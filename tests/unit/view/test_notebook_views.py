@@ -137,7 +137,7 @@ def test_a_feed_that_is_closed_says_nothing():
 
 def test_a_live_view_has_the_last_picture_and_its_state(monkeypatch):
     ended = threading.Event()
-    monkeypatch.setattr(LiveView, "_end", lambda _view: ended.set())
+    monkeypatch.setattr(LiveView, "_end", lambda view: (view._ended.set(), ended.set()))
     view = LiveView(Scripted(snapshot(1), snapshot(2)), snapshot(0))
     assert ended.wait(60)
     assert view.widget.latest == packed_message(snapshot(2))
