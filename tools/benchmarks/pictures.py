@@ -58,7 +58,7 @@ def of_array(name: str, array: NDArray[np.generic], pixels: str, target: float |
     frame = Frame(array.shape[2::-1], pixels)  # type: ignore[arg-type] - three sides
     frame.set(array)
     dense = pixels != "mono1"
-    return Picture(name, frame, array.size if dense else len(frame.lit()[0]), target)
+    return Picture(name, frame, frame.grid.voxels if dense else len(frame.lit()[0]), target)
 
 
 def gradients(name: str, side: int, curve: Curve, colors: Sequence[str]) -> Iterator[Picture]:
