@@ -48,6 +48,7 @@ def test_push_tells_of_every_part(command):
     assert told["device"]["size"] == [8, 5, 7]
     assert told["verified"] is True
     assert told["digest"]
+    assert 0 <= told["skew_s"] <= told["elapsed_s"]
     assert [part["name"] for part in told["parts"]] == ["left", "right"]
     assert [part["at"] for part in told["parts"]] == [[0, 0, 0], [4, 0, 0]]
     assert sum(part["voxels"] for part in told["parts"]) == told["voxels"] == 8

@@ -128,7 +128,8 @@ def parts_json(display: Display, receipt: Receipt | None = None) -> dict[str, An
     found = [part.as_json() for part in display.parts]
     for entry, part in zip(found, getattr(receipt, "parts", ()), strict=False):
         entry.update(_receipt_json(part.receipt))
-    return {"parts": found}
+    skew_s = getattr(receipt, "skew_s", None)
+    return {"parts": found} | ({} if skew_s is None else {"skew_s": round(skew_s, 6)})
 
 
 def _receipt_json(receipt: Receipt | None) -> dict[str, Any]:

@@ -15,7 +15,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.handshake import closed_meanwhile
-from voxdisplay.errors import LocalProtocolError, TransportError, VoxDisplayError
+from voxdisplay.errors import (
+    LocalProtocolError,
+    TransportClosed,
+    TransportError,
+    VoxDisplayError,
+)
 
 if TYPE_CHECKING:
     from voxdisplay.display.display import Display
@@ -268,6 +273,9 @@ class PartWorker:
             if self.lost is None:
                 self.lost = error
                 self.display.close(flush=False)
+        elif isinstance(error, VoxDisplayError) and self._connection.closed:
+            # Another device came back behind its port: then the connection has closed itself.
+            self.lost = self.lost or TransportClosed(str(error), hint=error.hint)
         elif streamed and isinstance(error, Exception):
             self.fault = self.fault or error
         self._wake()

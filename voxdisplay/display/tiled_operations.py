@@ -155,9 +155,11 @@ class TiledOperations:
         self._connection.report()
         for worker, future in zip(self._workers, futures, strict=True):
             error = future.exception()
-            if isinstance(error, VoxDisplayError) and error is not worker.lost:
+            if worker.lost is not None:
+                continue
+            if isinstance(error, VoxDisplayError):
                 raise named_error(worker.part, error)
-            if error is not None and error is not worker.lost:
+            if error is not None:
                 raise error
         self._check_any_left()
         return futures

@@ -132,6 +132,38 @@ def test_its_parts_are_told():
         assert alone.parts == ()
 
 
+def test_a_part_behind_whose_port_another_device_comes_back_is_lost(monkeypatch):
+    notes = []
+    with vd.open(display=wall(), note=notes.append) as shown:
+        worker = shown._tiles.workers[1]
+
+        def another(*_arguments):
+            worker.display._connection.close()  # as a connection does that finds it
+            raise vd.IncompatibleDevice("the device came back as another")
+
+        monkeypatch.setattr(worker.display._operations, "show", another)
+        receipt = shown.present(drawn(shown.frame()))
+        assert receipt.lost == ("b",)
+        assert receipt.digest is None
+        assert receipt.parts[0].receipt.digest is not None
+    assert notes == ["b is lost: the device came back as another; the others go on"]
+
+
+def test_a_part_that_shows_something_else_is_an_error_that_names_it(monkeypatch):
+    with vd.open(display=wall()) as shown:
+        worker = shown._tiles.workers[1]
+
+        def wrong(*_arguments):
+            raise vd.DesyncError("the display's digest is 1, the frame's 2")
+
+        monkeypatch.setattr(worker.display._operations, "show", wrong)
+        with pytest.raises(vd.DesyncError, match=r"b \(sim:.*\): the display's digest is 1"):
+            shown.present(drawn(shown.frame()))
+        monkeypatch.undo()
+        frame = drawn(shown.frame())
+        assert shown.present(frame).digest == frame.digest()
+
+
 def test_closing_twice_and_dark():
     shown = vd.open(display=wall())
     shown.present(drawn(shown.frame()))
