@@ -217,9 +217,10 @@ class LiveServer:
             return json.dumps({"error": "files are shown for browsers on the view's own computer"})
         data = bytearray()
         async for piece in browser:
-            if not piece or len(data) > MAX_FILE_BYTES:
+            if not piece:
                 break
-            data += piece if isinstance(piece, bytes) else piece.encode()
+            if len(data) <= MAX_FILE_BYTES:  # what is more is read, so that the answer is seen
+                data += piece if isinstance(piece, bytes) else piece.encode()
         name = query.get("name", ["file"])[0]
         try:
             async with self._reading_file:
