@@ -57,7 +57,7 @@ def dies_of_a_reserved_op(patch):
             self.dead = True
         if getattr(self, "dead", False):
             raise PacketError(spec.CODE_OP, 0, "")
-        old(self, packet, page)
+        return old(self, packet, page)
 
     around(patch, op_decoder.OpDecoder, "draw", draw)
 

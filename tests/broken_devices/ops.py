@@ -298,11 +298,12 @@ def unused_bits_taken(patch):
     "11/error-session",
     "11/reserved-ops",
     "11/first-op-first",
+    "11/refused-commit",
 )
 def reserved_ops_skipped(patch):
     def ops(old, features):
         table = old(features)
-        table[0x1F] = table[0x07] = lambda decoder, low: None
+        table[0x1F] = table[0x0A] = lambda decoder, low: None
         return table
 
     around(patch, op_decoder, "_op_table", ops)

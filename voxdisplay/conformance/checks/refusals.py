@@ -338,8 +338,8 @@ def random_ops(probe: Probe) -> None:
 def refused_commit(probe: Probe) -> None:
     probe.show(b"")
     probe.request(data(1, 1, ops.run() + b"\x1f", CLEAR | COMMIT))
+    probe.wait_two_ticks()  # a HELLO would drop a frame that waits
     probe.open_session()
-    probe.wait_two_ticks()
     probe.poll_status()
     probe.require_ack(probe.state, shown=0, pending=0)
     probe.require_displayed(probe.state, Page())
