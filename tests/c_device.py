@@ -18,7 +18,7 @@ import document
 FIRMWARE = Path(__file__).parents[1] / "firmware"
 FEATURES = (
     *("line", "box", "dots", "oct", "diff", "arc", "palette", "read", "digest"),
-    *("slabs", "fade", "arc2"),
+    *("slabs", "fade", "arc2", "hold"),
 )
 ONLY_INDEX8 = {"diff", "palette"}
 NOT_MONO1 = {"fade"}
@@ -33,10 +33,11 @@ _built: dict[tuple[str, ...], Path] = {}
 _directory = tempfile.TemporaryDirectory(prefix="firmware-")
 
 
-def all_features(pixel_format: str) -> frozenset[str]:
-    """Names of all features that a format allows."""
+def all_features(pixel_format: str, *, ticks: bool = False) -> frozenset[str]:
+    """Names of all features that a format allows, and HOLD only to a device with refresh ticks."""
     unfit = ONLY_INDEX8 if pixel_format != "index8" else set()
-    return frozenset(FEATURES) - unfit - (NOT_MONO1 if pixel_format == "mono1" else set())
+    unfit = unfit | (NOT_MONO1 if pixel_format == "mono1" else set())
+    return frozenset(FEATURES) - unfit - (set() if ticks else {"hold"})
 
 
 def build(

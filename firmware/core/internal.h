@@ -19,16 +19,23 @@ _Static_assert(VXD_RING >= 64U + LONGEST_SEGMENT + 1U, "the ring holds a packet 
 _Static_assert(VXD_NX >= 1 && VXD_NX <= 65535, "nx: 1 to 65535");
 _Static_assert(VXD_NY >= 1 && VXD_NY <= 65535, "ny: 1 to 65535");
 _Static_assert(VXD_NZ >= 1 && VXD_NZ <= 65535, "nz: 1 to 65535");
-_Static_assert(VXD_NX * 1.0 * VXD_NY * VXD_NZ <= 2147483647.0, "at most 2^31 - 1 voxels");
+_Static_assert((uint64_t)VXD_NX * VXD_NY * VXD_NZ <= 2147483647U, "at most 2^31 - 1 voxels");
 _Static_assert(VXD_FORMAT >= 1 && VXD_FORMAT <= 4, "an unknown pixel format");
-_Static_assert(VXD_FORMAT == VXD_INDEX8 || !(VXD_DIFF || VXD_PALETTE),
-               "DIFF and PALETTE need INDEX8");
+_Static_assert(VXD_FORMAT == VXD_INDEX8 || !VXD_DIFF, "DIFF needs INDEX8");
+_Static_assert(VXD_FORMAT == VXD_INDEX8 || !VXD_PALETTE, "PALETTE needs INDEX8");
 _Static_assert(VXD_FORMAT != VXD_MONO1 || !VXD_FADE, "FADE does not go with MONO1");
 
 /* Whether the pen may be a fade: ARC2 has fades of its own. */
 #define VXD_FADES (VXD_FADE || (VXD_ARC2 && VXD_FORMAT != VXD_MONO1))
 #define VXD_CHAINS (VXD_ARC || VXD_ARC2)
 #define VXD_RANGE_CODED (VXD_CHAINS || VXD_SLABS)
+
+/* A device that has none of the features of version 1.1 is one of version 1.0. */
+#if VXD_SLABS || VXD_FADE || VXD_ARC2 || VXD_HOLD
+#define MINOR 1U
+#else
+#define MINOR 0U
+#endif
 
 #define WIDE (VXD_NX > 256 || VXD_NY > 256 || VXD_NZ > 256)
 #define COORDINATE_BYTES (WIDE ? 2U : 1U)
@@ -55,6 +62,9 @@ enum code {
     OVERRUN = 13
 };
 
+/* A refusal: a code, and an offset in the packet, which is 0 with a code alone. */
+#define REFUSED(code, offset) ((code) | (offset) << 8)
+
 /* ---- The receive ring (ring.c) ---- */
 
 enum segment { SEGMENT_NONE, SEGMENT_PACKET, SEGMENT_DAMAGED, SEGMENT_SHORT };
@@ -69,8 +79,8 @@ void ring_release(void);
 
 /* ---- Packets (packets.c) ---- */
 
-/* The one packet buffer: what was received last, then the response to it. */
-extern uint8_t packet[LONGEST_PACKET];
+/* The one packet buffer: what was received last, then the response to it, with a 00 behind it. */
+extern uint8_t packet[LONGEST_PACKET + 1U];
 
 uint32_t crc32(const uint8_t *bytes, uint32_t count);
 void put_u16(uint32_t at, uint32_t value);
@@ -84,7 +94,11 @@ void send_packet(uint32_t length);
 
 extern uint32_t back_digest;
 
+#if VXD_DIGEST
 void write_voxel(uint32_t index, uint32_t value);
+#else
+#define write_voxel(index, value) vxd_put(index, value)
+#endif
 /* Write the pen to (x, y, z), or return false if that is not on the grid. */
 bool write_at(uint32_t x, uint32_t y, uint32_t z, uint32_t pen);
 #if VXD_PALETTE
@@ -95,7 +109,14 @@ void write_color(uint8_t entry, uint32_t color);
 uint32_t encode_page(bool back, uint32_t start, uint32_t *count, uint32_t at);
 #endif
 
-/* ---- Ops (ops.c, shapes.c, fades.c, range_coded_chains.c, range_coded_slabs.c) ---- */
+/* ---- Frames (session.c) ---- */
+
+#if VXD_HOLD
+/* HOLD: let the frame before stay for some ticks; return OP if there are no ticks. */
+enum code hold_frame(uint8_t ticks);
+#endif
+
+/* ---- Ops (ops.c, chains.c, runs.c, shapes.c, fades.c, range_coded_*.c) ---- */
 
 struct decoder {
     const uint8_t *at;  /* the next byte */
@@ -109,8 +130,8 @@ struct decoder {
 #endif
 };
 
-/* Apply the ops of a payload; `offset` becomes that of the op which is refused. */
-enum code apply_ops(const uint8_t *payload, uint32_t length, uint32_t *offset);
+/* Apply the ops of the packet in the buffer; return OK, or what is refused, and where. */
+uint32_t apply_ops(uint32_t length);
 uint32_t get_pixel(const uint8_t *bytes);
 uint32_t bytes_left(const struct decoder *d);
 /* Decode a LEB128 (section 7.2): its shortest form, of at most 5 bytes. */
@@ -119,6 +140,10 @@ void get_xyz(struct decoder *d, uint32_t xyz[3]);
 void cursor_xyz(const struct decoder *d, uint32_t xyz[3]);
 bool on_grid(const uint32_t xyz[3]);
 uint32_t index_of(const uint32_t xyz[3]);
+/* STEP, or FROM, which begins with a place. */
+enum code draw_chain(struct decoder *d, uint32_t octant, bool from);
+/* SKIP, RUN, LIT or DIFF. */
+enum code draw_run(struct decoder *d, uint32_t op);
 enum code draw_line(struct decoder *d);
 enum code draw_box(struct decoder *d);
 enum code draw_dots(struct decoder *d);
@@ -174,7 +199,7 @@ void begin_bits(struct decoder *d, uint32_t models, const uint8_t shifts[7]);
 bool bits_truncated(void);
 /* What the end of an op without a fault comes to. */
 enum code end_bits(void);
-uint32_t bit_of(uint32_t model);
+uint32_t bit_of(uint32_t i);
 uint32_t bit_of_two(uint32_t i, uint32_t j);
 /* Decode a number of so many bits, without models. */
 uint32_t plain(uint32_t count);

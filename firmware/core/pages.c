@@ -3,6 +3,7 @@
 
 uint32_t back_digest;
 
+#if VXD_FORMAT == VXD_INDEX8
 uint32_t vxd_default_color(uint8_t entry)
 {
     /* floor(255 * level / levels + 1/2) */
@@ -12,6 +13,7 @@ uint32_t vxd_default_color(uint8_t entry)
 
     return red | green << 8 | blue << 16;
 }
+#endif
 
 #if VXD_DIGEST
 static uint32_t mix(uint32_t index, uint32_t value)
@@ -24,12 +26,10 @@ static uint32_t mix(uint32_t index, uint32_t value)
     h *= 0x297A2D39U;
     return h ^ h >> 15;
 }
-#endif
 
 void write_voxel(uint32_t index, uint32_t value)
 {
-#if VXD_DIGEST
-    uint32_t old = vxd_get(true, index);
+    const uint32_t old = vxd_get(true, index);
 
     if (old != 0) {
         back_digest -= mix(index, old);
@@ -37,9 +37,9 @@ void write_voxel(uint32_t index, uint32_t value)
     if (value != 0) {
         back_digest += mix(index, value);
     }
-#endif
     vxd_put(index, value);
 }
+#endif
 
 #if VXD_PALETTE
 #if VXD_DIGEST

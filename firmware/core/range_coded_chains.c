@@ -31,7 +31,7 @@ static uint32_t number(uint32_t model, uint32_t most)
     while (k < most && bit_of(model + k)) {
         k++;
     }
-    return (1U << k) - 1U + plain(k);
+    return ((uint32_t)1 << k) - 1U + plain(k);
 }
 
 static uint32_t least(uint32_t a, uint32_t b)

@@ -75,16 +75,16 @@ bool ring_overrun(void)
     return true;
 }
 
-/* Undo COBS from `at` to `end`, which is not included, and check the CRC. */
-static bool decode_segment(uint32_t at, uint32_t end, uint32_t *length)
+/* Undo COBS from the oldest byte to the 00 behind it, and check the CRC. */
+static enum segment decode_segment(uint32_t *length)
 {
+    uint32_t at = ring.tail;
     uint32_t size = 0;
     uint32_t left = 0;    /* bytes of the group that are still to come */
     bool implied = false; /* a 00 stands before the next group */
+    uint8_t byte;
 
-    for (; at != end; at++) {
-        uint8_t byte = ring.bytes[at & MASK];
-
+    while ((byte = ring.bytes[at++ & MASK]) != 0) {
         if (left == 0) {
             const bool zero = implied;
 
@@ -97,38 +97,38 @@ static bool decode_segment(uint32_t at, uint32_t end, uint32_t *length)
         } else {
             left--;
         }
-        if (size == LONGEST_PACKET) {
-            return false;
+        if (size < LONGEST_PACKET) {
+            packet[size] = byte;
         }
-        packet[size++] = byte;
+        size++;
     }
-    *length = size - 4U;
-    return left == 0 && size >= 7U && crc32(packet, size - 4U) == get_u32(packet + size - 4U);
+    ring.release = at;
+    at -= ring.tail;
+    if (at >= 2U && at <= 8U) { /* below 8 bytes and a 00, but not a segment that was too long */
+        return SEGMENT_SHORT;
+    }
+    size -= 4U;
+    *length = size;
+    return left == 0 && size - 3U <= LONGEST_PACKET - 7U && crc32(packet, size) == get_u32(packet + size)
+               ? SEGMENT_PACKET
+               : SEGMENT_DAMAGED;
 }
 
 enum segment ring_segment(uint32_t *length)
 {
     const uint32_t tail = ring.tail;
-    uint32_t end = tail;
 
-    if (tail == ring.start) {
-        VXD_LOCK();
-        if (ring.start == tail && ring.head - tail > LONGEST_SEGMENT) {
-            ring.skipping = TOO_LONG;
-            ring.head = tail;
-        }
-        ring.lost = false;
-        VXD_UNLOCK();
-        return SEGMENT_NONE;
+    if (tail != ring.start) {
+        return decode_segment(length);
     }
-    while (ring.bytes[end & MASK] != 0) {
-        end++;
+    VXD_LOCK();
+    if (ring.start == tail && ring.head - tail > LONGEST_SEGMENT) {
+        ring.skipping = TOO_LONG;
+        ring.head = tail;
     }
-    ring.release = end + 1U;
-    if (end - tail - 1U < 7U) { /* not below 8 bytes, unless it is empty */
-        return SEGMENT_SHORT;
-    }
-    return decode_segment(tail, end, length) ? SEGMENT_PACKET : SEGMENT_DAMAGED;
+    ring.lost = false;
+    VXD_UNLOCK();
+    return SEGMENT_NONE;
 }
 
 void ring_release(void)

@@ -1,7 +1,7 @@
 /* The ops of the features LINE, BOX, DOTS and OCT (sections 7.3 and 7.4). */
 #include "internal.h"
 
-#if VXD_OCT || VXD_SLABS
+#if VXD_SLABS
 bool write_at(uint32_t x, uint32_t y, uint32_t z, uint32_t pen)
 {
     const uint32_t xyz[3] = {x, y, z};
@@ -56,16 +56,8 @@ enum code draw_line(struct decoder *d)
     }
     /* rest is (2 k d + L) mod 2 L on each axis; p has the quotient. */
     rest[0] = rest[1] = rest[2] = length;
-    for (int32_t k = 0;; k++) {
-        if (k == 0) {
-            write_first(d, index_of(p));
-        } else {
-            write_next(d, index_of(p));
-        }
-        if (k == length) {
-            join_fade(d, true);
-            return OK;
-        }
+    write_first(d, index_of(p));
+    for (int32_t k = 0; k < length; k++) {
         for (uint32_t axis = 0; axis < 3U; axis++) {
             rest[axis] += 2 * (int32_t)q[axis];
             if (rest[axis] >= 2 * length) {
@@ -74,6 +66,25 @@ enum code draw_line(struct decoder *d)
             } else if (rest[axis] < 0) {
                 rest[axis] += 2 * length;
                 p[axis]--;
+            }
+        }
+        write_next(d, index_of(p));
+    }
+    join_fade(d, true);
+    return OK;
+}
+#endif
+
+#if VXD_BOX || VXD_OCT
+/* Write the pen to all voxels from p to q, of which no coordinate is below that of p. */
+static void fill_box(const uint32_t p[3], const uint32_t q[3], uint32_t pen)
+{
+    for (uint32_t z = p[2]; z <= q[2]; z++) {
+        for (uint32_t y = p[1]; y <= q[1]; y++) {
+            const uint32_t row = (uint32_t)VXD_NX * (y + (uint32_t)VXD_NY * z);
+
+            for (uint32_t x = p[0]; x <= q[0]; x++) {
+                write_voxel(row + x, pen);
             }
         }
     }
@@ -99,15 +110,7 @@ enum code draw_box(struct decoder *d)
             p[axis] = low;
         }
     }
-    for (uint32_t z = p[2]; z <= q[2]; z++) {
-        for (uint32_t y = p[1]; y <= q[1]; y++) {
-            uint32_t index = (uint32_t)VXD_NX * (y + (uint32_t)VXD_NY * z);
-
-            for (uint32_t x = p[0]; x <= q[0]; x++) {
-                write_voxel(index + x, d->pen);
-            }
-        }
-    }
+    fill_box(p, q, d->pen);
     return OK;
 }
 #endif
@@ -142,39 +145,26 @@ enum code draw_dots(struct decoder *d)
 #if VXD_OCT
 #define LEVELS 4U
 
-static bool fill_cube(const uint32_t xyz[3], uint32_t side, uint32_t pen)
-{
-    for (uint32_t z = 0; z < side; z++) {
-        for (uint32_t y = 0; y < side; y++) {
-            for (uint32_t x = 0; x < side; x++) {
-                if (!write_at(xyz[0] + x, xyz[1] + y, xyz[2] + z, pen)) {
-                    return false;
-                }
-            }
-        }
-    }
-    return true;
-}
-
 /*
  * The masks come level by level, but within a level in the order of the parents: so a walk into
  * the depth needs no more than a pointer to the next mask of each level. `masks[j]` is that of the
- * level j; `state[j]` is what the walk has still to do there: the bits left of the mask.
+ * level j; `rest[j]` are the children there that are still to be drawn. The brick is the only
+ * child of a level above it.
  */
 enum code draw_brick(struct decoder *d, uint32_t level)
 {
     const uint8_t *masks[LEVELS + 1U];
-    uint8_t rest[LEVELS + 1U];
-    uint8_t child[LEVELS + 1U];
-    uint32_t xyz[3];
+    uint32_t rest[LEVELS + 2U];
+    uint32_t place[3] = {0, 0, 0}; /* within the brick */
+    uint32_t brick[3];
     uint32_t nodes = 1;
     uint32_t j;
 
     if (bytes_left(d) < XYZ_BYTES) {
         return TRUNCATED;
     }
-    get_xyz(d, xyz);
-    for (j = level; j >= 1U; j--) {
+    get_xyz(d, brick);
+    for (j = level; j != 0; j--) {
         uint32_t children = 0;
 
         if (bytes_left(d) < nodes) {
@@ -188,55 +178,35 @@ enum code draw_brick(struct decoder *d, uint32_t level)
         }
         nodes = children;
     }
-    for (uint32_t axis = 0; axis < 3U; axis++) {
-        xyz[axis] <<= level;
-    }
-    if (level == 0) {
-        return write_at(xyz[0], xyz[1], xyz[2], d->pen) ? OK : OUTSIDE;
-    }
-    /* Enter the node of level j at xyz; leave it when its bits are done. */
-    j = level;
-    rest[j] = *masks[j]++;
-    child[j] = 0;
-    if (rest[j] == 0) {
-        return fill_cube(xyz, 1U << j, d->pen) ? OK : OUTSIDE;
-    }
+    j = level + 1U;
+    rest[j] = 1;
     for (;;) {
-        uint32_t c;
-        uint32_t at[3];
+        uint32_t p[3];
+        uint32_t q[3];
+        uint32_t child = 0;
 
         while (rest[j] == 0) {
-            if (j == level) {
+            if (j++ > level) {
                 return OK;
             }
-            j++;
         }
-        while (!(rest[j] & 1U)) {
-            rest[j] >>= 1;
-            child[j]++;
+        while (!(rest[j] >> child & 1U)) {
+            child++;
         }
-        c = child[j];
-        rest[j] >>= 1;
-        child[j]++;
-        /* The corner's bits below 2^j belong to the children: bit j - 1 is this one. */
+        rest[j] &= rest[j] - 1U;
+        j--;
         for (uint32_t axis = 0; axis < 3U; axis++) {
-            xyz[axis] = (xyz[axis] >> j << j) | (c >> axis & 1U) << (j - 1U);
-            at[axis] = xyz[axis];
+            /* The bits below belong to the child's own children. */
+            place[axis] = (place[axis] >> 1 >> j << 1 | (child >> axis & 1U)) << j;
+            p[axis] = (brick[axis] << level) + place[axis];
+            q[axis] = p[axis] + (1U << j) - 1U;
         }
-        if (j == 1U) {
-            if (!write_at(at[0], at[1], at[2], d->pen)) {
+        rest[j] = j != 0 ? *masks[j]++ : 0;
+        if (rest[j] == 0) {
+            if (!on_grid(q)) {
                 return OUTSIDE;
             }
-            continue;
-        }
-        rest[j - 1U] = *masks[j - 1U]++;
-        child[j - 1U] = 0;
-        if (rest[j - 1U] == 0) {
-            if (!fill_cube(at, 1U << (j - 1U), d->pen)) {
-                return OUTSIDE;
-            }
-        } else {
-            j--;
+            fill_box(p, q, d->pen);
         }
     }
 }

@@ -46,7 +46,10 @@
 #define VXD_RING 1024
 #endif
 
-/* Features: 1 with, 0 without. DIFF and PALETTE need VXD_INDEX8, FADE anything but VXD_MONO1. */
+/*
+ * Features: 1 with, 0 without. DIFF and PALETTE need VXD_INDEX8, FADE anything but VXD_MONO1; HOLD is
+ * announced only by a device that has refresh ticks.
+ */
 #ifndef VXD_LINE
 #define VXD_LINE 1
 #endif
@@ -74,6 +77,9 @@
 #ifndef VXD_FADE
 #define VXD_FADE (VXD_FORMAT != VXD_MONO1)
 #endif
+#ifndef VXD_HOLD
+#define VXD_HOLD 1
+#endif
 #ifndef VXD_PALETTE
 #define VXD_PALETTE (VXD_FORMAT == VXD_INDEX8)
 #endif
@@ -82,6 +88,11 @@
 #endif
 #ifndef VXD_DIGEST
 #define VXD_DIGEST 1
+#endif
+
+/* A table of 64 bytes makes the check value twice as fast. */
+#ifndef VXD_CRC_TABLE
+#define VXD_CRC_TABLE 1
 #endif
 
 /* Keep the receive interrupt from running, and let it run again. */

@@ -7,13 +7,14 @@
 
 static uint8_t pages[2][VXD_VOXELS * BYTES];
 static uint32_t front;
+static uint8_t *back_page = pages[1]; /* at hand: each voxel is written there */
 #if VXD_PALETTE
 static uint32_t palettes[2][256];
 #endif
 
 void vxd_clear(void)
 {
-    memset(pages[1U - front], 0, sizeof pages[0]);
+    memset(back_page, 0, sizeof pages[0]);
 #if VXD_PALETTE
     for (uint32_t i = 0; i < 256U; i++) {
         palettes[1U - front][i] = vxd_default_color((uint8_t)i);
@@ -23,7 +24,7 @@ void vxd_clear(void)
 
 void vxd_put(uint32_t index, uint32_t value)
 {
-    uint8_t *at = &pages[1U - front][index * BYTES];
+    uint8_t *at = &back_page[index * BYTES];
 
     for (uint32_t i = 0; i < BYTES; i++, value >>= 8) {
         at[i] = (uint8_t)value;
@@ -32,12 +33,13 @@ void vxd_put(uint32_t index, uint32_t value)
 
 void vxd_show(void)
 {
+    back_page = pages[front];
     front = 1U - front;
 }
 
 void vxd_keep(void)
 {
-    memcpy(pages[1U - front], pages[front], sizeof pages[0]);
+    memcpy(back_page, pages[front], sizeof pages[0]);
 #if VXD_PALETTE
     memcpy(palettes[1U - front], palettes[front], sizeof palettes[0]);
 #endif
@@ -46,7 +48,7 @@ void vxd_keep(void)
 #if VXD_READ || VXD_DIGEST
 uint32_t vxd_get(bool back, uint32_t index)
 {
-    const uint8_t *at = &pages[back ? 1U - front : front][index * BYTES];
+    const uint8_t *at = &(back ? back_page : pages[front])[index * BYTES];
     uint32_t value = 0;
 
     for (uint32_t i = 0; i < BYTES; i++) {

@@ -24,7 +24,7 @@ def voxdisplay(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 SET_UPS: list[tuple[Grid, str, frozenset[str], float]] = [
-    ((3, 5, 7), "index8", all_features("index8"), 100),
+    ((3, 5, 7), "index8", all_features("index8", ticks=True), 100),
     ((4, 4, 4), "mono1", all_features("mono1"), 0),
     ((300, 2, 2), "rgb565", all_features("rgb565"), 0),
     ((3, 5, 7), "rgb888", NONE, 0),

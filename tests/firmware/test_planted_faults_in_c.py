@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import c_device
 import document
 import pytest
-from c_device import TerminalDevice, all_features, build, device_of
+from c_device import HELLO, TerminalDevice, all_features, build, device_of
 
 pytestmark = pytest.mark.skipif(c_device.COMPILER is None, reason="no C compiler (cc)")
 
@@ -30,10 +30,10 @@ LOSS = "send_error(OVERRUN, 0, 0, 0);"
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault: the dialogue and the check that find it, and (file, text, text instead)."""
+    """A fault: the vector and the check that find it, and (file, text, text instead)."""
 
     name: str
-    dialogue: str
+    vector: str
     check: str
     edits: tuple[tuple[str, str, str], ...]
 
@@ -100,24 +100,95 @@ FAULTS = (
 )
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_a_fault_is_found(fault: Fault, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(c_device.FIRMWARE, tmp_path / "firmware")
+FADES, CHAINS, SLABS = "fades.c", "range_coded_chains.c", "range_coded_slabs.c"
+NEXT = "write_next"
+FAULTS_OF_OPS = (
+    Fault(
+        "the-first-voxel-of-a-chain-counts-again",
+        "fade-along-a-chain",
+        "7.9/fade-goes-on",
+        ((FADES, "if (d->fading && d->joined) {", "if (false) {"),),
+    ),
+    Fault(
+        "slabs-learn-as-chains-do",
+        "slabs-shell",
+        "7.11/slabs-surfaces",
+        ((SLABS, "{1, 1, 1, 2, 2, 2, 3}", "{1, 1, 2, 2, 3, 3, 4}"),),
+    ),
+    Fault(
+        "slabs-see-nothing-under-their-cells",
+        "slabs-shell",
+        "7.11/slabs-surfaces",
+        ((SLABS, "    look_under(box.slices[1], w, h);", "    (void)look_under;"),),
+    ),
+    Fault(
+        "a-near-start-is-near-the-origin",
+        "arc2-near-starts",
+        "7.10/arc2-starts",
+        ((CHAINS, "*morton += number(", "*morton = number("),),
+    ),
+    Fault(
+        "chains-stay-at-one-place-of-a-fade",
+        "arc2-fade-that-goes-on",
+        "7.10/arc2-fades",
+        (
+            (
+                CHAINS,
+                "    if (second) {\n        write_next",
+                "    if (false) {\n        write_next",
+            ),
+        ),
+    ),
+)
+MORE_FAULTS_OF_OPS = (
+    Fault(
+        "fades-round-down",
+        "fade-along-a-chain",
+        "7.9/fade-rounding",
+        ((FADES, " + b->span) / (2U", ") / (2U"),),
+    ),
+    Fault(
+        "slabs-of-any-number-of-cells",
+        "slabs-of-too-many-cells",
+        "7.11/slabs-too-many-cells",
+        ((SLABS, "if (w * h > cells_left) {", "if (false) {"),),
+    ),
+    Fault(
+        "a-box-goes-on-from-the-box-before",
+        "slabs-two-boxes",
+        "7.11/slabs-boxes",
+        ((SLABS, "        memset(&box, 0, sizeof box);\n", ""),),
+    ),
+    Fault(
+        "indices-of-more-than-30-bits",
+        "arc2-beyond-all-grids",
+        "7.10/arc2-outside",
+        ((CHAINS, "if (*morton >> 30) {", "if (false) {"),),
+    ),
+)
+
+
+def plant(fault: Fault, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let `build` compile a copy of the firmware that has the fault."""
+    shutil.copytree(c_device.FIRMWARE, folder / "firmware")
     for name, text, instead in fault.edits:
-        source = tmp_path / "firmware" / "core" / name
+        source = folder / "firmware" / "core" / name
         before = source.read_text()
         assert before.count(text) == 1
         source.write_text(before.replace(text, instead))
-    monkeypatch.setattr(c_device, "FIRMWARE", tmp_path / "firmware")
+    monkeypatch.setattr(c_device, "FIRMWARE", folder / "firmware")
     monkeypatch.setattr(c_device, "_built", {})
-    monkeypatch.setattr(c_device, "_directory", SimpleNamespace(name=str(tmp_path)))
+    monkeypatch.setattr(c_device, "_directory", SimpleNamespace(name=str(folder)))
 
-    (vector,) = (each for each in document.vectors("dialogue") if each.name == fault.dialogue)
-    with device_of(vector) as device, pytest.raises(AssertionError):
-        document.hold_dialogue(vector.lines, device)
 
-    program = build((3, 5, 7), "index8", all_features("index8"))
-    with TerminalDevice(program, refresh=50) as port:
+def vector_of(fault: Fault, *kinds: str) -> document.Vector:
+    every = (vector for kind in kinds for vector in document.vectors(kind))
+    (vector,) = (each for each in every if each.name == fault.vector)
+    return vector
+
+
+def assert_the_kit_finds(fault: Fault, program: Path, refresh: float) -> None:
+    with TerminalDevice(program, refresh=refresh) as port:
         words = ("conformance", "--port", port, "--no-reset", "--json", "--only", fault.check)
         done = subprocess.run(
             [sys.executable, "-m", "voxdisplay", *words],
@@ -128,3 +199,36 @@ def test_a_fault_is_found(fault: Fault, tmp_path: Path, monkeypatch: pytest.Monk
     assert done.returncode == 1, done.stderr
     (result,) = json.loads(done.stdout)["checks"]
     assert result["verdict"] == "broken"
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_is_found(fault: Fault, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plant(fault, tmp_path, monkeypatch)
+    vector = vector_of(fault, "dialogue")
+    with device_of(vector) as device, pytest.raises(AssertionError):
+        document.hold_dialogue(vector.lines, device)
+    assert_the_kit_finds(fault, build((3, 5, 7), "index8", all_features("index8")), 50)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        *FAULTS_OF_OPS,
+        *(pytest.param(fault, marks=pytest.mark.slow) for fault in MORE_FAULTS_OF_OPS),
+    ],
+    ids=lambda fault: fault.name,
+)
+def test_a_fault_of_an_op_is_found(
+    fault: Fault, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant(fault, tmp_path, monkeypatch)
+    vector = vector_of(fault, "ops", "refused")
+    with device_of(vector) as device:
+        device.send(HELLO)
+        (answer,) = device.send(bytes((0x15, 0, 0)) + vector.hex("ops"))
+    if vector.kind == "ops":
+        assert (answer[0], answer[16:20]) != (0x81, vector.integer("digest").to_bytes(4, "little"))
+    else:
+        code = document.literals()[f"CODE_{vector['code']}"]
+        assert (answer[0], answer[3]) != (0xB0, code)
+    assert_the_kit_finds(fault, build((19, 13, 11), "rgb888", all_features("rgb888")), 0)

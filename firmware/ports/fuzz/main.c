@@ -20,10 +20,8 @@ void vxd_send(uint8_t byte)
 
 static const struct vxd_identity identity = {1, 30000, "fuzz", "1", ""};
 
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count);
-
 /* One byte is a tick where two of FE follow each other; all others arrive. */
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count)
+static void feed(const uint8_t *bytes, size_t count)
 {
     vxd_start(&identity);
     for (size_t i = 0; i < count; i++) {
@@ -36,19 +34,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count)
             vxd_tick();
         }
     }
-    return 0;
-}
-
-#ifndef LIBFUZZER
-
-static uint32_t state = 1;
-
-static uint32_t random_number(uint32_t below)
-{
-    state ^= state << 13;
-    state ^= state >> 17;
-    state ^= state << 5;
-    return state % below;
 }
 
 static uint32_t check_value(const uint8_t *bytes, size_t count)
@@ -87,6 +72,61 @@ static size_t append(uint8_t *out, size_t at, uint8_t *bytes, size_t count)
     return at;
 }
 
+#ifdef LIBFUZZER
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count);
+
+/*
+ * An input that begins with an even byte arrives as it is; others are packets, each behind the
+ * number of its bytes, that get their check value here, which no fuzzer would find.
+ */
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count)
+{
+    static uint8_t wire[1 << 16];
+    uint8_t packet[300];
+    size_t size;
+
+    if (count == 0 || bytes[0] % 2U == 0) {
+        feed(bytes, count);
+        return 0;
+    }
+    memcpy(packet, "\x30\0\0\1\x17\x5A\0\0", 8);
+    size = append(wire, 0, packet, 8);
+    for (bytes++, count--; count > 1U && size < sizeof wire - 400U;) {
+        size_t length = bytes[0];
+
+        bytes++;
+        count--;
+        if (length > count) {
+            length = count;
+        }
+        memset(packet, 0, 3);
+        memcpy(packet, bytes, length);
+        bytes += length;
+        count -= length;
+        size = append(wire, size, packet, length < 3U ? 3U : length);
+        if (packet[1] % 8U == 7U) {
+            wire[size++] = 0xFE;
+            wire[size++] = 0xFE;
+            wire[size++] = 0;
+        }
+    }
+    feed(wire, size);
+    return 0;
+}
+
+#else
+
+static uint32_t state = 1;
+
+static uint32_t random_number(uint32_t below)
+{
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return state % below;
+}
+
 int main(int count, char **words)
 {
     static uint8_t wire[1 << 16];
@@ -104,7 +144,7 @@ int main(int count, char **words)
             size_t length = 3;
             uint32_t kind = random_number(16);
 
-            if (kind == 0 || size == 0) {
+            if (kind < 4U || size == 0) { /* often: a refusal ends the session */
                 memcpy(packet, "\x30\0\0\1\x17\x5A\0\0", 8);
                 length = 8;
                 number = frame = 0;
@@ -114,12 +154,12 @@ int main(int count, char **words)
                 packet[1] = (uint8_t)(number++ + (random_number(12) ? 0U : random_number(40)));
                 packet[2] = (uint8_t)frame;
                 frame += packet[0] >> 2 & 1U;
-                for (uint32_t n = random_number(260); n != 0; n--) {
+                for (uint32_t n = random_number(random_number(4) ? 24 : 260); n != 0; n--) {
                     packet[length++] =
                         (uint8_t)(random_number(3) ? random_number(8) : random_number(256));
                 }
                 if (random_number(4) == 0) {
-                    packet[3] = 0x58;
+                    packet[3] = (uint8_t)(0x58U + random_number(3));
                 }
             } else if (kind == 12U) {
                 packet[0] = 0x40;
@@ -140,11 +180,11 @@ int main(int count, char **words)
                 wire[size++] = 0xFE;
                 wire[size++] = 0;
             }
-            if (random_number(40) == 0) {
+            if (size > 20U && random_number(40) == 0) {
                 wire[size - 1U - random_number(20)] ^= (uint8_t)(1U << random_number(8));
             }
         }
-        LLVMFuzzerTestOneInput(wire, size);
+        feed(wire, size);
         done += (double)size;
     }
     printf("%.0f bytes in, %zu bytes out\n", done, sent);
