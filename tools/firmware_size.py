@@ -263,7 +263,15 @@ def count(sample: Sample) -> Count:
         sources += [ports / "memory.c", ports / "bench" / "main.c"]
         words = [*flags(), *macros(sample.features, sample.pixel_format), "-nostdlib"]
         script = ports / "mps2-an385" / "board.ld"
-        words += ["-I", str(FIRMWARE / "core"), "-I", name, f"-L{ports / 'cortex-m'}"]
+        words += [
+            "-I",
+            str(FIRMWARE / "core"),
+            "-I",
+            name,
+            "-I",
+            str(ports / "cortex-m"),
+            f"-L{ports / 'cortex-m'}",
+        ]
         program = folder / "bench.elf"
         run(TRIPLE + "gcc", *words, "-T", script, *sources, "-lgcc", "-o", program, cwd=folder)
         listing = run(TRIPLE + "objdump", "-d", "--no-show-raw-insn", program)

@@ -131,13 +131,7 @@ FAULTS_OF_OPS = (
         "chains-stay-at-one-place-of-a-fade",
         "arc2-fade-that-goes-on",
         "7.10/arc2-fades",
-        (
-            (
-                CHAINS,
-                "    if (second) {\n        write_next",
-                "    if (false) {\n        write_next",
-            ),
-        ),
+        ((CHAINS, f"if (second) {{\n        {NEXT}", f"if (second && false) {{\n        {NEXT}"),),
     ),
 )
 MORE_FAULTS_OF_OPS = (

@@ -166,9 +166,9 @@ static int run_terminal(uint32_t refresh)
         struct pollfd wait = {out_file, POLLIN, 0};
         double left = due - now();
         int timeout = refresh == 0 ? -1 : left <= 0 ? 0 : (int)(left * 1000) + 1;
-        uint8_t bytes[1024];
 
         if (poll(&wait, 1, timeout) > 0) {
+            uint8_t bytes[1024];
             ssize_t count = read(out_file, bytes, sizeof bytes);
 
             if (count < 0 && errno != EINTR) {
