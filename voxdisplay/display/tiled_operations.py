@@ -50,6 +50,7 @@ class TiledOperations:
 
     refresh_hz = 0.0  # see `TiledQueue`
     reconnects = 0  # one part that was gone does not move a player's time
+    max_hold_ticks = 0  # nor do parts hold frames: each would by ticks of its own
 
     def __init__(self, connection: TiledConnection, clock: Clock) -> None:
         self._connection = connection
