@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from voxdisplay.raster.display_list import DrawnVoxels, Kind
 from voxdisplay.raster.pixel_map import contains
-from voxdisplay.wire import range_coded_chains, slabs, sorted_chains, spans, spec, voxel_sets
+from voxdisplay.wire import spans, spec, voxel_sets
 from voxdisplay.wire.array_order import items_that_are_sets
 from voxdisplay.wire.chains import Chains, build_chains
 from voxdisplay.wire.fades import FADED, FadedRows
@@ -107,6 +107,8 @@ def _encode_values(
     index: Ints, update: PageUpdate, best: list[bytes], config: EncoderConfig
 ) -> tuple[list[bytes], Ints]:
     """Return voxels range-coded with their values, if that may be the shortest, and the others."""
+    from voxdisplay.wire import slabs  # noqa: PLC0415 - for slow lines
+
     values = update.pixels_at(index)
     lit = values > 0
     some, of_some = index[lit], values[lit]
@@ -127,6 +129,8 @@ def _encode_sets(update: PageUpdate, config: EncoderConfig) -> tuple[list[bytes]
 
     An op has one pen: of many values the most frequent are tried.
     """
+    from voxdisplay.wire import slabs  # noqa: PLC0415 - for slow lines
+
     index, values = update.unordered, update.pixels_at(update.unordered)
     if not config.has(spec.FEATURE_SLABS) or is_incompressible(index, values):
         return [], index
@@ -225,6 +229,8 @@ def _offer_range_coded(best: _BestLayout, drawn: DrawnVoxels, sets: float) -> No
     first, second = config.has(spec.FEATURE_ARC), config.has(spec.FEATURE_ARC2)
     if not (first or second) or not len(drawn):
         return
+    from voxdisplay.wire import range_coded_chains, sorted_chains  # noqa: PLC0415 - for slow lines
+
     drawn = _without_repeats(drawn)
     second &= not first or sorted_chains.may_gain(drawn, config)
     voxels = config.grid.voxels_at(drawn.index)
