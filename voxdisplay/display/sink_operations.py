@@ -100,14 +100,15 @@ class SinkQueue:
         """Have a copy of a frame sent when its turn comes, unless a newer one follows."""
         self._replace(frame.copy())
 
-    def start_unwaited(self, picture: Picture) -> int:
+    def start_unwaited(self, picture: Picture, hold_ticks: int = 0) -> int:
         """Have a frame sent when its turn comes, and return its ticket."""
+        del hold_ticks  # there are no ticks: always 0
         self._replace(self._decoded(picture))
         return self._ticket
 
-    def repeat(self, ticket: int, picture: Picture) -> int:
+    def repeat(self, ticket: int, picture: Picture, hold_ticks: int = 0) -> int:
         """Return the ticket of what is shown: there is no tick that would want a frame."""
-        del picture
+        del picture, hold_ticks
         return ticket
 
     def _replace(self, frame: Frame) -> None:

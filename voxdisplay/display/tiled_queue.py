@@ -119,14 +119,15 @@ class TiledQueue:
         self._pending = copy
         self.playback.note_presented()
 
-    def start_unwaited(self, picture: Picture) -> int:
+    def start_unwaited(self, picture: Picture, hold_ticks: int = 0) -> int:
         """Start a frame that nobody waits for at once, and return its ticket."""
+        del hold_ticks  # there are no ticks: always 0
         self.playback.note_presented()
         return self._start(self._decoded(picture))
 
-    def repeat(self, ticket: int, picture: Picture) -> int:
+    def repeat(self, ticket: int, picture: Picture, hold_ticks: int = 0) -> int:
         """Return the ticket of what is shown: no tick wants a frame."""
-        del picture
+        del picture, hold_ticks
         return ticket
 
     def start_pending(self) -> None:
