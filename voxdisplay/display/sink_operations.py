@@ -170,6 +170,7 @@ class SinkOperations:
 
     refresh_hz = 0.0
     reconnects = 0
+    max_hold_ticks = 0
 
     def __init__(
         self, connection: SinkConnection, clock: Clock, sleep: Callable[[float], None]
