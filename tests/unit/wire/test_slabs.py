@@ -240,7 +240,7 @@ def test_too_many_colours_are_not_tried(monkeypatch):
     monkeypatch.setattr(encoding_selection, "_MANY_PENS", 3)
     encode = slabs.encode_slabs
     monkeypatch.setattr(
-        encoding_selection.slabs,
+        slabs,
         "encode_slabs",
         lambda index, pen, config: tried.append(pen) or encode(index, pen, config),
     )
@@ -252,7 +252,7 @@ def test_what_is_nearly_dark_is_not_tried(monkeypatch):
     def encode(*_given):
         raise AssertionError
 
-    monkeypatch.setattr(encoding_selection.slabs, "encode_slabs", encode)
+    monkeypatch.setattr(slabs, "encode_slabs", encode)
     frame = Frame((256, 256, 256), "mono1")
     frame.draw(np.random.default_rng(3).integers(0, 256, (2000, 3)), "white")
     assert drawn(frame, (*SETS, "slabs")) == drawn(frame, SETS)
