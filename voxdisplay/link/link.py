@@ -162,10 +162,8 @@ class Link(LinkRequests):
 
     def _reopen(self, now: float) -> None:
         """Open a new session; frames of the backlog are sent again, in full."""
-        if self.info and self.info.has(spec.FEATURE_HOLD):  # HELLO waits behind held frames
-            self._timer.held_s = spec.LIMIT_MAX_HELD / 1000
         self._shown_ticket = 0
-        self.info = None
+        self.info = None  # and the timer goes on to allow for held frames, behind which HELLO waits
         self._sender.close_session()
         self._poll_now = self._status_requested
         self._timer.cancel_polls()
