@@ -76,8 +76,8 @@ def given_up_frame_stays(patch):
 
 @mutant("6/swap-reported", "6/waits-unchecked")
 def swap_not_reported(patch):
-    def tick(_, self):
-        if self.session and self.pending:
+    def tick(_, self, count=1):
+        if self.session and self.session.tick(count):
             self._swap(self.session)
             if self._deferred:
                 packet, self._deferred, self._deferred_bytes = self._deferred, b"", 0

@@ -252,6 +252,7 @@ def pen_not_reset(patch):
                 raise inner.error(spec.CODE_OP, "")
             self.ops[op](decoder, op & 31)
         self.pen = decoder._pen
+        return decoder.hold_ticks
 
     around(patch, op_decoder.OpDecoder, "draw", draw)
 
@@ -267,6 +268,7 @@ def cursor_not_reset(patch):
                 raise inner.error(spec.CODE_OP, "")
             self.ops[op](decoder, op & 31)
         page.cursor = decoder._cursor
+        return decoder.hold_ticks
 
     around(patch, op_decoder.OpDecoder, "draw", draw)
 

@@ -18,6 +18,7 @@ HIDDEN = {
     "ids-wrap-at-255": "takes 256 frames",
     "credit-lapses": "takes time",
     "session-lapses": "takes time",
+    "holds-without-ticks": "is another configuration of the emulator",
     "credit-of-twice-the-ring": "is another configuration of the emulator",
     "page-too-long": "how much of a READ a PAGE covers is the device's choice",
     "page-count-of-the-read": "how much of a READ a PAGE covers is the device's choice",

@@ -25,7 +25,7 @@ SESSION, RING, DECLARATIONS = "session.c", "ring.c", "internal.h"
 USED, OVERRUN = "uint32_t ring_used(void)", "bool ring_overrun(void)"
 CLEAR = "vxd_clear();\n    vxd_show();\n   "
 COUNT = "me.damaged++;\n   "
-LOSS = "send_error(OVERRUN, 0, 0, 0);"
+LOSS = "send_error(OVERRUN);"
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,13 @@ FAULTS = (
         "swaps-at-once-in-spite-of-the-refresh",
         "draw-and-prove",
         "6/swaps-at-a-tick",
-        ((SESSION, "if (me.self->refresh == 0) {", "if (true) {"),),
+        (
+            (
+                SESSION,
+                "if (me.self->refresh == 0) {\n                swap",
+                "if (true) {\n                swap",
+            ),
+        ),
     ),
     Fault(
         "hello-clears-the-page-and-keeps-the-digest",

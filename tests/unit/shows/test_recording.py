@@ -170,7 +170,7 @@ class TestWhole:
         every = set(EVERY_FEATURE)
         kept = {name: set(drawing_features(vd.PixelFormat(name), every)) for name in FORMATS}
         assert every - kept["index8"] == {"read", "digest", "hold"}
-        assert kept["index8"] - kept["mono1"] == {"diff", "palette", "fade"}
+        assert kept["index8"] - kept["mono1"] == {"diff", "palette", "fade", "values"}
         assert kept["index8"] - kept["rgb565"] == {"diff", "palette"}
 
     def test_times_are_computed_from_the_number(self):
