@@ -46,7 +46,7 @@ HOSTILE = [
     "sim:?refresh=nan", "sim-usb:?", "hwgrep://[", "nothing://", "COM3", "page.npy", "+5", "0x10",
 ]  # fmt: skip
 CODES = {0, 1, 2, 3, 4}
-ENDLESS = {"--loop"}  # a key or a signal ends it
+ENDLESS = {"--loop", "--watch"}  # a key or a signal ends it
 
 
 @pytest.fixture
