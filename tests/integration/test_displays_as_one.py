@@ -107,9 +107,6 @@ def test_one_that_is_killed_in_mid_frame_stops_no_other_and_comes_back(wall):
         assert receipt.digest == frame.digest()
         assert [part.reconnects for part in display.parts] == [0, 0, 1, 0]
         assert np.array_equal(display.read(), frame.array())
-        # The others did not wait for it.
-        times = [part.receipt.elapsed_s for part in receipt.parts]
-        assert max(times[:2] + times[3:]) < times[2]
     assert [note for note in notes if note.startswith("tile 2: ") and "is back after" in note]
 
 

@@ -335,5 +335,16 @@ def test_voxels_that_become_dark_are_coded_otherwise():
     assert np.array_equal(read.values, pixels[index])
 
 
+def test_what_is_nearly_dark_has_no_values(monkeypatch):
+    def encode(*_given):
+        raise AssertionError
+
+    monkeypatch.setattr(slabs, "encode_values_best", encode)
+    rng = np.random.default_rng(3)
+    frame = Frame((256, 256, 256), "index8")
+    frame.draw(rng.integers(0, 256, (2000, 3)), rng.integers(0, 256, (2000, 3)).astype(np.uint8))
+    assert drawn(frame, (*SETS, "values")) == drawn(frame, SETS)
+
+
 def test_a_fast_line_has_no_values():
     assert select_features(("line", "values"), 100_000) == ("line",)
