@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -106,23 +107,7 @@ _FPS: Final = 20.0  # of a film that turns once
     "be read leaves the last picture as it is.",
 )
 @quiet_option
-def preview(
-    *,
-    scene: str,
-    output: Path,
-    size_px: tuple[int, int],
-    view_angle: tuple[float, float] | None,
-    zoom: float | None,
-    size: Grid | None,
-    format_: str,
-    fit: Fit,
-    model: ModelOptions,
-    seconds: float,
-    fps: float | None,
-    at_s: float | None,
-    plain: bool,
-    watch: bool,
-) -> None:
+def preview(*, scene: str, watch: bool, **options: Any) -> None:
     """Draw SCENE, a JSON file or - for stdin, or a recording, as a display would show it.
 
     Needs the extra `view`: pip install 'voxdisplay[view]'.
@@ -133,12 +118,7 @@ def preview(
         raise click.UsageError("--watch: stdin cannot be followed; name a file")
     file = FollowedFile(scene)
 
-    def draw() -> None:
-        _draw(
-            scene, output, size_px=size_px, view_angle=view_angle, zoom=zoom, size=size,
-            format_=format_, fit=fit, model=model, seconds=seconds, fps=fps, at_s=at_s, plain=plain,
-        )  # fmt: skip
-
+    draw = partial(_draw, scene, **options)
     draw()
     if watch:
         note(f"{scene} is followed: Ctrl-C ends that")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from itertools import product
+from math import prod
 
 from voxdisplay.conformance import ops
 from voxdisplay.conformance.announced_device import AnnouncedDevice, Voxel
@@ -57,19 +58,37 @@ def ball_in(device: AnnouncedDevice, box: Box, rng: random.Random, *, hollow: bo
     return found
 
 
+def random_boxes(device: AnnouncedDevice, rng: random.Random, slabs: int) -> list[Box]:
+    """Return up to three random boxes that together have no more cells than the grid."""
+    boxes = [random_box(device, rng, 2, slabs) for _ in range(3)]
+    while sum(box.w * box.h * box.slabs for box in boxes) > prod(cells_of(device)):
+        boxes.pop()
+    return boxes
+
+
+def wide_box(device: AnnouncedDevice, widest: int) -> Box:
+    """Return a box of one slab on the last one of the grid, as wide as it may be."""
+    cells = cells_of(device)
+    total = prod(cells)
+    w = min(widest, total)
+    return Box((0, 0, cells[2] - 1), w, max(1, min(widest, total // w)), 1)
+
+
+def fewer_cells(boxes: list[Box]) -> list[Box]:
+    """Return boxes without the last slab, or without the last box, or half as wide a one."""
+    *rest, last = boxes
+    if last.slabs > 1:
+        return [*rest, Box(last.cell, last.w, last.h, last.slabs - 1)]
+    return rest or [Box(last.cell, max(1, last.w // 2), max(1, last.h // 2), 1)]
+
+
 def encode_fitting(device: AnnouncedDevice, voxels: set[Voxel], boxes: list[Box]) -> bytes:
     """Return a SLABS of the first of these boxes, or of fewer slabs, so that it fits a packet."""
     while True:
         op = encode(device, voxels, boxes)
         if len(op) <= device.max_payload - 8:
             return op
-        *rest, last = boxes
-        if last.slabs > 1:
-            boxes = [*rest, Box(last.cell, last.w, last.h, last.slabs - 1)]
-        elif rest:
-            boxes = rest
-        else:
-            boxes = [Box(last.cell, max(1, last.w // 2), max(1, last.h // 2), 1)]
+        boxes = fewer_cells(boxes)
 
 
 @check(
@@ -141,11 +160,8 @@ def slabs_solids(probe: Probe) -> None:
 )
 def slabs_boxes(probe: Probe) -> None:
     device, rng = probe.device, probe.rng
-    total = cells_of(device)[0] * cells_of(device)[1] * cells_of(device)[2]
     for _ in range(4):
-        boxes = [random_box(device, rng, 2, 2) for _ in range(3)]
-        while sum(box.w * box.h * box.slabs for box in boxes) > total:
-            boxes.pop()
+        boxes = random_boxes(device, rng, 2)
         voxels = set().union(*(ball_in(device, box, rng, hollow=True) for box in boxes))
         probe.show(ops.run(min(7, device.voxel_count)) + encode_fitting(device, voxels, boxes))
     sides = cells_of(device)
@@ -165,10 +181,7 @@ def slabs_boxes(probe: Probe) -> None:
 )
 def slabs_wide(probe: Probe) -> None:
     device = probe.device
-    cells = cells_of(device)
-    total = cells[0] * cells[1] * cells[2]
-    w = min(_WIDEST, total)
-    box = Box((0, 0, cells[2] - 1), w, max(1, min(_WIDEST, total // w)), 1)
+    box = wide_box(device, _WIDEST)
     lit = {place for place in ball_in(device, box, probe.rng, hollow=True) if sum(place) % 3}
     probe.show(encode_fitting(device, lit, [box]))
 

@@ -12,7 +12,10 @@ from voxdisplay.conformance.checks.range_coded_slabs import (
     ball_in,
     cells_of,
     few_cells,
+    fewer_cells,
     random_box,
+    random_boxes,
+    wide_box,
 )
 from voxdisplay.conformance.probe import Probe
 from voxdisplay.conformance.range_coded_slabs import Box
@@ -52,15 +55,10 @@ def encode_fitting(
         op = encode(device, pixels, boxes, switches)
         if len(op) <= device.max_payload - 8:
             return op
-        *rest, last = boxes
-        if last.slabs > 1:
-            boxes = [*rest, Box(last.cell, last.w, last.h, last.slabs - 1)]
-        elif rest:
-            boxes = rest
-        elif last.w * last.h > 1:
-            boxes = [Box(last.cell, max(1, last.w // 2), max(1, last.h // 2), 1)]
-        else:
+        fewer = fewer_cells(boxes)
+        if fewer == boxes:  # one cell
             pixels = dict(list(pixels.items())[: len(pixels) // 2])
+        boxes = fewer
 
 
 def show_bodies(
@@ -160,12 +158,8 @@ def values_weighted(probe: Probe) -> None:
 )
 def values_boxes(probe: Probe) -> None:
     device, rng = probe.device, probe.rng
-    cells = cells_of(device)
-    total = cells[0] * cells[1] * cells[2]
     for switches in (Switches(), Switches(copies=1), Switches(weights=_WEIGHTS)):
-        boxes = [random_box(device, rng, 2, 1) for _ in range(3)]
-        while sum(box.w * box.h * box.slabs for box in boxes) > total:
-            boxes.pop()
+        boxes = random_boxes(device, rng, 1)
         voxels = set().union(*(ball_in(device, box, rng, hollow=False) for box in boxes))
         pixels = gradient(device, voxels, rng, step=2, noise=2)
         probe.show(
@@ -182,10 +176,7 @@ def values_boxes(probe: Probe) -> None:
 )
 def values_wide(probe: Probe) -> None:
     device = probe.device
-    cells = cells_of(device)
-    total = cells[0] * cells[1] * cells[2]
-    w = min(_WIDEST, total)
-    box = Box((0, 0, cells[2] - 1), w, max(1, min(_WIDEST, total // w)), 1)
+    box = wide_box(device, _WIDEST)
     lit = {place for place in ball_in(device, box, probe.rng, hollow=True) if sum(place) % 3}
     pixels = gradient(device, lit, probe.rng, step=0.5)
     op = encode(device, pixels, [box], Switches(copies=1))
