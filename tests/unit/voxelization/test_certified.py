@@ -13,7 +13,7 @@ from space_curves import Function
 import voxdisplay as vd
 from voxdisplay.compute.kernel_backend import set_enabled
 from voxdisplay.curves import Transformed
-from voxdisplay.voxelization import measure, voxelize, voxelize_many
+from voxdisplay.voxelization import measure, thinning, voxelize, voxelize_many
 from voxdisplay.voxelization.certify import COVERAGE, END_ERROR, ERROR, Certificate, certify
 from voxdisplay.voxelization.restoring import restore_coverage
 from voxdisplay.voxelization.voxel_events import NO_HEADING, VoxelEvents
@@ -310,6 +310,22 @@ def test_what_thinning_took_is_put_back():
     assert isinstance(
         certify(thin.curve, *args, mended.voxels.T, mended.t, closed=False), Certificate
     )
+
+
+def test_a_sequence_without_its_tip_is_restored_before_it_is_certified(monkeypatch):
+    curve = vd.Parametric("t", "6*exp(-(t - 5)**2*4)", "2", t=(0, 10))
+    whole = voxelize(curve)
+
+    def thin(events, samples, *, keep_tips=False):
+        kept = thinning.thin_events(events, samples, keep_tips=keep_tips)
+        return kept.take(np.flatnonzero(kept.voxels[1] < 2))
+
+    module = sys.modules["voxdisplay.voxelization.digitise"]  # its function has the same name
+    monkeypatch.setattr(module, "thin_events", thin)
+    cut = voxelize(curve)
+    mended = voxelize(curve, certified=True)
+    assert len(cut) < len(whole) <= len(mended)
+    assert_proven(mended)
 
 
 def _events(sequence):
