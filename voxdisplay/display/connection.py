@@ -6,6 +6,7 @@ answers. Must not know pictures; what is to be sent is decided elsewhere.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -27,6 +28,7 @@ from voxdisplay.transport import Transport
 from voxdisplay.transport.capture import Capture
 
 MAX_WAIT_S: Final = 0.5  # of one exchange
+_WRITE_NOW_S: Final = 0.1
 # Assumed of a line without a known rate before the first ACK: what the handshake showed, from that
 # of 300 Bd, for a device may have had to start first, to that of 9600 Bd.
 _LEAST_BYTES_PER_S, _MOST_BYTES_PER_S = 30.0, 960.0
@@ -165,6 +167,16 @@ class Connection:
             if self.closed:  # by a signal handler, in the middle of the exchange
                 raise closed_meanwhile() from error
             self._wait_for_device(error)
+
+    def write_now(self) -> None:
+        """Write what may be written, in any thread while that of the connection does nothing.
+
+        It is meant for a packet on an idle line, and takes no longer than for that. What fails is
+        left to `pump`, which will meet it, too.
+        """
+        with contextlib.suppress(TransportError):
+            if out := self.link.transmit(self._clock()):
+                self._transport.write(out, min(self._timeout_s, _WRITE_NOW_S))
 
     @property
     def _not_wanted(self) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -38,6 +39,7 @@ from voxdisplay.wire.packet import Page
 from voxdisplay.wire.spans import decode_runs
 
 Progress: TypeAlias = Callable[[int, int], None]
+Hold: TypeAlias = Callable[[Callable[[], None]], None]
 # A page is compared by its lit voxels if no more than one of so many is lit.
 SPARSE_SHARE = 8
 
@@ -159,9 +161,7 @@ class DisplayOperations:
 
     # -- frames
 
-    def show(
-        self, frame: Frame, progress: Progress | None, hold: Callable[[], None] | None = None
-    ) -> Receipt:
+    def show(self, frame: Frame, progress: Progress | None, hold: Hold | None = None) -> Receipt:
         """Show a frame and compare the digest. See `Display.present`.
 
         Parameters
@@ -169,8 +169,8 @@ class DisplayOperations:
         frame, progress
             As of `Display.present`.
         hold : callable, optional
-            Called when the device has all of the frame but its COMMIT, which is sent when it
-            returns.
+            Called when the device has all of the frame but its COMMIT, with a function that sends
+            that, in any thread while this one waits. It returns when that was called.
 
         """
         began_s = self._clock()
@@ -180,8 +180,7 @@ class DisplayOperations:
         self.queue.playback.note_presented()
         if hold is not None:
             self._wait_until_held(ticket, progress)
-            hold()
-            self.release(ticket)
+            self.release(ticket, hold)
         digest = self.wait_until_shown(ticket, progress)
         repaired = None
         if digest is not None and digest != frame.digest():
@@ -213,10 +212,13 @@ class DisplayOperations:
         self._wait_until_held(ticket)
         return ticket
 
-    def release(self, ticket: int) -> None:
-        """Send the COMMIT of a held frame."""
+    def release(self, ticket: int, hold: Hold) -> None:
+        """Have the COMMIT of a held frame sent by `hold`: see `show`."""
+        hold(partial(self._commit, ticket))
+
+    def _commit(self, ticket: int) -> None:
         self.queue.release(ticket)
-        self.pump(wait=False)
+        self._connection.write_now()
 
     def _wait_until_held(self, ticket: int, progress: Progress | None = None) -> None:
         while self.queue.encoding:  # at its end, a frame without ops is held without any answer

@@ -7,6 +7,7 @@ not wait, read back, or know bytes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
@@ -46,11 +47,14 @@ class FrameQueue:
         Counts what is presented, shown and dropped.
     on_shown : callable
         Called with ticket and time when a frame is displayed that nobody waits for.
+    shown_s : float
+        When the device reported last that it displays a frame.
 
     """
 
     def __init__(self, connection: Connection) -> None:
         self.frames = 0
+        self.shown_s = -math.inf
         self.playback = PlaybackMeter()
         self.on_shown: Callable[[int, float], None] = _ignore_shown
         self._connection = connection
@@ -317,6 +321,7 @@ class FrameQueue:
             If nobody waited for it, and the digest differs for the second time in a row.
 
         """
+        self.shown_s = now
         if ticket in self._unwaited:
             self._note_unwaited_shown(ticket, digest, now)
         else:

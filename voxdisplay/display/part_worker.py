@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from voxdisplay.display.connection import Clock
 from voxdisplay.display.handshake import closed_meanwhile
+from voxdisplay.display.tick_phase import TickPhase
 from voxdisplay.errors import (
     LocalProtocolError,
     TransportClosed,
@@ -68,8 +69,8 @@ class PartWorker:
         What a streamed frame has raised besides, until somebody takes it away.
     shown_number : int
         Of the streamed frame displayed last.
-    shown_s : float
-        When a frame was displayed last, on the clock.
+    tick_phase : TickPhase or None
+        When its device ticks; None if it has no ticks.
 
     """
 
@@ -85,7 +86,7 @@ class PartWorker:
         self.lost: TransportError | None = None
         self.fault: Exception | None = None
         self.shown_number = 0
-        self.shown_s = 0.0
+        self.tick_phase: TickPhase | None = None
         self._opener, self._clock, self._wake = opener, clock, wake
         self._changed = threading.Condition()
         self._calls: deque[tuple[Callable[[], None], Future[Any]]] = deque()
@@ -125,6 +126,11 @@ class PartWorker:
         return page if output is None else output.to_user(page)
 
     @property
+    def shown_s(self) -> float:
+        """When its device reported last that it displays a frame, on the clock."""
+        return self.display._operations.queue.shown_s  # noqa: SLF001 - as above
+
+    @property
     def is_present(self) -> bool:
         """True unless its device is gone: waited for, or lost for ever."""
         return self.lost is None and not self._connection.is_away
@@ -152,7 +158,6 @@ class PartWorker:
                 self._note_error(error)
                 future.set_exception(error)
             else:
-                self.shown_s = self._clock()
                 future.set_result(result)
             self._wake()
 
@@ -186,7 +191,8 @@ class PartWorker:
 
         def work(operations: DisplayOperations) -> None:
             self.is_cancelled = False
-            operations.blank(timeout_s)
+            operations.blank(timeout_s)  # by a queue of its own
+            operations.queue.on_shown = self._note_shown
 
         self.cancel()
         return self.call(work)
@@ -207,9 +213,11 @@ class PartWorker:
             self.opened.set_exception(error)
             self._wake()
             return
+        if refresh_hz := display.info.refresh_hz:
+            self.tick_phase = TickPhase(refresh_hz)
+        display._operations.queue.on_shown = self._note_shown  # noqa: SLF001 - as above
         self.opened.set_result(display)
         self._wake()
-        display._operations.queue.on_shown = self._note_shown  # noqa: SLF001 - as above
         while (work := self._next_work()) is not None:
             work()
         display.close(flush=False)
@@ -257,13 +265,18 @@ class PartWorker:
     def _start(self, operations: DisplayOperations, streamed: _Streamed) -> None:
         ticket = operations.start_held(streamed.frame)
         self._numbers[ticket] = streamed.number
-        streamed.barrier.wait(self)
-        operations.release(ticket)
+        operations.release(ticket, lambda commit: streamed.barrier.wait(self, commit))
+
+    def note_swap(self) -> None:
+        """Record that its device has reported a swap."""
+        if self.tick_phase:
+            self.tick_phase.note_swap(self.shown_s)
 
     def _note_shown(self, ticket: int, now: float) -> None:
+        del now
         for started in [each for each in self._numbers if each <= ticket]:
             self.shown_number = max(self.shown_number, self._numbers.pop(started))
-        self.shown_s = now
+        self.note_swap()
         self._wake()
 
     def _note_error(self, error: BaseException, *, streamed: bool = False) -> None:

@@ -19,7 +19,7 @@ from voxdisplay.shows.show import EncodedFrame
 from voxdisplay.wire.op_decoder import decode_ops
 
 if TYPE_CHECKING:
-    from voxdisplay.display.display_operations import Progress
+    from voxdisplay.display.display_operations import Hold, Progress
     from voxdisplay.display.frame_queue import Picture
     from voxdisplay.display.sink_connection import SinkConnection
 
@@ -42,6 +42,8 @@ class SinkQueue:
     playback : PlaybackMeter
     on_shown : callable
         Called with ticket and time when a frame was sent that nobody waits for.
+    shown_s : float
+        When a frame was sent last.
     displayed : Frame or None
         That which was sent last.
 
@@ -55,6 +57,7 @@ class SinkQueue:
         self.frames = 0
         self.playback = PlaybackMeter()
         self.on_shown: Callable[[int, float], None] = lambda _ticket, _now: None
+        self.shown_s = -math.inf
         self.displayed: Frame | None = None
         self.info = connection.info
         self._clock = clock
@@ -145,7 +148,7 @@ class SinkQueue:
         # From when it was due, if that was just now: late wake-ups do not add up.
         is_late = began_s - self._due_s > self._period_s / 2
         self._due_s = (began_s if is_late else self._due_s) + self._period_s
-        now = self._clock()
+        self.shown_s = now = self._clock()
         self.displayed = frame
         self.frames += 1
         self.playback.note_shown(1, now)
@@ -223,15 +226,13 @@ class SinkOperations:
             self.pump(within_s=min(left_s, MAX_WAIT_S))
         return True
 
-    def show(
-        self, frame: Frame, progress: Progress | None, hold: Callable[[], None] | None = None
-    ) -> Receipt:
+    def show(self, frame: Frame, progress: Progress | None, hold: Hold | None = None) -> Receipt:
         """Send a frame as soon as the sink's rate allows. See `DisplayOperations.show`."""
         began_s = self._clock()
         while (left_s := self.queue.left_s) > 0:
             self._sleep(left_s)
         if hold is not None:
-            hold()
+            hold(_nothing)
         frame = frame.copy()
         self.queue.playback.note_presented()
         packets, wire_bytes = self._send(frame, waited=True)
@@ -252,8 +253,9 @@ class SinkOperations:
         self._held = frame
         return self.queue.next_ticket
 
-    def release(self, ticket: int) -> None:
-        """Send the frame that was kept when the sink's rate allows."""
+    def release(self, ticket: int, hold: Hold) -> None:
+        """Send the frame that was kept when `hold` returns and the sink's rate allows."""
+        hold(_nothing)  # it may take long to send: that is not for the threads of others
         frame, self._held = self._held, None
         if frame is not None and ticket == self.queue.next_ticket:
             self.queue.start_unwaited(frame)
@@ -298,3 +300,7 @@ class SinkOperations:
         self.queue.drop_pending()
         info = self.queue.info
         self._send(Frame(info.grid, info.format), waited=True)
+
+
+def _nothing() -> None:
+    pass

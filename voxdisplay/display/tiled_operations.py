@@ -24,7 +24,7 @@ from voxdisplay.errors import TransportError, TransportTimeout, VoxDisplayError
 from voxdisplay.frame import Frame
 
 if TYPE_CHECKING:
-    from voxdisplay.display.display_operations import DisplayOperations, Progress
+    from voxdisplay.display.display_operations import DisplayOperations, Hold, Progress
     from voxdisplay.display.tiled_connection import TiledConnection
     from voxdisplay.raster.pixel_format import Pixels
 
@@ -185,13 +185,14 @@ class TiledOperations:
     # -- frames
 
     def show(
-        self, frame: Frame, progress: Progress | None, hold: Callable[[], None] | None = None
+        self, frame: Frame, progress: Progress | None, hold: Hold | None = None
     ) -> TiledReceipt:
         """Show a frame on all parts together, and compare their digests. See `Display.present`.
 
         A part that is lost, or was before, is left out; one that is waited for delays the return,
         and not the others.
         """
+        del hold  # the parts hold it: a display that is made of parts is itself none
         began_s = self._clock()
         frame = frame.copy()
         shares = {id(worker): worker.cut(frame) for worker in self._workers}
@@ -202,13 +203,13 @@ class TiledOperations:
             def step(done: int, total: int) -> None:
                 steps[id(worker)] = done, total
 
-            def wait() -> None:
-                barrier.wait(worker)
-                if hold is not None:
-                    hold()
+            def wait(commit: Callable[[], None]) -> None:
+                barrier.wait(worker, commit)
 
             try:
-                return operations.show(shares[id(worker)], step, wait)
+                receipt = operations.show(shares[id(worker)], step, wait)
+                worker.note_swap()
+                return receipt
             finally:
                 barrier.leave(worker)
 
