@@ -16,7 +16,7 @@ import numpy as np
 
 from voxdisplay.display.connection import MAX_WAIT_S, Clock, Connection, Reconnected
 from voxdisplay.display.device_info import device_error
-from voxdisplay.display.frame_queue import FrameQueue
+from voxdisplay.display.frame_queue import FrameQueue, Payloads
 from voxdisplay.display.receipt import (
     WRONG_TWICE_HINT,
     Receipt,
@@ -40,6 +40,7 @@ from voxdisplay.wire.spans import decode_runs
 
 Progress: TypeAlias = Callable[[int, int], None]
 Hold: TypeAlias = Callable[[Callable[[], None]], None]
+Work: TypeAlias = Callable[[], bool]
 # A page is compared by its lit voxels if no more than one of so many is lit.
 SPARSE_SHARE = 8
 
@@ -199,18 +200,29 @@ class DisplayOperations:
             repaired=repaired,
         )
 
-    def start_held(self, frame: Frame) -> int:
+    def start_held(
+        self, frame: Frame, payloads: Payloads | None = None, work: Work | None = None
+    ) -> int:
         """Start a frame that nobody waits for; return its ticket when only its COMMIT is left.
 
         Parameters
         ----------
         frame : Frame
             It must not change.
+        payloads : iterator of list of bytes, optional
+            From `encode`, as far as it was encoded before.
+        work : callable, optional
+            Called while the frame is on its way, for a few milliseconds of work on another one;
+            returns whether there was any.
 
         """
-        ticket = self.queue.start_unwaited(frame, held=True)
-        self._wait_until_held(ticket)
+        ticket = self.queue.start_unwaited(frame, held=True, payloads=payloads)
+        self._wait_until_held(ticket, work=work)
         return ticket
+
+    def encode(self, frame: Frame) -> Payloads:
+        """Return an iterator that encodes a frame in portions, for `start_held`."""
+        return self.queue.iter_payloads(frame)
 
     def release(self, ticket: int, hold: Hold) -> None:
         """Have the COMMIT of a held frame sent by `hold`: see `show`."""
@@ -220,12 +232,14 @@ class DisplayOperations:
         self.queue.release(ticket)
         self._connection.write_now()
 
-    def _wait_until_held(self, ticket: int, progress: Progress | None = None) -> None:
+    def _wait_until_held(
+        self, ticket: int, progress: Progress | None = None, work: Work | None = None
+    ) -> None:
         while self.queue.encoding:  # at its end, a frame without ops is held without any answer
             self.pump(wait=False)
         link, total = self._connection.link, 1
         while not self.queue.is_held(ticket):
-            self.pump()
+            self.pump(wait=work is None or not work())
             total = max(total, link.payload_count)
             if progress:
                 progress(total - link.unacknowledged_payloads, total)

@@ -29,6 +29,7 @@ _MAX_UNSHOWN = 2
 _NO_PICTURE: PictureId = (0, 0)  # is never displayed
 
 Picture: TypeAlias = Frame | EncodedFrame
+Payloads: TypeAlias = Iterator[list[bytes]]
 
 
 class FrameQueue:
@@ -71,7 +72,9 @@ class FrameQueue:
 
     # -- in
 
-    def enqueue(self, frame: Picture, *, held: bool = False) -> int:
+    def enqueue(
+        self, frame: Picture, *, held: bool = False, payloads: Payloads | None = None
+    ) -> int:
         """Start a frame and return its ticket.
 
         It is sent in full, or as its difference from what is displayed, whichever is shorter. It
@@ -83,10 +86,12 @@ class FrameQueue:
         held : bool
             Whether the device gets all of it but the COMMIT, in an empty packet, which waits for
             `release`. No other frame may be started before.
+        payloads : iterator of list of bytes, optional
+            From `iter_payloads`, of a held frame.
 
         """
         if held:
-            return self._enqueue_held(frame)
+            return self._enqueue_held(frame, payloads)
         if isinstance(frame, EncodedFrame):
             return self._link.present(list(frame.payloads))
         link, displayed = self._link, self.displayed
@@ -94,37 +99,37 @@ class FrameQueue:
             full_payloads = cache(partial(self.payloads, frame))
             lit = len(frame.lit()[0])
             if 2 * len(frame.changed_indices(displayed)) < lit:
-                payloads = frame.difference(displayed, link.payload_bytes, self._features)
-                size = sum(map(len, payloads))
+                changes = frame.difference(displayed, link.payload_bytes, self._features)
+                size = sum(map(len, changes))
                 if size * _LIT_PER_DIFFERENCE_BYTE < lit or size < sum(map(len, full_payloads())):
-                    return link.present_difference(link.displayed, payloads, full_payloads)
+                    return link.present_difference(link.displayed, changes, full_payloads)
                 return link.present(full_payloads())
         ticket = link.open_frame()
-        coded = frame.iter_payloads(link.payload_bytes, self._features, self._bytes_per_s)
-        self._encoder = _Encoder(ticket, coded)
+        self._encoder = _Encoder(ticket, self.iter_payloads(frame))
         return ticket
 
-    def _enqueue_held(self, frame: Picture) -> int:
+    def _enqueue_held(self, frame: Picture, payloads: Payloads | None) -> int:
         link, displayed = self._link, self.displayed
-        if isinstance(frame, Frame) and displayed and not link.backlog:
+        if payloads is None and isinstance(frame, Frame) and displayed and not link.backlog:
             changed, lit = len(frame.changed_indices(displayed)), len(frame.lit()[0])
             if 2 * changed < lit:
-                payloads = frame.difference(displayed, link.payload_bytes, self._features)
+                changes = frame.difference(displayed, link.payload_bytes, self._features)
                 self._held = link.present_difference(
                     link.displayed,
-                    [*payloads, b""],
+                    [*changes, b""],
                     lambda: [*self.payloads(frame), b""],
                     held=True,
                 )
                 return self._held
         self._held = link.open_frame()
-        coded = (
-            iter([list(frame.payloads)])
-            if isinstance(frame, EncodedFrame)
-            else frame.iter_payloads(link.payload_bytes, self._features, self._bytes_per_s)
-        )
-        self._encoder = _Encoder(self._held, coded)
+        self._encoder = _Encoder(self._held, payloads or self.iter_payloads(frame))
         return self._held
+
+    def iter_payloads(self, frame: Picture) -> Payloads:
+        """Return an iterator that encodes a frame for this device and its line, in portions."""
+        if isinstance(frame, EncodedFrame):
+            return iter([list(frame.payloads)])
+        return frame.iter_payloads(*self.encoding_for)
 
     def is_held(self, ticket: int) -> bool:
         """Return whether the device has all of a held frame, and would show it on COMMIT."""
@@ -144,7 +149,14 @@ class FrameQueue:
         self._pending = copy
         self.playback.note_presented()
 
-    def start_unwaited(self, picture: Picture, hold_ticks: int = 0, *, held: bool = False) -> int:
+    def start_unwaited(
+        self,
+        picture: Picture,
+        hold_ticks: int = 0,
+        *,
+        held: bool = False,
+        payloads: Payloads | None = None,
+    ) -> int:
         """Start a frame that nobody waits for at once, and return its ticket.
 
         Parameters
@@ -153,11 +165,11 @@ class FrameQueue:
         hold_ticks : int
             For how many refresh ticks the frame before it stays on display, if the device has the
             feature HOLD.
-        held : bool
+        held, payloads
             As of `enqueue`.
 
         """
-        ticket = self.enqueue(picture, held=held)
+        ticket = self.enqueue(picture, held=held, payloads=payloads)
         self._link.hold(hold_ticks)
         self._unwaited[ticket] = picture
         self.playback.note_presented()
@@ -384,4 +396,4 @@ class _Encoder:
     """Frame that is being encoded: the link's ticket, and the payloads as they get ready."""
 
     ticket: int
-    payloads: Iterator[list[bytes]]
+    payloads: Payloads

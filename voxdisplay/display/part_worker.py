@@ -10,7 +10,8 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from voxdisplay.display.connection import Clock
@@ -26,6 +27,7 @@ from voxdisplay.errors import (
 if TYPE_CHECKING:
     from voxdisplay.display.display import Display
     from voxdisplay.display.display_operations import DisplayOperations
+    from voxdisplay.display.frame_queue import Payloads
     from voxdisplay.display.part_profile import PartProfile
     from voxdisplay.display.playback_counts import Playback
     from voxdisplay.display.swap_barrier import SwapBarrier
@@ -37,13 +39,32 @@ _PUMP_S: Final = 0.01  # after which new work is begun
 _JOIN_S: Final = 2.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Streamed:
-    """A frame that nobody waits for: the part's share, and its number in the whole display."""
+    """A frame that nobody waits for: the part's share, and its number in the whole display.
+
+    It is encoded while the frame before it is on its way: then a line has no pauses.
+    """
 
     frame: Frame
     number: int
     barrier: SwapBarrier
+    encoded: list[list[bytes]] = field(default_factory=list)
+    rest: Payloads | None = None  # that is still being encoded; None before it is begun
+
+    def encode(self, operations: DisplayOperations) -> bool:
+        """Encode a portion; return False if there is none left."""
+        if self.rest is None:
+            self.rest = operations.encode(self.frame)
+        portion = next(self.rest, None)
+        if portion is not None:
+            self.encoded.append(portion)
+        return portion is not None
+
+    @property
+    def payloads(self) -> Payloads | None:
+        """All of its payloads; None if none are encoded yet."""
+        return None if self.rest is None else chain(self.encoded, self.rest)
 
 
 class PartWorker:
@@ -263,9 +284,15 @@ class PartWorker:
             self._wake()
 
     def _start(self, operations: DisplayOperations, streamed: _Streamed) -> None:
-        ticket = operations.start_held(streamed.frame)
+        ticket = operations.start_held(
+            streamed.frame, streamed.payloads, lambda: self._encode_next(operations)
+        )
         self._numbers[ticket] = streamed.number
         operations.release(ticket, lambda commit: streamed.barrier.wait(self, commit))
+
+    def _encode_next(self, operations: DisplayOperations) -> bool:
+        following = self._streamed
+        return following is not None and following.encode(operations)
 
     def note_swap(self) -> None:
         """Record that its device has reported a swap."""

@@ -19,8 +19,8 @@ from voxdisplay.shows.show import EncodedFrame
 from voxdisplay.wire.op_decoder import decode_ops
 
 if TYPE_CHECKING:
-    from voxdisplay.display.display_operations import Hold, Progress
-    from voxdisplay.display.frame_queue import Picture
+    from voxdisplay.display.display_operations import Hold, Progress, Work
+    from voxdisplay.display.frame_queue import Payloads, Picture
     from voxdisplay.display.sink_connection import SinkConnection
 
 _EARLY_S: Final = 1e-3  # by which clocks and sleeps may be inexact
@@ -248,10 +248,18 @@ class SinkOperations:
             digest=None,
         )
 
-    def start_held(self, frame: Frame) -> int:
+    def start_held(
+        self, frame: Frame, payloads: Payloads | None = None, work: Work | None = None
+    ) -> int:
         """Keep a frame until `release`, and return its ticket."""
+        del payloads, work
         self._held = frame
         return self.queue.next_ticket
+
+    def encode(self, frame: Frame) -> Payloads:
+        """Return an empty iterator: there are no packets of protocol.md."""
+        del frame
+        return iter(())
 
     def release(self, ticket: int, hold: Hold) -> None:
         """Send the frame that was kept when `hold` returns and the sink's rate allows."""

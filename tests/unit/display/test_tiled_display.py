@@ -86,6 +86,29 @@ def test_unwaited_frames_are_shown_and_the_last_one_stays():
         assert np.array_equal(shown.read(), frame.array())
 
 
+def test_a_frame_is_encoded_while_the_one_before_it_is_on_its_way():
+    with vd.open(display=wall(refresh=120)) as shown:
+        operations = shown._tiles.workers[1].display._operations
+        start, encoded_before = operations.start_held, []
+
+        def start_held(frame, payloads, work):
+            encoded_before.append(payloads is not None)
+            return start(frame, payloads, work)
+
+        operations.start_held = start_held
+        for number in range(300):
+            frame = drawn(shown.frame())
+            frame.draw([[number % 8, 4, 2]], "white")
+            shown.present(frame, wait=False)
+            shown.wait_until(shown._clock() + 0.002)
+            if any(encoded_before):
+                break
+        assert any(encoded_before)
+        shown.flush()
+        assert shown.playback.wrong == 0
+        assert np.array_equal(shown.verify(frame), frame.array())
+
+
 def test_a_show_is_played():
     scene = vd.read_scene(
         '{"size": [8, 5, 7], "duration": 0.2, "fps": 20, "objects": [{"type": "segment", '
