@@ -6,7 +6,6 @@ them: neither threads nor closing.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -16,6 +15,7 @@ import numpy as np
 
 from voxdisplay.display.connection import MAX_WAIT_S, Clock, Connection, Reconnected
 from voxdisplay.display.device_info import device_error
+from voxdisplay.display.flushing import Flushing
 from voxdisplay.display.frame_queue import FrameQueue, Payloads
 from voxdisplay.display.receipt import (
     WRONG_TWICE_HINT,
@@ -23,7 +23,7 @@ from voxdisplay.display.receipt import (
     describe_difference,
     describe_wrong_digest,
 )
-from voxdisplay.errors import DesyncError, IncompatibleDevice, TransportTimeout
+from voxdisplay.errors import DesyncError, IncompatibleDevice
 from voxdisplay.frame import Frame
 from voxdisplay.link import (
     Event,
@@ -45,7 +45,7 @@ Work: TypeAlias = Callable[[], bool]
 SPARSE_SHARE = 8
 
 
-class DisplayOperations:
+class DisplayOperations(Flushing):
     """Blocking operations on one connection.
 
     Parameters
@@ -59,6 +59,8 @@ class DisplayOperations:
     queue : FrameQueue
 
     """
+
+    queue: FrameQueue
 
     def __init__(self, connection: Connection, clock: Clock) -> None:
         self.queue = FrameQueue(connection)
@@ -132,33 +134,6 @@ class DisplayOperations:
             case PacketRefused(error):
                 self.queue.note_refusal()
                 raise device_error(error)
-
-    def flush(self, timeout_s: float = math.inf) -> None:
-        """Wait until no frame is queued.
-
-        Raises
-        ------
-        TransportTimeout
-            If that takes longer than ``timeout_s``.
-
-        """
-        deadline_s = self._clock() + timeout_s
-        while self.queue.busy:
-            if (left_s := deadline_s - self._clock()) <= 0:
-                raise TransportTimeout(
-                    f"the last frame was not shown within {timeout_s:g} s",
-                    hint="it is still on its way: call flush again, or allow more time",
-                )
-            self.pump(within_s=min(left_s, MAX_WAIT_S))
-
-    def flush_unwaited(self, timeout_s: float) -> bool:
-        """Wait until no frame is queued that nobody waits for; return whether that was in time."""
-        deadline_s = self._clock() + timeout_s
-        while self.queue.has_unwaited:
-            if self._clock() >= deadline_s:
-                return False
-            self.pump()
-        return True
 
     # -- frames
 

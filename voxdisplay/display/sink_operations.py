@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from voxdisplay.display.connection import MAX_WAIT_S, Clock
+from voxdisplay.display.flushing import Flushing
 from voxdisplay.display.playback_counts import PlaybackMeter
 from voxdisplay.display.receipt import Receipt
-from voxdisplay.errors import IncompatibleDevice, TransportTimeout
+from voxdisplay.errors import IncompatibleDevice
 from voxdisplay.frame import Frame
 from voxdisplay.shows.show import EncodedFrame
 from voxdisplay.wire.op_decoder import decode_ops
@@ -156,7 +157,7 @@ class SinkQueue:
             self.on_shown(self._ticket, now)
 
 
-class SinkOperations:
+class SinkOperations(Flushing):
     """Operations on one sink.
 
     Parameters
@@ -174,6 +175,8 @@ class SinkOperations:
     refresh_hz = 0.0
     reconnects = 0
     max_hold_ticks = 0
+
+    queue: SinkQueue
 
     def __init__(
         self, connection: SinkConnection, clock: Clock, sleep: Callable[[float], None]
@@ -201,30 +204,6 @@ class SinkOperations:
     def send_encoded(self) -> None:
         """Send the frame that waits, if it is due."""
         self.pump(wait=False)
-
-    def flush(self, timeout_s: float = math.inf) -> None:
-        """Wait until no frame waits to be sent.
-
-        Raises
-        ------
-        TransportTimeout
-            If that takes longer than ``timeout_s``.
-
-        """
-        if not self.flush_unwaited(timeout_s):
-            raise TransportTimeout(
-                f"the last frame was not sent within {timeout_s:g} s",
-                hint="call flush again, or allow more time",
-            )
-
-    def flush_unwaited(self, timeout_s: float) -> bool:
-        """Wait until no frame waits to be sent; return whether that was in time."""
-        deadline_s = self._clock() + timeout_s
-        while self.queue.has_unwaited:
-            if (left_s := deadline_s - self._clock()) <= 0:
-                return False
-            self.pump(within_s=min(left_s, MAX_WAIT_S))
-        return True
 
     def show(self, frame: Frame, progress: Progress | None, hold: Hold | None = None) -> Receipt:
         """Send a frame as soon as the sink's rate allows. See `DisplayOperations.show`."""

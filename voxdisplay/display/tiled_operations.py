@@ -7,7 +7,6 @@ COMMIT, and when all that are present hold it, all get that. Must not know how a
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -15,12 +14,13 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 
 from voxdisplay.display.connection import MAX_WAIT_S, Clock
+from voxdisplay.display.flushing import Flushing
 from voxdisplay.display.part_worker import PartWorker, named_error
 from voxdisplay.display.receipt import Receipt, describe_difference
 from voxdisplay.display.swap_barrier import SwapBarrier
 from voxdisplay.display.tiled_queue import TiledQueue
 from voxdisplay.display.tiled_receipt import PartReceipt, TiledReceipt, sum_receipts
-from voxdisplay.errors import TransportError, TransportTimeout, VoxDisplayError
+from voxdisplay.errors import TransportError, VoxDisplayError
 from voxdisplay.frame import Frame
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _WAIT_S: Final = 0.1  # after which progress is told, and an interrupt is notice
 _BLANK_S: Final = 5.0
 
 
-class TiledOperations:
+class TiledOperations(Flushing):
     """Operations on all parts together.
 
     Parameters
@@ -48,9 +48,12 @@ class TiledOperations:
 
     """
 
+    longest_wait_s = _WAIT_S
     refresh_hz = 0.0  # see `TiledQueue`
     reconnects = 0  # one part that was gone does not move a player's time
     max_hold_ticks = 0  # nor do parts hold frames: each would by ticks of its own
+
+    queue: TiledQueue
 
     def __init__(self, connection: TiledConnection, clock: Clock) -> None:
         self._connection = connection
@@ -106,30 +109,6 @@ class TiledOperations:
     def send_encoded(self) -> None:
         """Start the frame that waits, if its turn has come."""
         self.pump(wait=False)
-
-    def flush(self, timeout_s: float = math.inf) -> None:
-        """Wait until all parts that are present show all frames that were handed over.
-
-        Raises
-        ------
-        TransportTimeout
-            If that takes longer than ``timeout_s``.
-
-        """
-        if not self.flush_unwaited(timeout_s):
-            raise TransportTimeout(
-                f"the last frame was not shown within {timeout_s:g} s",
-                hint="it is still on its way: call flush again, or allow more time",
-            )
-
-    def flush_unwaited(self, timeout_s: float) -> bool:
-        """Wait for that, and return whether it was in time."""
-        deadline_s = self._clock() + timeout_s
-        while self.queue.has_unwaited:
-            if (left_s := deadline_s - self._clock()) <= 0:
-                return False
-            self.pump(within_s=min(left_s, _WAIT_S))
-        return True
 
     def _all(
         self,
