@@ -7,6 +7,7 @@ import pytest
 from light_receivers import UdpReceiver
 
 from voxdisplay.cli.main import main
+from voxdisplay.shows.recording import Recording
 
 SCENE = """{"size": [8, 5, 7], "duration": 0.2, "fps": 20, "objects":
   [{"type": "segment", "from": [0, 0, 0], "to": [7.9, 4.9, "6.9 - time"], "color": "red"}]}"""
@@ -33,7 +34,12 @@ def command(tmp_path, capsys, monkeypatch):
     def run(name, *options, parts=(LEFT, RIGHT), **keys):
         profile = tmp_path / "wall.toml"
         profile.write_text(toml(*parts, **keys))
-        scene = [str(tmp_path / "scene.json")] if name in {"push", "play"} else []
+        scene = (
+            [str(tmp_path / "scene.json")]
+            if name in {"push", "play", "record"}
+            and not (options and str(options[0]).endswith(".vxs"))
+            else []
+        )
         code = main([name, *scene, "--display", str(profile), *map(str, options)])
         captured = capsys.readouterr()
         return code, captured.out, captured.err
@@ -139,6 +145,27 @@ def test_axes_are_not_asked_of_the_whole(command, tmp_path):
     command("info")
     assert main(["test-pattern", "--ask", str(tmp_path / "wall.toml")]) == 2
     assert "[[parts]]" in (tmp_path / "wall.toml").read_text()
+
+
+def test_axes_are_not_asked_of_parts_for_another_profile(command, tmp_path):
+    code, _, err = command("test-pattern", "--ask", tmp_path / "new.toml")
+    assert code == 2
+    assert "this display is made of parts: ask of each with --port" in err
+    assert not (tmp_path / "new.toml").exists()
+
+
+def test_a_recording_is_made_for_the_whole_and_played_on_it(command, tmp_path):
+    recording = tmp_path / "day.vxs"
+    code, _, err = command("record", "-o", recording, pitch_mm=[1, 1, 2])
+    assert code == 0, err
+    assert "scaled" in err  # round stays round on voxels that are no cubes
+    assert Recording(recording).grid == (8, 5, 7)
+    code, out, err = command("play", recording, "--json")
+    assert code == 0, err
+    report = json.loads(out)
+    assert report["frames"] == report["shown"] + report["dropped"] == 4
+    assert report["wrong"] == 0
+    assert [part["name"] for part in report["parts"]] == ["left", "right"]
 
 
 def test_holes_and_overlaps_are_drawn_and_said(command):

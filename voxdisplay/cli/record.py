@@ -20,6 +20,7 @@ from voxdisplay.cli.options import (
 )
 from voxdisplay.cli.output import note, plural, print_json, progress_bar
 from voxdisplay.cli.param_types import CountType, FeaturesType
+from voxdisplay.cli.profile_options import current_profile, display_option, pitch_option
 
 if TYPE_CHECKING:
     from voxdisplay.frame import Fit
@@ -33,6 +34,7 @@ _SUFFIX: Final = ".vxs"
     Examples:
       voxdisplay record spin.json -o spin.vxs
       voxdisplay record spin.json -o spin.vxs --size 64x64x64 --jobs 4
+      voxdisplay record spin.json -o spin.vxs --display wall
       voxdisplay record spin.json -o spin.vxs --dask tcp://render:8786 --check 5
       voxdisplay play spin.vxs --port /dev/ttyUSB0
 
@@ -50,7 +52,8 @@ _SUFFIX: Final = ".vxs"
     help="The recording; it appears when it is complete.",
 )
 @display_size_option(
-    f"Size of the display in voxels.  [default: the scene's, else {DEFAULT_SIZE_TEXT}]"
+    "Size of the display in voxels.  [default: that of the parts of --display, else the scene's, "
+    f"else {DEFAULT_SIZE_TEXT}]"
 )
 @format_option("Pixel format of the display.  [default: rgb888]", "rgb888")
 @click.option(
@@ -78,6 +81,8 @@ _SUFFIX: Final = ".vxs"
     help="Afterwards render N frames again in this process, and compare them.",
 )
 @fit_option
+@display_option
+@pitch_option
 @quiet_option
 @json_option
 def record(
@@ -96,6 +101,9 @@ def record(
     """Record SCENE, which has a duration, as packets that a display of its size plays as they are.
 
     SCENE is a JSON file, or - for stdin. All ways to render give the same bytes.
+
+    Of --display, the size of its parts together, pitch_mm and fit count. How it stands and its
+    light are seen to when the recording is played.
     """
     from voxdisplay.cli.scene_drawing import fit_scene  # noqa: PLC0415 - as in push
     from voxdisplay.shows import record as recording  # noqa: PLC0415
@@ -111,9 +119,11 @@ def record(
         raise click.UsageError("--jobs are processes of this machine: leave it out with --dask")
     began_s = time.monotonic()
     loaded = vd.load_scene(scene)
-    grid = size or loaded.size or vd.Grid(128, 128, 128)
+    profile = current_profile()
+    grid = size or (profile.grid if profile else None) or loaded.size or vd.Grid(128, 128, 128)
+    pitch = profile.output.pitch if profile and profile.output else (1.0, 1.0, 1.0)
     pixel_format = vd.PixelFormat(format_)
-    fitted = fit_scene(loaded, grid, fit)
+    fitted = fit_scene(loaded, grid, fit, pitch)
     name = "stdin" if scene == "-" else Path(scene).name
     wanted = RecordingFormat(
         grid,

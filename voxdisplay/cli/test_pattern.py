@@ -143,6 +143,10 @@ def _ask(name: str, port: str | None, baud: Baud, timeout_s: float, share: float
     path, keys = prepare_profile(name)
     port = keys.get("port") if port is None else port
     with open_display(port, baud, timeout_s, as_memory=True) as display:
+        if display.parts:
+            raise click.ClickException(
+                "this display is made of parts: ask of each with --port, and copy its axes"
+            )
         axes = ask_axes(display, share)
         display.clear()
         write_profile(path, keys, port, display.info.serial, axes)

@@ -22,6 +22,7 @@ from voxdisplay.raster.pixel_format import PixelFormat
 if TYPE_CHECKING:
     from voxdisplay.display.display import Display
     from voxdisplay.display.part_profile import PartProfile
+    from voxdisplay.raster.grid import Grid
 
 DITHERS: Final = ("none", "ordered")
 _LIMIT_KEYS: Final = ("amps", "ma_per_channel")
@@ -77,6 +78,13 @@ class DisplayProfile:
             self.dither == "ordered",
         )
         return None if output == OutputTransform() else output
+
+    @property
+    def grid(self) -> Grid | None:
+        """Grid of pictures, if it has parts; of any other display, only its device tells."""
+        from voxdisplay.display.part_layout import PartLayout  # noqa: PLC0415 - few have parts
+
+        return PartLayout(self.parts).grid if self.parts else None
 
     def upright(self) -> DisplayProfile:
         """Return the profile without what it says of the axes."""
