@@ -136,14 +136,15 @@ def test_the_page_comes_back_when_the_server_does(tab, unused_port):
     where = f"127.0.0.1:{unused_port}"
     with emulator_with_view(where) as (_, url):
         page = tab(url)
-        page.wait("$('state').dataset.is === 'live'")
+        page.wait("$('state').dataset.is === 'live' && current()")
     page.wait("$('state').dataset.is === 'ended'", errors=True)
     assert page.run("$('state').hasAttribute('data-old')"), "the picture is dimmed"
     assert page.run("getComputedStyle(canvas).opacity") < "1"
     with emulator_with_view(where) as (display, _):
         show(display, (1, 1, 1))
         page.wait("$('state').dataset.is === 'live' && current()?.n === 1", errors=True)
-    assert all("ERR_CONNECTION_REFUSED" in error for error in page.errors)
+    # Asked why while it was closing, the server may have answered.
+    assert all("CONNECTION_REFUSED" in error or "426" in error for error in page.errors)
     page.errors.clear()
 
 

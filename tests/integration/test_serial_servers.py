@@ -137,7 +137,7 @@ def test_a_line_behind_ser2net_that_is_not_there(tmp_path, ser2net):
     """The server runs: the hint must not ask whether it does."""
     where = ser2net(tmp_path / "ttyNOWHERE", "telnet(rfc2217),tcp")
     with pytest.raises(vd.TransportError) as refused:
-        vd.open(f"rfc2217://{where}?timeout=0.5", timeout_s=1)
+        vd.open(f"rfc2217://{where}?timeout=3", timeout_s=4)
     assert "running" not in (refused.value.hint or "")
 
 
@@ -145,7 +145,7 @@ def test_a_line_behind_ser2net_that_is_not_there(tmp_path, ser2net):
 def test_two_of_us_at_one_line_behind_ser2net(sim, ser2net):
     where = ser2net(sim.port, "telnet(rfc2217),tcp")
     with vd.open(f"rfc2217://{where}"), pytest.raises(vd.TransportError) as refused:
-        vd.open(f"rfc2217://{where}?timeout=0.5", timeout_s=1)
+        vd.open(f"rfc2217://{where}?timeout=3", timeout_s=4)
     assert "running" not in (refused.value.hint or "")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from voxdisplay.errors import CurveError
@@ -99,6 +99,9 @@ cells = st.sampled_from(
 
 
 @settings(deadline=None)
+@example(
+    [["1,5", '"'], ["1", "1", "", "1"]], ",", False, b""
+)  # fields are missing in the first row
 @given(
     st.lists(st.lists(cells, max_size=6), max_size=6),
     st.sampled_from([",", ";", "\t", " ", ", "]),

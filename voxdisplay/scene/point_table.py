@@ -90,12 +90,14 @@ class _Rows:
         self.skipped: list[int] = []  # rows before which there is a line that is no row
         self.decimal_comma: int | None = None  # line of the first one
         first = table.fields(layout.first, layout.separator)
-        if any(has_decimal_comma(first[k]) for k in layout.axes):
+        # The first row may be without some of its fields, which is refused when it is read.
+        if any(has_decimal_comma(first[k]) for k in layout.axes if k < len(first)):
             self.decimal_comma = layout.first
-        self._read(len(first))
+        self._read()
 
-    def _read(self, columns: int) -> None:
+    def _read(self) -> None:
         a, b, c = self.layout.axes
+        columns = self.layout.columns
         lines, separator = self.table.lines, self.layout.separator
         extend = self.numbers.extend
         plain = self.table.plain and self.decimal_comma is None

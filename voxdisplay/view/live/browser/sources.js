@@ -32,11 +32,12 @@ function setLink(...is) {
   link = is;
   updateStatus();
 }
-// Ask why the WebSocket was refused, which a script cannot see; empty if the server is down.
+// Ask why the WebSocket was refused, which a script cannot see; empty if the server is down, or
+// is just ending: where pictures came through before, an upgrade is possible.
 async function reason() {
   try {
     const answer = await fetch(new URL(`live?origin=${encodeURIComponent(location.origin)}`, location.href));
-    return [403, 426].includes(answer.status) ? (await answer.text()).trim() : "";
+    return [403, history.length || 426].includes(answer.status) ? (await answer.text()).trim() : "";
   } catch { return ""; }
 }
 function refusal(why) {
