@@ -172,14 +172,7 @@ def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
         index, (n,) int64; to the bit what its ``value`` gives.
 
     """
-    programs = [each.program for each in expressions]
-    numbers = np.array([[x for x in program if isinstance(x, float)] for program in programs])
-    bits = numbers.view(np.int64)
-    # Numbers that are the same in all, as exponents are, stay scalars.
-    columns = [
-        column[0] if same else column
-        for column, same in zip(numbers.T, (bits == bits[0]).all(axis=0), strict=True)
-    ]
+    columns = _number_columns(expressions)
     plain = _flatten(expressions[0])
 
     @np.errstate(all="ignore")
@@ -191,6 +184,54 @@ def batch_evaluator(expressions: Sequence[Expression]) -> Evaluate:
         return out
 
     return evaluate
+
+
+_ROW = 64  # values: a multiple of the lanes of all vector units
+_TOGETHER = 256  # expressions, of which the values stay in a processor's cache
+
+
+def values_of_template(expressions: Sequence[Expression], variables: Sequence[Floats]) -> Floats:
+    """Evaluate expressions of one template and the same variables at n values of these.
+
+    Vectorised functions may round a value otherwise at the end of an array, where there are fewer
+    than a processor takes together. Where n is a multiple of 64, no row begins or ends within such
+    a group; for any other n the expressions are evaluated one by one.
+
+    Parameters
+    ----------
+    expressions : sequence of Expression
+        k of them.
+    variables : sequence of (n,) float64 arrays
+
+    Returns
+    -------
+    (k, n) float64 array
+        To the bit the `Expression.value` of each.
+
+    """
+    if len(expressions) == 1 or variables[0].size % _ROW:
+        return np.array([each.value(*variables) for each in expressions])
+    plain, columns = _flatten(expressions[0]), _number_columns(expressions)
+    found = np.empty((len(expressions), variables[0].size))
+    for first in range(0, len(expressions), _TOGETHER):
+        rows = slice(first, first + _TOGETHER)
+        values = iter([x[rows, None] if x.ndim else x for x in columns])
+        program = [(0, next(values)) if arity == 0 else (arity, step) for arity, step in plain]
+        with np.errstate(all="ignore"):
+            found[rows] = _run(program, variables)
+    return found
+
+
+def _number_columns(expressions: Sequence[Expression]) -> list[Floats]:
+    """Return the numbers of k expressions of one template, (k,) each, in the program's order.
+
+    Numbers that are the same in all, as exponents are, stay scalars: ().
+    """
+    rows = [[x for x in each.program if isinstance(x, float)] for each in expressions]
+    numbers = np.array(rows, dtype=np.float64)
+    bits = numbers.view(np.int64)
+    same = (bits == bits[0]).all(axis=0)
+    return [np.array(x[0]) if once else x for x, once in zip(numbers.T, same, strict=True)]
 
 
 def _flatten(expression: Expression) -> list[tuple[int, Any]]:

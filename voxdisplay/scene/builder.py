@@ -6,7 +6,6 @@ tell by identity what has not changed. Must not know JSON text but to name place
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,6 +19,7 @@ from voxdisplay.expressions.parse import names_in
 from voxdisplay.raster.color import as_colors
 from voxdisplay.raster.color_map import color_map
 from voxdisplay.scene.coloring import WHITE, Coloring, ColorsByValue
+from voxdisplay.scene.columns import Columns, columns_of
 from voxdisplay.scene.environment import MovingEnvironment
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error, scene_error
 from voxdisplay.scene.item import PartSpan, SceneItem
@@ -41,8 +41,6 @@ T = TypeVar("T")
 
 MAX_ITEMS = 100_000
 """Most objects of a scene, repeats counted each."""
-MIN_COLUMN = 8
-"""Fewer objects of a type are built alone."""
 MAX_DEPTH = 32
 """Deepest nesting of groups."""
 
@@ -102,9 +100,13 @@ class SceneBuilder:
         self._kept: dict[tuple[Any, ...], Any] = {}
         self._placements: dict[tuple[Any, ...], tuple[Placement, Placement, Placement]] = {}
         self._items: dict[tuple[Any, ...], tuple[tuple[Any, ...], SceneItem]] = {}
+        self.colors: dict[Any, Any] = {None: WHITE}  # of simple objects, by their texts
+        self._columns: list[Columns] | None = None
+        self._was_built = False
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_kept": {}, "_placements": {}, "_items": {}}
+        state = vars(self) | {"_kept": {}, "_placements": {}, "_items": {}}
+        return state | {"_columns": None, "_was_built": False}
 
     def build(self, time: float | None = None, fit: Placement | None = None) -> Built:
         """Return the items.
@@ -123,27 +125,40 @@ class SceneBuilder:
 
         """
         run = _Run(self, time, fit)
-        simple = {} if self._environment.varies or fit else self._built_in_columns()
+        simple = self._built_in_columns()
         for i, (path, scene_object) in enumerate(self._objects):
             curve = simple.get(i)
             if curve is None:
                 run.add(scene_object, path, self._environment, fit, None, 0)
             else:
-                run.add_simple(scene_object, path, curve)
+                run.add_simple(scene_object, path, curve, fit)
+        self._was_built = True
         return Built(tuple(run.items), tuple(run.spans), tuple(dict.fromkeys(run.notes)))
 
     def _built_in_columns(self) -> dict[int, Curve]:
-        """Return the curves of simple objects of plain numbers, by index; built type by type."""
-        members = defaultdict(list)
-        for i, (_, scene_object) in enumerate(self._objects):
-            if scene_object.is_simple:
-                members[type(scene_object)].append(i)
+        """Return the curves of simple objects, by index; built type by type.
+
+        In a moving scene all are built alone the first time: that reads their expressions and
+        tells which of them depend on the time. The others are kept.
+        """
+        environment = self._environment
+        if environment.varies and not self._was_built:
+            return {}
+        if self._columns is None:
+            moving = [
+                (i, scene_object)
+                for i, (path, scene_object) in enumerate(self._objects)
+                if not self.keeps((path, "shapes"), environment)
+            ]
+            self._columns = columns_of(moving)
         found: dict[int, Curve] = {}
-        for kind, indices in members.items():
-            if len(indices) >= MIN_COLUMN:
-                shapes = kind.build_plain([self._objects[i][1] for i in indices])
-                # Those that are None are built alone, and so are all of a type that has no columns.
-                found.update((i, shape) for i, shape in zip(indices, shapes, strict=False) if shape)
+        for columns in self._columns:
+            if environment.varies:
+                table = environment.table_of(columns.rows)
+            else:
+                table = np.array(columns.rows) if columns.are_plain else None
+            if table is not None:
+                found.update(columns.build(table))
         return found
 
     def once(
@@ -205,7 +220,6 @@ class _Run:
         self._count = 0
         self._copies = 1  # of the object that is added now, by all repeats around it
         self.notes: list[str] = []
-        self._colors: dict[Any, Any] = {None: WHITE}  # of simple objects, by their texts
 
     def add(
         self,
@@ -291,18 +305,25 @@ class _Run:
             begin, end = context.numbers("part", scene_object.part).tolist()
             self.spans.append(PartSpan(first, len(self.items), begin, end))
 
-    def add_simple(self, scene_object: SceneObject, path: str, curve: Curve) -> None:
+    def add_simple(
+        self, scene_object: SceneObject, path: str, curve: Curve, outer: Placement | None
+    ) -> None:
         """Add a simple object of which the curve has been built."""
         self._count += 1
         if self._count > MAX_ITEMS or len(self.items) >= MAX_ITEMS:
             raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
         text = scene_object.color
-        colors = self._colors.get(text)
+        known = self.builder.colors
+        colors = known.get(text)
         if colors is None:
-            colors = self._colors[text] = read_colors(text, f"{path}.color")
+            colors = known[text] = read_colors(text, f"{path}.color")
             colors.flags.writeable = False  # of several items
         tag = str(scene_object.__struct_config__.tag)
-        self.items.append(SceneItem(tag, curve, colors, path, self.builder.source, None, self.fit))
+        image = curve if outer is None else _image(curve, outer, path)
+        if image is not None:
+            self.items.append(
+                SceneItem(tag, image, colors, path, self.builder.source, None, self.fit)
+            )
 
     def _is_during(self, scene_object: SceneObject, context: EvaluationContext) -> bool:
         """Return whether an object is there at the present time."""
@@ -347,10 +368,7 @@ class _Run:
             if item is None:
                 image = shape
                 if place is not None:
-                    try:
-                        found = placed(shape, place)
-                    except (CurveError, BodyError) as error:
-                        raise SceneError(str(error), path=path, hint=error.hint) from error
+                    found = _image(shape, place, path)
                     if found is None:  # nothing is left of it
                         continue
                     image = found
@@ -386,6 +404,14 @@ class _Run:
         return self.builder.once(
             (path, "color"), context.environment, read_colors, color, f"{path}.color"
         )
+
+
+def _image(shape: Curve | Body, place: Placement, path: str) -> Curve | Body | None:
+    """Return the image of a shape at a JSON path; None if nothing is left of it."""
+    try:
+        return placed(shape, place)
+    except (CurveError, BodyError) as error:
+        raise SceneError(str(error), path=path, hint=error.hint) from error
 
 
 def _shapes(

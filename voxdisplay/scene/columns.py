@@ -1,4 +1,4 @@
-"""Reading of many objects of one type in columns, as far as they are of plain numbers.
+"""Groups of objects of one type whose numbers are read in columns, one row for each object.
 
 Must not know object types.
 """
@@ -6,55 +6,62 @@ Must not know object types.
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Protocol, TypeVar
-
-import numpy as np
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.curves import Curve
+    from voxdisplay.scene.scene_object import SceneObject
+
+MIN_COLUMN = 8
+"""Fewer objects of a type are built alone."""
 
 
-class MayBeThick(Protocol):
-    """An object that is shown as a thin curve, or as a tube about it."""
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Objects of one type that have equally many numbers.
 
-    @property
-    def thickness(self) -> str | float | None:
-        """Diameter of the tube; None: thin."""
-
-
-Kind = TypeVar("Kind", bound=MayBeThick)
-
-
-def curves_in_columns(
-    objects: Sequence[Kind],
-    numbers_of: Callable[[Kind], tuple[str | float, ...]],
-    build: Callable[[Floats, Sequence[Kind]], Sequence[Curve | None]],
-) -> list[Curve | None]:
-    """Return the curves of thin objects of plain numbers; None for others.
-
-    Parameters
+    Attributes
     ----------
-    objects : sequence
-        Of one type.
-    numbers_of : callable
-        An object -> all its numbers.
-    build : callable
-        The numbers, (n, k), of n objects that have k numbers each, and these objects -> their
-        curves, None where a number is wrong.
+    indices : list of int
+        The objects' places in the scene.
+    objects : list of SceneObject
+    rows : list of tuple of str or float
+        The numbers of each.
 
     """
-    rows = [numbers_of(each) if each.thickness is None else () for each in objects]
-    plain = defaultdict(list)  # indices of objects, by their k
-    for i, row in enumerate(rows):
-        if set(map(type, row)) == {float}:
-            plain[len(row)].append(i)
-    found: list[Curve | None] = [None] * len(objects)
-    for members in plain.values():
-        table = np.array([rows[i] for i in members])
-        shapes = build(table, [objects[i] for i in members])
-        for i, shape in zip(members, shapes, strict=True):
-            found[i] = shape
-    return found
+
+    indices: list[int]
+    objects: list[SceneObject]
+    rows: list[tuple[str | float, ...]]
+
+    @property
+    def are_plain(self) -> bool:
+        """True if no number is an expression."""
+        return {type(number) for row in self.rows for number in row} == {float}
+
+    def build(self, table: Floats) -> dict[int, Curve]:
+        """Return the curves of the numbers, (n, k), by the objects' places.
+
+        Those of which a number is wrong are left out.
+        """
+        shapes = type(self.objects[0]).build_columns(table, self.objects)
+        pairs = zip(self.indices, shapes, strict=True)
+        return {index: shape for index, shape in pairs if shape is not None}
+
+
+def columns_of(objects: Sequence[tuple[int, SceneObject]]) -> list[Columns]:
+    """Return the objects that can be read in columns, with their places in the scene."""
+    groups: dict[tuple[type, int, bool], Columns] = defaultdict(lambda: Columns([], [], []))
+    for index, scene_object in objects:
+        row = scene_object.column_numbers if scene_object.is_simple else None
+        if row is not None:
+            plain = set(map(type, row)) == {float}
+            group = groups[type(scene_object), len(row), plain]
+            group.indices.append(index)
+            group.objects.append(scene_object)
+            group.rows.append(row)
+    return [group for group in groups.values() if len(group.rows) >= MIN_COLUMN]

@@ -8,11 +8,12 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import Annotated, ClassVar
 
+import numpy as np
 from msgspec import Meta, field
 
 from voxdisplay import bodies, curves
 from voxdisplay.bodies import Body
-from voxdisplay.scene.columns import curves_in_columns
+from voxdisplay.compute.array_types import Floats
 from voxdisplay.scene.evaluation_context import EvaluationContext
 from voxdisplay.scene.point_keys import Gaps, InlinePoints, PointsFile, points_of
 from voxdisplay.scene.scene_object import Axis, Center, Normal, Radius, SceneObject
@@ -97,16 +98,18 @@ class Segment(CurveObject, tag="segment", frozen=True):
             context.numbers("from", self.start), context.numbers("to", self.end), closed=self.closed
         )
 
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers: `SceneObject.column_numbers`."""
+        return (*self.start, *self.end) if self.thickness is None else None
+
     @classmethod
-    def build_plain(cls, objects: Sequence["Segment"]) -> list[curves.Curve | None]:
-        """Return many segments: `SceneObject.build_plain`."""
-        return curves_in_columns(
-            objects,
-            lambda each: (*each.start, *each.end),
-            lambda table, some: curves.Segment.many(
-                table[:, :3], table[:, 3:], [each.closed for each in some]
-            ),
-        )
+    def build_columns(
+        cls, table: Floats, objects: Sequence["Segment"]
+    ) -> Sequence[curves.Curve | None]:
+        """Return many segments: `SceneObject.build_columns`."""
+        closed = [each.closed for each in objects]
+        return curves.Segment.many(table[:, :3], table[:, 3:], closed)
 
 
 class Polyline(CurveObject, tag="polyline", frozen=True):
@@ -142,16 +145,20 @@ class Arc(CurveObject, tag="arc", frozen=True):
             closed=self.closed,
         )
 
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers: `SceneObject.column_numbers`."""
+        numbers = (*self.center, *self.normal, self.radius, self.start, self.end)
+        return numbers if self.thickness is None else None
+
     @classmethod
-    def build_plain(cls, objects: Sequence["Arc"]) -> list[curves.Curve | None]:
-        """Return many arcs: `SceneObject.build_plain`."""
-        return curves_in_columns(
-            objects,
-            lambda each: (*each.center, *each.normal, each.radius, each.start, each.end),
-            lambda table, some: curves.Arc.many(
-                table[:, :3], table[:, 6], table[:, 7:], table[:, 3:6], [o.closed for o in some]
-            ),
-        )
+    def build_columns(
+        cls, table: Floats, objects: Sequence["Arc"]
+    ) -> Sequence[curves.Curve | None]:
+        """Return many arcs: `SceneObject.build_columns`."""
+        center, normal, radius, angles = np.split(table, (3, 6, 7), axis=1)
+        closed = [each.closed for each in objects]
+        return curves.Arc.many(center, radius[:, 0], angles, normal, closed)
 
 
 class Circle(CurveObject, tag="circle", frozen=True):
@@ -170,19 +177,19 @@ class Circle(CurveObject, tag="circle", frozen=True):
             closed=self.closed is not False,
         )
 
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers: `SceneObject.column_numbers`."""
+        return (*self.center, *self.normal, self.radius) if self.thickness is None else None
+
     @classmethod
-    def build_plain(cls, objects: Sequence["Circle"]) -> list[curves.Curve | None]:
-        """Return many circles: `SceneObject.build_plain`."""
-        return curves_in_columns(
-            objects,
-            lambda each: (*each.center, *each.normal, each.radius),
-            lambda table, some: curves.Circle.many(
-                table[:, :3],
-                table[:, 6],
-                table[:, 3:6],
-                [each.closed is not False for each in some],
-            ),
-        )
+    def build_columns(
+        cls, table: Floats, objects: Sequence["Circle"]
+    ) -> Sequence[curves.Curve | None]:
+        """Return many circles: `SceneObject.build_columns`."""
+        center, normal, radius = np.split(table, (3, 6), axis=1)
+        closed = [each.closed is not False for each in objects]
+        return curves.Circle.many(center, radius[:, 0], normal, closed)
 
 
 class Ellipse(CurveObject, tag="ellipse", frozen=True):
@@ -206,18 +213,18 @@ class Ellipse(CurveObject, tag="ellipse", frozen=True):
             closed=self.closed is not False,
         )
 
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers: `SceneObject.column_numbers`."""
+        return (*self.center, *self.axes[0], *self.axes[1]) if self.thickness is None else None
+
     @classmethod
-    def build_plain(cls, objects: Sequence["Ellipse"]) -> list[curves.Curve | None]:
-        """Return many ellipses: `SceneObject.build_plain`."""
-        return curves_in_columns(
-            objects,
-            lambda each: (*each.center, *each.axes[0], *each.axes[1]),
-            lambda table, some: curves.Ellipse.many(
-                table[:, :3],
-                table[:, 3:].reshape(-1, 2, 3),
-                [each.closed is not False for each in some],
-            ),
-        )
+    def build_columns(
+        cls, table: Floats, objects: Sequence["Ellipse"]
+    ) -> Sequence[curves.Curve | None]:
+        """Return many ellipses: `SceneObject.build_columns`."""
+        closed = [each.closed is not False for each in objects]
+        return curves.Ellipse.many(table[:, :3], table[:, 3:].reshape(-1, 2, 3), closed)
 
 
 class Helix(CurveObject, tag="helix", frozen=True):
@@ -315,16 +322,18 @@ class Bezier(CurveObject, tag="bezier", frozen=True):
         """Return the curve."""
         return curves.Bezier(context.points("points", self.points), closed=self.closed)
 
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers: `SceneObject.column_numbers`."""
+        return tuple(chain.from_iterable(self.points)) if self.thickness is None else None
+
     @classmethod
-    def build_plain(cls, objects: Sequence["Bezier"]) -> list[curves.Curve | None]:
-        """Return many curves: `SceneObject.build_plain`."""
-        return curves_in_columns(
-            objects,
-            lambda each: tuple(chain.from_iterable(each.points)),
-            lambda table, some: curves.Bezier.many(
-                table.reshape(len(table), -1, 3), [each.closed for each in some]
-            ),
-        )
+    def build_columns(
+        cls, table: Floats, objects: Sequence["Bezier"]
+    ) -> Sequence[curves.Curve | None]:
+        """Return many curves: `SceneObject.build_columns`."""
+        closed = [each.closed for each in objects]
+        return curves.Bezier.many(table.reshape(len(table), -1, 3), closed)
 
 
 class BSpline(CurveObject, tag="bspline", frozen=True):

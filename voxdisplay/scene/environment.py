@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from voxdisplay.compute.array_types import Floats
 from voxdisplay.errors import CurveError
 from voxdisplay.expressions.parse import constant, excerpt, parse
+from voxdisplay.expressions.program import values_of_template
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -88,8 +90,8 @@ class StillEnvironment(Environment):
 class ValueTable:
     """Values at a block of times of all expressions that depend on the time.
 
-    A block is evaluated expression by expression: vectorised functions may round a value otherwise
-    next to other values, and a frame must not depend on which others there are.
+    Expressions that differ in their numbers alone are evaluated together. A frame does not depend
+    on which others there are: see `values_of_template`.
 
     Parameters
     ----------
@@ -124,40 +126,48 @@ class ValueTable:
         self.row = 0
         self.block: Floats = np.zeros(1)
         self._variable_values: Sequence[Floats] | None = None
-        self._rows: list[list[float]] = []
+        self._templates: dict[tuple[Any, ...], list[int]] = defaultdict(list)
+        self._values: Floats = np.empty((0, 1))  # (slots, n), without the newest
+        self._newest: list[Floats] = []  # (n,) each
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_variable_values": None, "_rows": []}
+        return vars(self) | {"_variable_values": None, "_values": np.empty((0, 1)), "_newest": []}
 
     def slot(self, expression: Expression) -> int:
         """Return the index in `column` of a new expression of the variables."""
+        slot = len(self._expressions)
         self._expressions.append(expression)
-        if self._variable_values is not None:
-            values = self._evaluate(expression)
-            for row, value in zip(self._rows, values, strict=True):
-                row.append(value)
-        else:
+        self._templates[expression.variables, expression.template].append(slot)
+        if self._variable_values is None:
             self.seek(self.block, self.row)
-        return len(self._expressions) - 1
+        else:
+            values = expression.value(*self._variable_values)
+            self._newest.append(values)
+            self.column.append(float(values[self.row]))
+        return slot
 
     def seek(self, block: Floats, row: int) -> None:
         """Make one of a block's times, (n,), the present one."""
         if self._variable_values is None or not np.array_equal(block, self.block):
             self.block = block
             self._variable_values = self._values_at(block)
-            columns = [self._evaluate(each) for each in self._expressions]
-            self._rows = [list(each) for each in zip(*columns, strict=True)] or [[] for _ in block]
+            self._newest = []
+            self._values = np.empty((len(self._expressions), len(block)))
+            for slots in self._templates.values():
+                some = [self._expressions[slot] for slot in slots]
+                self._values[slots] = values_of_template(some, self._variable_values)
         self.row = row
-        self.column = self._rows[row]
+        self.column = self._all_values()[:, row].tolist()
 
     def values_of(self, slots: list[int]) -> Floats:
         """Return the values of some slots at all times of the block, (n, slots)."""
-        return np.array([[row[slot] for slot in slots] for row in self._rows])
+        return np.ascontiguousarray(self._all_values()[slots].T)
 
-    def _evaluate(self, expression: Expression) -> list[float]:
-        assert self._variable_values is not None  # noqa: S101 - set by whoever calls
-        values: list[float] = expression.value(*self._variable_values).tolist()
-        return values
+    def _all_values(self) -> Floats:
+        if self._newest:
+            self._values = np.concatenate((self._values, self._newest))
+            self._newest = []
+        return self._values
 
 
 class MovingEnvironment(Environment):

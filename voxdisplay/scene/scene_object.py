@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta, Struct
 
 from voxdisplay.bodies import Body
+from voxdisplay.compute.array_types import Floats
 from voxdisplay.curves import Curve
 from voxdisplay.scene.evaluation_context import EvaluationContext
 from voxdisplay.scene.values import Color, Number, Range, Transform, Vector
@@ -72,11 +73,20 @@ class SceneObject(Struct, tag_field="type", forbid_unknown_fields=True, kw_only=
         """
         raise NotImplementedError
 
-    @classmethod
-    def build_plain(cls, objects: Sequence[Any]) -> list[Curve | None]:  # noqa: ARG003 - for those that can
-        """Return the curves of many objects of this type, read in columns; empty if it has none.
+    @property
+    def column_numbers(self) -> tuple[str | float, ...] | None:
+        """All its numbers, in the order of `build_columns`; None if it is built alone."""
+        return None
 
-        None for an object that is to be built alone: one that has more than plain numbers, or a
-        wrong one, so that its error is that of `build`.
+    @classmethod
+    def build_columns(cls, table: Floats, objects: Sequence[Any]) -> Sequence[Curve | None]:
+        """Return the curves of n objects of this type: None where a number is wrong.
+
+        Parameters
+        ----------
+        table : (n, k) float64 array
+            The values of each object's `column_numbers`.
+        objects : sequence of SceneObject
+
         """
-        return []
+        raise NotImplementedError

@@ -14,6 +14,7 @@ from voxdisplay.expressions.interval import Interval
 from voxdisplay.expressions.operations import FUNCTIONS
 from voxdisplay.expressions.params import MAX_PARAMS, param_order, resolve_params
 from voxdisplay.expressions.parse import MAX_DEPTH, MAX_LENGTH, MAX_STEPS, constant, parse
+from voxdisplay.expressions.program import values_of_template
 
 T = np.array([0.25, 0.5, 2.0])
 
@@ -268,3 +269,32 @@ def test_other_variables_than_those_named_are_unknown() -> None:
     with pytest.raises(CurveError, match="'t' at column 1") as caught:
         parse("t", variables=("u", "v"))
     assert caught.value.hint == "the variables here are u and v"
+
+
+@pytest.mark.parametrize(
+    ("operation", "times"),
+    [*((each, 64) for each in (*sorted(FUNCTIONS), *"+-*/", "**")), ("exp", 50), ("**", 50)],
+)
+def test_values_of_a_template_are_those_of_each_expression(operation: str, times: int) -> None:
+    """To the bit: a frame of a scene must not depend on how many objects there are."""
+    rng = np.random.default_rng(8)
+    time_s = np.linspace(-3, 9, times)
+    speed = rng.uniform(0, 1, times)
+
+    def text() -> str:
+        operands = [f"({x:.5f} + {y:.5f}*time)" for x, y in rng.uniform(-2, 2, (3, 2))]
+        if operation == "**":
+            return f"{abs(rng.normal()):.4f}**time + abs(time)**2 + speed**{operands[0]}"
+        if operation == "if":
+            return f"if(time < {rng.normal():.4f}, {operands[0]}, {operands[1]})"
+        if operation in FUNCTIONS:
+            arity = FUNCTIONS[operation].arity
+            return f"{rng.normal():.4f}*{operation}({', '.join(operands[:arity])}) + speed"
+        return f"2*({operands[0]} {operation} {operands[1]}) + {rng.normal():.4f}"
+
+    expressions = [parse(text(), variables=("time", "speed")) for _ in range(260)]
+    assert len({each.template for each in expressions}) == 1
+    together = values_of_template(expressions, (time_s, speed))
+    alone = np.array([each.value(time_s, speed) for each in expressions])
+    assert together.shape == (260, times)
+    assert np.array_equal(together.view(np.int64), alone.view(np.int64))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import voxdisplay as vd
-from voxdisplay.scene import builder
+from voxdisplay.scene.columns import MIN_COLUMN
 
-COUNT = 3 * builder.MIN_COLUMN
+COUNT = 3 * MIN_COLUMN
 
 
 def circles():
@@ -171,3 +171,66 @@ def test_the_first_wrong_object_is_named(wrong: dict[str, object]) -> None:
     assert many.value.path == alone.value.path.replace("[0]", f"[{place}]", 1)
     assert many.value.hint == alone.value.hint
     assert many.value.line > alone.value.line
+
+
+def in_motion(kind):
+    """Return objects of which the first number depends on the time in all but one."""
+    found = of_kind(kind)
+    for k, each in enumerate(found[6:]):
+        numbers = next(value for value in each.values() if isinstance(value, list))
+        if isinstance(numbers[0], list):
+            numbers = numbers[0]
+        numbers[0] = f"{numbers[0]} + {k + 1}*sin({k + 2}*time)"
+    return found
+
+
+def read_moving(objects, **more):
+    return vd.read_scene(
+        json.dumps({"size": [17, 17, 17], "duration": 4, "fps": 40, "objects": objects} | more)
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_in_motion_are_those_that_each_is_alone(kind: str) -> None:
+    objects = in_motion(kind)
+    scene, alone = read_moving(objects), [read_moving([each]) for each in objects]
+    for number in (3, 4, 100, 4):
+        many = scene.at_frame(number).items
+        for one, each in zip(many, alone, strict=True):
+            (other,) = each.at_frame(number).items
+            assert (one.type, repr(one.shape)) == (other.type, repr(other.shape))
+            assert np.array_equal(one.color, other.color)
+            if isinstance(one.shape, vd.Curve):
+                t = np.linspace(*one.curve.t_range, 9)
+                assert np.array_equal(one.curve.position(t), other.curve.position(t))
+    assert [item.path for item in many] == [f"$.objects[{i}]" for i in range(COUNT)]
+    assert scene.at_frame(5).items[0] is many[0]
+    assert scene.at_frame(5).items[-1] is not many[-1]
+    again = pickle.loads(pickle.dumps(scene))  # noqa: S301 - our own
+    for _ in range(2):
+        assert repr(again.at_frame(4).items[-1].shape) == repr(many[-1].shape)
+
+
+def test_many_in_motion_are_fitted_together() -> None:
+    objects = in_motion("segment")
+    whole = read_moving(objects)
+    fitted, _ = whole.fitted(vd.Grid(33, 33, 33), "contain")
+    alone, _ = read_moving(objects[-1:]).fitted(vd.Grid(33, 33, 33), "contain")
+    t = np.linspace(0, 1, 5)
+    for number in (0, 7):
+        plain, one, other = (
+            each.at_frame(number).items[-1].curve.position(t) for each in (whole, fitted, alone)
+        )
+        assert np.array_equal(one, other)
+        assert not np.array_equal(one, plain)
+
+
+def test_one_of_many_in_motion_that_fails_later_is_named() -> None:
+    objects = in_motion("arc")
+    objects[-2] |= {"radius": "1/(1 - time)"}
+    scene = read_moving(objects)
+    for number, problem in ((40, "not finite"), (80, "positive"), (40, "not finite")):
+        with pytest.raises(vd.SceneError, match=problem) as caught:
+            scene.at_frame(number)
+        assert caught.value.path == f"$.objects[{COUNT - 2}].radius"
+    assert len(scene.at_frame(39).items) == COUNT
