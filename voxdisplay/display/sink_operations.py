@@ -11,13 +11,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from voxdisplay.display.connection import MAX_WAIT_S, Clock
+from voxdisplay.display.decoded_picture import decoded_picture
 from voxdisplay.display.flushing import Flushing
 from voxdisplay.display.playback_counts import PlaybackMeter
 from voxdisplay.display.receipt import Receipt
 from voxdisplay.errors import IncompatibleDevice
 from voxdisplay.frame import Frame
-from voxdisplay.shows.show import EncodedFrame
-from voxdisplay.wire.op_decoder import decode_ops
 
 if TYPE_CHECKING:
     from voxdisplay.display.display_operations import Hold, Progress, Work
@@ -107,7 +106,7 @@ class SinkQueue:
     def start_unwaited(self, picture: Picture, hold_ticks: int = 0) -> int:
         """Have a frame sent when its turn comes, and return its ticket."""
         del hold_ticks  # there are no ticks: always 0
-        self._replace(self._decoded(picture))
+        self._replace(decoded_picture(picture, self.info))
         return self._ticket
 
     def repeat(self, ticket: int, picture: Picture, hold_ticks: int = 0) -> int:
@@ -121,14 +120,6 @@ class SinkQueue:
         self._pending = frame
         self._ticket += 1
         self.playback.note_presented()
-
-    def _decoded(self, picture: Picture) -> Frame:
-        if not isinstance(picture, EncodedFrame):
-            return picture
-        frame = Frame(self.info.grid, self.info.format)
-        drawn = decode_ops(picture.payloads, frame.grid, frame.format)
-        frame.set_voxels(drawn.index, drawn.values)
-        return frame
 
     def restart_playback(self) -> None:
         """Count anew."""

@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from voxdisplay.display.decoded_picture import decoded_picture
 from voxdisplay.display.playback_counts import Playback, PlaybackMeter
 from voxdisplay.display.swap_barrier import SwapBarrier
 from voxdisplay.frame import Frame
-from voxdisplay.shows.show import EncodedFrame
-from voxdisplay.wire.op_decoder import decode_ops
 
 if TYPE_CHECKING:
     from voxdisplay.display.device_info import DeviceInfo
@@ -123,7 +122,7 @@ class TiledQueue:
         """Start a frame that nobody waits for at once, and return its ticket."""
         del hold_ticks  # there are no ticks: always 0
         self.playback.note_presented()
-        return self._start(self._decoded(picture))
+        return self._start(decoded_picture(picture, self._info))
 
     def repeat(self, ticket: int, picture: Picture, hold_ticks: int = 0) -> int:
         """Return the ticket of what is shown: no tick wants a frame."""
@@ -143,14 +142,6 @@ class TiledQueue:
         for worker in self._workers:
             worker.stream(worker.cut(frame), self._ticket, barrier)
         return self._ticket
-
-    def _decoded(self, picture: Picture) -> Frame:
-        if not isinstance(picture, EncodedFrame):
-            return picture
-        frame = Frame(self._info.grid, self._info.format)
-        drawn = decode_ops(picture.payloads, frame.grid, frame.format)
-        frame.set_voxels(drawn.index, drawn.values)
-        return frame
 
     def collect_shown(self) -> None:
         """Take note of frames that all parts show by now."""
