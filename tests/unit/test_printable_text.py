@@ -50,15 +50,16 @@ def test_only_line_feeds_stay_in_several_lines():
 
 def test_there_is_one_place_that_cleans():
     """No other module of the driver replaces characters by whether they are printable."""
+    package = Path(vd.__file__).parent
     cleaners = {
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "voxdisplay").rglob("*.py")
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant)
         and isinstance(node.value, str)
         and "\N{REPLACEMENT CHARACTER}" in node.value
     }
-    assert cleaners == {"voxdisplay/printable_text.py"}
+    assert cleaners == {"printable_text.py"}
 
 
 @pytest.mark.parametrize(
