@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
+from multiprocessing.context import BaseContext
 from typing import Any, Protocol
 
 from voxdisplay.errors import MissingExtra, RecordingError
@@ -28,6 +29,7 @@ Rendered = tuple[Chunk, list[EncodedFrame]]
 # How often a chunk is tried again after the worker that rendered it has died.
 _ATTEMPTS = 3
 _DASK_WAIT_S = 10
+_PRELOADED = ("voxdisplay.shows.render_engines", "voxdisplay.scene.model")
 _MAX_PORT = 65_535
 
 
@@ -77,7 +79,7 @@ def _render_until_broken(
     jobs: int, rendering: Rendering, chunks: Sequence[Chunk], tried: dict[Chunk, int]
 ) -> Iterator[Rendered]:
     """Yield chunks until all are rendered or a worker dies; count how often each was begun."""
-    context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks
+    context = _worker_context()
     pool = ProcessPoolExecutor(
         jobs, mp_context=context, initializer=_init_worker, initargs=(rendering,)
     )
@@ -100,6 +102,18 @@ def _render_until_broken(
         ended = True
     finally:
         pool.shutdown(wait=ended, cancel_futures=True)
+
+
+def _worker_context() -> BaseContext:
+    """Return how workers are started: no fork of this process, which would copy threads' locks.
+
+    Where there is a fork server, it imports once what all of its workers need.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(_PRELOADED))
+    return context
 
 
 class _Worker:
