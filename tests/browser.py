@@ -21,6 +21,7 @@ import urllib.request
 import numpy as np
 import pytest
 from PIL import Image
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -207,5 +208,6 @@ class Tab:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
     def close(self):
-        with self._open:
+        # The page may be gone before its answer has been sent.
+        with self._open, contextlib.suppress(ConnectionClosed):
             self.call("Page.close")

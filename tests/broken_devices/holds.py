@@ -41,7 +41,7 @@ def holds_add_up(patch):
     patch.setattr(Session, "hold", hold)
 
 
-@mutant("7.12/since-the-swap", "7.12/first-is-not-held")
+@mutant("7.12/since-the-swap", "7.12/first-is-not-held", "7.12/held", "7.12/longest-counts")
 def holds_count_from_when_a_frame_is_whole(patch):
     def mark(old, self, seq, flags):
         before = self.state

@@ -23,7 +23,7 @@ from voxdisplay.conformance.device_bugs import DEVICE_BUGS
 from voxdisplay.conformance.dialogue import Dialogue, NoResponse, NotApplicable, Violation
 from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
 from voxdisplay.conformance.reference_page import Page
-from voxdisplay.conformance.report import as_json, violation_lines
+from voxdisplay.conformance.report import as_json, report_lines, violation_lines
 from voxdisplay.conformance.run import Verdict, run_checks, select_checks
 from voxdisplay.conformance.saved_page import SavedPage
 from voxdisplay.errors import TransportClosed
@@ -248,6 +248,23 @@ def test_a_hold_is_not_blamed_for_late_pauses(late, verdict, monkeypatch):
     report = examined(emulated_port(refresh=50_000), ["7.12/held", "7.12/longest-counts"])
     assert report.results[0].verdict is verdict, explain(report)
     assert report.results[1].verdict is (Verdict.HOLDS if late == 1 else verdict), explain(report)
+
+
+def test_late_responses_are_waited_for_and_counted():
+    checks = ["5/info-same", "6/given-up"]
+    report = examined(emulated_port(late_s=0.25), checks, timeout_s=0.2)
+    assert report.holds, explain(report)
+    assert report.late_responses > 0
+    assert report.slowest_response_s >= 0.25
+    assert "later than the limit" in "\n".join(report_lines(report, transcripts=False))
+    assert examined(emulated_port(), checks).late_responses == 0
+
+
+def test_a_device_without_any_check_does_not_conform():
+    report = examined(emulated_port(**DEVICES["bare"]), ["7.3/lines"])
+    assert not report.holds
+    assert "no check was made" in "\n".join(report_lines(report, transcripts=False))
+    assert as_json("port", report)["conforms"] is False
 
 
 @pytest.mark.parametrize("checks", ["6", "9.1"])

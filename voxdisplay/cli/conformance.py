@@ -87,7 +87,8 @@ def conformance(
     Takes any device behind any kind of port. Draws on the display; afterwards the display is as it
     was, if it can be read back, otherwise dark.
 
-    An answer may take --timeout, plus a refresh period and its time on a serial line.
+    An answer may take --timeout, plus a refresh period and its time on a serial line. Later ones,
+    as a busy computer makes them, are waited for and counted.
     """
     from voxdisplay.conformance import report, run  # noqa: PLC0415 - only what is needed
 

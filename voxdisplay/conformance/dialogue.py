@@ -28,6 +28,8 @@ _MAX_RESPONSES = 10_000
 _MAX_LOG_ENTRIES = 2_000
 _BITS_PER_BYTE = 10  # on a serial line
 _HURRY_FACTOR, _HURRIED_S = 4, 0.05
+_PATIENCE = 5  # a busy computer may delay a response by more than the limit
+_SLICE_S = 0.1  # of a wait, which measures how late this process is woken up
 _LOGGED_BYTES = 48  # of each packet, in a transcript
 
 
@@ -79,7 +81,8 @@ class Dialogue:
     ----------
     pipe : Transport
     timeout_s : float
-        How long a response may take, plus a refresh period and the time on a serial line.
+        How long a response may take, plus a refresh period and the time on a serial line. Up to
+        five times that is waited for it, and it is counted as late.
     opening_s : float
         How long the first INFO may take: a board may have to boot.
     baud : int
@@ -109,6 +112,9 @@ class Dialogue:
         See above.
     timeout_count : int
         Number of responses that were waited for in vain.
+    late_count, slowest_s : int, float
+        Number of responses that took longer than ``timeout_s`` allows, and the longest that any
+        took, in seconds.
     is_hurried : bool
         True if responses are given up soon, see `response_timeout_s`.
     """
@@ -126,7 +132,7 @@ class Dialogue:
         self.clock = clock
         self.rng = random.Random(seed)
         self._seed = seed
-        self.timeout_count = 0
+        self.timeout_count = self.late_count = 0
         self.is_hurried = False
         self.reader = ResponseReader()
         self.session = 0
@@ -138,7 +144,7 @@ class Dialogue:
         self._timeout_s, self._opening_s, self._baud = timeout_s, opening_s, baud
         self._received: deque[Response] = deque()
         self._unanswered_bytes = 0
-        self._written_s = self._slowest_s = 0.0
+        self._written_s = self.slowest_s = 0.0
         self._tags: Iterator[int] = iter(())
 
     def start_check(self, name: str) -> None:
@@ -170,23 +176,35 @@ class Dialogue:
 
     @property
     def response_timeout_s(self) -> float:
-        """Seconds to wait for a response: limit, two ticks, time on the line.
+        """Seconds to wait for a response: a multiple of the limit, two ticks, time on the line.
 
         With a device that has failed several checks by silence, the limit is a multiple of its
         slowest response so far: silence in all the other checks must not take minutes.
         """
-        line_s = self._unanswered_bytes * _BITS_PER_BYTE / self._baud
-        limit_s = self._timeout_s
+        wait_s = _PATIENCE * self._timeout_s
         if self.is_hurried:
-            limit_s = min(limit_s, max(_HURRY_FACTOR * self._slowest_s, _HURRIED_S))
-        return limit_s + 2 * self.device.period_s + line_s
+            wait_s = min(self._timeout_s, max(_HURRY_FACTOR * self.slowest_s, _HURRIED_S))
+        return wait_s + self._unavoidable_s
+
+    @property
+    def _unavoidable_s(self) -> float:
+        """Seconds that a response may take in any case: two ticks, time on the line."""
+        return 2 * self.device.period_s + self._unanswered_bytes * _BITS_PER_BYTE / self._baud
 
     def receive(self, until_s: float) -> Response | None:
-        """Return the next response; None if none comes before a deadline of `clock`."""
+        """Return the next response; None if none comes before a deadline of `clock`.
+
+        The deadline is moved by the time for which this process should have run, and did not: a
+        device on the same computer had to wait as long.
+        """
         while not self._received:
-            left_s = until_s - self.clock()
-            if not self._read_pipe(left_s) and left_s <= 0:
-                return None
+            began_s = self.clock()
+            left_s = until_s - began_s
+            slice_s = min(max(left_s, 0.0), _SLICE_S)
+            if not self._read_pipe(slice_s):
+                if left_s <= 0:
+                    return None
+                until_s += max(self.clock() - began_s - slice_s, 0.0)
             if left_s < -self._timeout_s:  # bytes keep coming, but no packet
                 return None
         self._unanswered_bytes = 0
@@ -196,7 +214,9 @@ class Dialogue:
         """Read what comes within a time, at least what has come; return whether anything did."""
         data = self._pipe.read(max(timeout_s, 0.0))
         for response in self.reader.feed(data):
-            self._slowest_s = max(self._slowest_s, self.clock() - self._written_s)
+            took_s = self.clock() - self._written_s
+            self.slowest_s = max(self.slowest_s, took_s)
+            self.late_count += took_s > self._timeout_s + self._unavoidable_s
             self._log(sent=False, data=response.body, text=str(response))
             self._received.append(response)
         return bool(data)

@@ -38,6 +38,9 @@ def report_lines(report: Report, *, transcripts: bool) -> Iterator[str]:
         yield printable(
             f"not applicable, {reason}: {', '.join(result.check.id for result in group)}"
         )
+    if report.late_responses:
+        slowest = f"the slowest {report.slowest_response_s:.2f} s"
+        yield f"responses later than the limit: {report.late_responses}, {slowest}"
     yield _conclusion(report)
     yield f"on display now: {report.display_state}"
 
@@ -57,6 +60,8 @@ def _conclusion(report: Report) -> str:
     if report.holds:
         return f"conforms: all {held} checks that apply hold"
     not_run = report.count(Verdict.NOT_RUN)
+    if not held + report.count(Verdict.BROKEN) + not_run:
+        return "no check was made: none of these applies to the device"
     missed = f", {not_run} not run" if not_run else ""
     return f"{report.count(Verdict.BROKEN)} broken, {held} hold{missed}"
 
@@ -108,6 +113,8 @@ def as_json(port: str, report: Report) -> dict[str, Any]:
         "conforms": report.holds,
         "counts": {_key(verdict): report.count(verdict) for verdict in Verdict},
         "on_display": report.display_state,
+        "late_responses": report.late_responses,
+        "slowest_response_s": round(report.slowest_response_s, 3),
         "checks": [_result_json(result) for result in report.results],
     }
 

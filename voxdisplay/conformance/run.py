@@ -86,11 +86,15 @@ class Report:
         In the order of the checks.
     display_state : str
         What is on display now, in words.
+    late_responses, slowest_response_s : int, float
+        Number of responses that took longer than the limit, and the longest that any took.
     """
 
     device: AnnouncedDevice | None = None
     results: list[Result] = field(default_factory=list)
     display_state: str = "unknown"
+    late_responses: int = 0
+    slowest_response_s: float = 0.0
 
     def count(self, verdict: Verdict) -> int:
         """Return the number of checks with a verdict."""
@@ -98,8 +102,9 @@ class Report:
 
     @property
     def holds(self) -> bool:
-        """True if every check that applies to the device was run, and holds."""
-        return not self.count(Verdict.BROKEN) and not self.count(Verdict.NOT_RUN)
+        """True if every check that applies to the device was run, at least one, and holds."""
+        failed = self.count(Verdict.BROKEN) + self.count(Verdict.NOT_RUN)
+        return not failed and self.count(Verdict.HOLDS) > 0
 
 
 def select_checks(patterns: Iterable[str]) -> list[Check]:
@@ -177,6 +182,8 @@ def run_checks(
             if on_result:
                 on_result(result)
     finally:  # after an interrupt, too
+        report.late_responses = probe.late_count
+        report.slowest_response_s = probe.slowest_s
         report.display_state = (
             _none_if_port_lost(lambda: restore_page(probe, saved)) or "unknown: the port is gone"
         )
