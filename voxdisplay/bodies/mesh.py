@@ -160,7 +160,7 @@ class Triangle(TriangulatedBody):
 
     def __init__(self, points: ArrayLike) -> None:
         corners = arguments.array("points", points, (3, 3))
-        super().__init__(TriangleMesh(corners, np.array([[0, 1, 2]])), "shell")
+        super().__init__(TriangleMesh(corners, np.array([[0, 1, 2]]), is_sheet=True), "shell")
         self._arguments = {"points": corners}
 
 
@@ -199,7 +199,7 @@ class Polygon(TriangulatedBody):
         triangles = clip_ears(np.rint(kept * scale).astype(np.int64))
         if triangles is None:
             raise ArgumentError("points", "has sides that cross each other")
-        super().__init__(TriangleMesh(ring, triangles), "shell")
+        super().__init__(TriangleMesh(ring, triangles, is_sheet=True), "shell")
         self._arguments = {"points": ring}
 
 

@@ -112,7 +112,8 @@ class Text(TriangulatedBody):
         self._frame = frame, start, scale
         # Flat letters enclose nothing.
         inside = check_fill(fill) if thickness is not None else "shell"
-        super().__init__(TriangleMesh(points @ frame + start, faces), inside)
+        sheet = thickness is None
+        super().__init__(TriangleMesh(points @ frame + start, faces, is_sheet=sheet), inside)
         self._arguments = {
             "text": text,
             "at": start,

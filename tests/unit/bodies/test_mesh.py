@@ -114,3 +114,15 @@ def test_a_polygon_has_no_more_triangles_than_corners():
 def test_wrong_polygons(points, message):
     with pytest.raises(vd.BodyError, match=message):
         vd.Polygon(points)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        vd.Triangle([(1, 1, 1), (2, 4, 1), (1, 3, 6)]),
+        vd.Polygon([(0, 0, 1), (2, 0, 1), (2, 4, 1), (0, 4, 1)]),
+    ],
+    ids=["triangle", "polygon"],
+)
+def test_what_is_flat_by_nature_is_not_called_open(body):
+    assert vd.voxelize(body).notes == ()

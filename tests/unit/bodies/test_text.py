@@ -124,6 +124,10 @@ def test_letters_with_a_depth_are_closed_and_turned_outward(text):
     assert volume_of(vertices, faces) == pytest.approx(3 * area, rel=1e-6)
 
 
+def test_flat_letters_are_not_called_open():
+    assert vd.voxelize(vd.Text("aO", (1, 1, 1), 9, font=FONT)).notes == ()
+
+
 def test_height_is_that_of_capitals_and_at_the_baseline():
     low, high = vd.Text("HH", (10, 20, 30), 24, font=FONT).bounds()
     assert low[2] == pytest.approx(30)
