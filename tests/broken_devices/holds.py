@@ -17,6 +17,11 @@ def holds_are_ignored(patch):
     patch.setattr(Session, "hold", lambda *_: None)
 
 
+@mutant("7.12/held", "7.12/longest-counts", "7.12/since-the-swap")
+def holds_are_twice_as_long(patch):
+    around(patch, Session, "hold", lambda old, self, ticks: old(self, 2 * ticks))
+
+
 @mutant("7.12/longest-counts")
 def last_hold_of_a_packet_counts(patch):
     def hold(self, _):
