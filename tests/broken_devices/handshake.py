@@ -28,6 +28,11 @@ def unknown_feature(patch):
 
 
 @mutant("5/info-fields")
+def features_of_a_later_minor(patch):
+    _announce(patch, minor=0)
+
+
+@mutant("5/info-fields")
 def one_page(patch):
     patch.setattr(memory.Memory, "PAGES", 1)
 

@@ -3,123 +3,32 @@
 import copy
 import json
 import pickle
-import random
-import struct
-import time
 from dataclasses import replace
 
 import broken_devices
-import document
 import pytest
 from broken_devices.mutant import Device, around
-from virtual_time_device import VirtualTimeDevice
+from kit_runs import DEVICES, by_verdict, emulated_port, examined, explain, info_of
 
 from firmware_sim import crc
 from firmware_sim.packet_error import PacketError
 from voxdisplay.conformance import CHECKS, ops, packets
-from voxdisplay.conformance.announced_device import FEATURES, AnnouncedDevice
+from voxdisplay.conformance.announced_device import AnnouncedDevice
 from voxdisplay.conformance.catalogue import HANDSHAKE, SECTIONS
 from voxdisplay.conformance.device_bugs import DEVICE_BUGS
 from voxdisplay.conformance.dialogue import Dialogue, NoResponse, NotApplicable, Violation
-from voxdisplay.conformance.reference_decoder import ReferenceDecoder, Refused
+from voxdisplay.conformance.reference_decoder import Refused
 from voxdisplay.conformance.reference_page import Page
 from voxdisplay.conformance.report import as_json, report_lines, violation_lines
-from voxdisplay.conformance.run import Verdict, run_checks, select_checks
+from voxdisplay.conformance.run import Verdict, select_checks
 from voxdisplay.conformance.saved_page import SavedPage
-from voxdisplay.errors import TransportClosed
 from voxdisplay.wire import spec
 
-SMALL = {"grid": (3, 5, 7), "pixel_format": "index8", "refresh": 200_000, "max_payload": 256}
-DEVICES = {
-    "at-once": {"refresh": 0},
-    "mono": {"grid": (17, 64, 40), "pixel_format": "mono1", "max_silent_acks": 8},
-    "wide": {
-        "grid": (300, 4, 3),
-        "pixel_format": "rgb888",
-        "max_payload": 64,
-        "rx_buffer": 137,
-        "name": "a",
-    },
-    "one-voxel": {"grid": (1, 1, 1), "pixel_format": "rgb565"},
-    "bare": {"features": frozenset(), "pixel_format": "rgb888"},
-    "digest-only": {"features": frozenset(("digest", "line"))},
-    "read-only": {"features": frozenset(("read", "diff"))},
-}
 # Some of every section, to see that a fault elsewhere leaves them alone.
 BYSTANDERS = (
     "3/resync", "4/data-flags", "5/info-same", "6/given-up", "7/pen", "7.3/lines", "8/one-voxel",
     "9/data-answered", "9.1/duplicate-answered", "10/ranges", "11/session-ends",
 )  # fmt: skip
-
-
-def emulated_port(**config):
-    return VirtualTimeDevice(**{**SMALL, "rx_buffer": 2048, "boot": 7} | config)
-
-
-def examined(port, only=(), **how):
-    return run_checks(port, only, clock=port.clock, **how)
-
-
-def by_verdict(report, verdict):
-    return {result.check.id for result in report.results if result.verdict is verdict}
-
-
-def explain(report):
-    return "\n".join(
-        f"{result.check.id}: must be {result.expected}, was {result.actual}, "
-        f"likely {result.likely_cause}"
-        for result in report.results
-        if result.verdict is Verdict.BROKEN
-    )
-
-
-# -- a third reading of the document
-
-
-def device_of(vector):
-    pixel_format = getattr(spec, f"FORMAT_{vector['format']}")
-    allowed = dict(vector.lines).get("features")
-    names = allowed.split("|") if allowed else [name for name in FEATURES if name != "HOLD"]
-    if pixel_format != spec.FORMAT_INDEX8:
-        names = [name for name in names if name not in {"DIFF", "PALETTE"}]
-    if pixel_format == spec.FORMAT_MONO1:
-        names = [name for name in names if name != "FADE"]
-    bits = sum(1 << FEATURES[name] for name in names)
-    return AnnouncedDevice(pixel_format, *vector.grid, features=bits)
-
-
-@pytest.mark.parametrize("vector", document.vectors("ops"), ids=str)
-def test_what_ops_draw(vector):
-    device, page = device_of(vector), Page()
-    ReferenceDecoder(device, page).draw(vector.hex("ops"))
-    lit = {place: int.from_bytes(pixel, "little") for place, pixel in vector.voxels().items()}
-    assert {device.voxel_at(index): value for index, value in page.pixels.items()} == lit
-    assert page.digest(device) == vector.integer("digest")
-
-
-@pytest.mark.parametrize("vector", document.vectors("refused"), ids=str)
-def test_what_is_refused(vector):
-    decoder = ReferenceDecoder(device_of(vector), Page())
-    if vector["code"].startswith("FINE"):
-        decoder.draw(vector.hex("ops"))
-        return
-    with pytest.raises(Refused) as refused:
-        decoder.draw(vector.hex("ops"))
-    assert refused.value.code == getattr(spec, f"CODE_{vector['code']}")
-    assert refused.value.at + packets.HEADER_BYTES == vector.integer("offset")
-
-
-@pytest.mark.parametrize("vector", document.vectors("cobs"), ids=str)
-def test_cobs(vector):
-    assert packets.cobs_encode(vector.hex("decoded")) == vector.hex("encoded")
-    assert packets.cobs_decode(vector.hex("encoded")) == vector.hex("decoded")
-
-
-@pytest.mark.parametrize("vector", document.vectors("packet"), ids=str)
-def test_packets(vector):
-    whole = vector.hex("packet")
-    assert packets.encode(whole[:-4]) == vector.hex("wire")
-    assert packets.decode_segment(vector.hex("wire")[:-1]) == whole[:-4]
 
 
 # -- a device that keeps to the document
@@ -159,7 +68,7 @@ def test_the_emulator_holds_on_a_slow_line(name, line):
 @pytest.mark.parametrize("name", ["at-once", "mono", "wide"])
 def test_the_picture_is_put_back(name):
     port = emulated_port(**DEVICES[name])
-    device = AnnouncedDevice.from_info(_info(port))
+    device = AnnouncedDevice.from_info(info_of(port))
     drawn = ops.literal(device, [1, 0, 1]) + ops.skip(device.voxel_count - 4) + ops.run()
     port.write(packets.encode(packets.data(0, 0, drawn, packets.CLEAR | packets.COMMIT)), 1)
     while not port.bench.snapshot().pixels.strip(b"\0"):
@@ -169,13 +78,6 @@ def test_the_picture_is_put_back(name):
     assert report.holds, explain(report)
     assert report.display_state == "as it was"
     assert port.bench.snapshot().pixels == before
-
-
-def _info(port):
-    port.write(b"\0" + packets.encode(packets.hello(9)), 1)
-    (segment, rest) = port.read(1).split(b"\0")
-    assert not rest
-    return packets.Response(packets.decode_segment(segment))
 
 
 # -- devices that do not
@@ -298,142 +200,6 @@ def _castagnoli():
         return crc._table()
     finally:
         crc.spec.CRC_POLY = poly
-
-
-class Pipe:
-    """A pipe with something at its other end that is no device."""
-
-    port = "nothing"
-
-    def __init__(self, say):
-        self._say = say
-        self.read_bytes = 0
-
-    def read(self, timeout_s):
-        if not (device := self._say(self)):
-            time.sleep(min(timeout_s, 0.05))
-        self.read_bytes += len(device)
-        return device
-
-    def write(self, data, timeout_s):
-        pass
-
-    def close(self):
-        pass
-
-
-def gone(_pipe):
-    raise TransportClosed("it was pulled out")
-
-
-@pytest.mark.parametrize(
-    "say",
-    [
-        lambda _pipe: b"",
-        lambda _pipe: b"\x55" * 997,
-        lambda _pipe: bytes(1000),
-        lambda _pipe: packets.encode(packets.body(8, payload=bytes(19))) * 50,
-        gone,
-    ],
-    ids=["silent", "babbling", "zeros", "answering-unasked", "gone"],
-)
-def test_what_is_no_device_ends_soon(say):
-    report = run_checks(Pipe(say), timeout_s=0.05, opening_s=0.1)
-    assert not report.holds
-    assert report.device is None
-    assert len(report.results) == len(CHECKS) + 1
-
-
-class Fickle(Pipe):
-    """Answers HELLO well, and everything else by chance."""
-
-    def __init__(self, seed):
-        super().__init__(lambda pipe: pipe.out.pop(0) if pipe.out else b"")
-        self.rng = random.Random(seed)
-        self.out = []
-        self.inner = emulated_port(refresh=0)
-
-    def write(self, data, timeout_s):
-        self.inner.write(data, timeout_s)
-        self.out += filter(None, [self.inner.read(0)])
-        for segment in data.split(b"\0"):
-            asked = packets.decode_segment(segment) if len(segment) >= 8 else None
-            if asked and asked[0] >> 4 != spec.TYPE_HELLO and self.rng.random() < 0.5:
-                kind = self.rng.choice([8, 8, 9, 10, 11, 3])
-                seq = self.rng.choice([asked[1], self.rng.randrange(256)])
-                rest = self.rng.randbytes(self.rng.randint(0, 40))
-                answer = bytes((kind << 4 | self.rng.randrange(16), seq, 0, asked[1])) + rest
-                self.out.append(packets.encode(answer) + self.rng.choice([b"", b"\0", b"noise\0"]))
-        self.rng.shuffle(self.out)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_whatever_a_device_answers_the_kit_ends_well(seed):
-    report = run_checks(Fickle(seed), timeout_s=0.01, opening_s=1)
-    assert not report.holds
-    assert len(report.results) >= len(CHECKS)
-
-
-def test_a_device_that_falls_silent_is_given_up():
-    port = emulated_port()
-    inner = port.write
-    written = 0
-
-    def write(data, timeout_s):
-        nonlocal written
-        written += 1
-        if written < 60:
-            inner(data, timeout_s)
-
-    port.write = write
-    report = examined(port)
-    assert by_verdict(report, Verdict.BROKEN)
-    assert len(by_verdict(report, Verdict.NOT_RUN)) > 100
-    assert report.display_state.startswith("unknown")
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{"nx": 0}, {"format": 9}, {"max_payload": 20}],
-    ids=lambda changes: next(iter(changes)),
-)
-def test_an_impossible_info_ends_it(changes):
-    fields = {"format": 2, "nx": 3, "ny": 5, "nz": 7, "max_payload": 96} | changes
-    body = struct.pack(
-        "<BHHBBHHHBBHIII",
-        *(1, 0x1234, 7, 0, fields["format"], fields["nx"], fields["ny"], fields["nz"]),
-        *(2, 0, fields["max_payload"], 512, 0, 0),
-    )
-
-    class Odd(Pipe):
-        def write(self, data, _timeout_s):
-            session = packets.decode_segment(data.strip(b"\0"))
-            if session:
-                self.answer = body[:1] + session[4:6] + body[3:] + bytes(3)
-
-    pipe = Odd(
-        lambda pipe: packets.encode(packets.body(9, payload=pipe.__dict__.pop("answer", b"")))
-    )
-    pipe.answer = body + bytes(3)
-    report = run_checks(pipe, timeout_s=0.05, opening_s=0.3)
-    assert not report.holds
-    assert report.results[0].check.id == "5/answers"
-    assert by_verdict(report, Verdict.NOT_RUN)
-
-
-def test_an_interrupted_examination_puts_the_picture_back():
-    port = emulated_port(refresh=0)
-    device = AnnouncedDevice.from_info(_info(port))
-    port.write(packets.encode(packets.data(0, 0, ops.run(3), packets.CLEAR | packets.COMMIT)), 1)
-    before = port.bench.snapshot().pixels
-    assert before.count(0xFF) == 3 < device.voxel_count
-
-    def enough(_result):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        examined(port, ["7/move"], on_result=enough)
-    assert port.bench.snapshot().pixels == before
 
 
 # -- the list

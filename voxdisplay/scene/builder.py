@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,12 +23,13 @@ from voxdisplay.scene.columns import Columns, columns_of
 from voxdisplay.scene.environment import MovingEnvironment
 from voxdisplay.scene.evaluation_context import EvaluationContext, as_scene_error, scene_error
 from voxdisplay.scene.item import PartSpan, SceneItem
+from voxdisplay.scene.kept_values import KeptValues
 from voxdisplay.scene.objects import Group
 from voxdisplay.scene.placement import Placement, placed, transform_placement
 from voxdisplay.scene.values import ColorMap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from voxdisplay.compute.array_types import Floats
     from voxdisplay.curves import Curve
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from voxdisplay.scene.json_text import JsonText
     from voxdisplay.scene.scene_files import SceneFiles
     from voxdisplay.scene.scene_object import SceneObject
-
-T = TypeVar("T")
 
 MAX_ITEMS = 100_000
 """Most objects of a scene, repeats counted each."""
@@ -97,16 +96,13 @@ class SceneBuilder:
         self.files = files
         self.source = source
         self.duration = duration
-        self._kept: dict[tuple[Any, ...], Any] = {}
-        self._placements: dict[tuple[Any, ...], tuple[Placement, Placement, Placement]] = {}
-        self._items: dict[tuple[Any, ...], tuple[tuple[Any, ...], SceneItem]] = {}
+        self.kept = KeptValues()
         self.colors: dict[Any, Any] = {None: WHITE}  # of simple objects, by their texts
         self._columns: list[Columns] | None = None
         self._was_built = False
 
     def __getstate__(self) -> dict[str, Any]:
-        state = vars(self) | {"_kept": {}, "_placements": {}, "_items": {}}
-        return state | {"_columns": None, "_was_built": False}
+        return vars(self) | {"_columns": None, "_was_built": False}
 
     def build(self, time: float | None = None, fit: Placement | None = None) -> Built:
         """Return the items.
@@ -145,67 +141,21 @@ class SceneBuilder:
         if environment.varies and not self._was_built:
             return {}
         if self._columns is None:
-            moving = [
+            others = [
                 (i, scene_object)
                 for i, (path, scene_object) in enumerate(self._objects)
-                if not self.keeps((path, "shapes"), environment)
+                if not self.kept.keeps((path, "shapes"), environment)
             ]
-            self._columns = columns_of(moving)
+            self._columns = columns_of(others)
         found: dict[int, Curve] = {}
         for columns in self._columns:
             if environment.varies:
                 table = environment.table_of(columns.rows)
             else:
-                table = np.array(columns.rows) if columns.are_plain else None
+                table = np.array(columns.rows) if columns.is_plain else None
             if table is not None:
                 found.update(columns.build(table))
         return found
-
-    def once(
-        self,
-        key: tuple[Any, ...],
-        environment: Environment,
-        compute: Callable[..., T],
-        *arguments: Any,
-    ) -> T:
-        """Return ``compute(*arguments)``, which is kept if it does not depend on the time."""
-        if not isinstance(environment, MovingEnvironment):
-            return compute(*arguments)
-        key = (*key, id(environment))
-        if key in self._kept:
-            kept: T = self._kept[key]
-            return kept
-        table = environment.table
-        before, table.touched = table.touched, False
-        value = compute(*arguments)
-        if not table.touched:
-            self._kept[key] = value
-        table.touched |= before
-        return value
-
-    def keeps(self, key: tuple[Any, ...], environment: Environment) -> bool:
-        """Return whether `once` has kept a value."""
-        return (*key, id(environment)) in self._kept
-
-    def placement(self, key: tuple[Any, ...], outer: Placement | None, own: Placement) -> Placement:
-        """Return the map ``own``, then ``outer``: the same object as before for the same two."""
-        if outer is None:
-            return own
-        kept = self._placements.get(key)
-        if kept is None or kept[0] is not outer or kept[1] is not own:
-            kept = self._placements[key] = (outer, own, outer.after(own))
-        return kept[2]
-
-    def kept_item(self, key: tuple[Any, ...], parts: tuple[Any, ...]) -> SceneItem | None:
-        """Return the item that was made of the same parts before; None if they are others."""
-        kept = self._items.get(key)
-        if kept is None or any(a is not b for a, b in zip(kept[0], parts, strict=True)):
-            return None
-        return kept[1]
-
-    def keep_item(self, key: tuple[Any, ...], parts: tuple[Any, ...], item: SceneItem) -> None:
-        """Keep an item and the parts it is made of."""
-        self._items[key] = parts, item
 
 
 class _Run:
@@ -287,11 +237,11 @@ class _Run:
         place = outer
         if scene_object.transform:
             key = (path, "transform")
-            own = self.builder.once(
+            own = self.builder.kept.once(
                 key, environment, transform_placement, scene_object.transform, context
             )
             assert own is not None  # noqa: S101 - it has steps
-            place = self.builder.placement((path, id(environment)), outer, own)
+            place = self.builder.kept.placement((path, id(environment)), outer, own)
         first = len(self.items)
         if isinstance(scene_object, Group):
             if depth == MAX_DEPTH:
@@ -348,7 +298,7 @@ class _Run:
         color: Coloring,
     ) -> None:
         builder, environment, path = self.builder, context.environment, context.path
-        shapes, columns = builder.once(
+        shapes, columns = builder.kept.once(
             (path, "shapes"), environment, _shapes, scene_object, context
         )
         self.notes += context.notes
@@ -361,10 +311,10 @@ class _Run:
             coloring = self._coloring(scene_object, context, color, names)
         if len(self.items) + len(shapes) > MAX_ITEMS:
             raise SceneError(f"the scene has more than {MAX_ITEMS} objects", path=path)
-        stays = environment.varies and builder.keeps((path, "shapes"), environment)
+        stays = environment.varies and builder.kept.keeps((path, "shapes"), environment)
         for i, shape in enumerate(shapes):
             parts = (shape, place, coloring)
-            item = builder.kept_item((path, i, id(environment)), parts) if stays else None
+            item = builder.kept.item((path, i, id(environment)), parts) if stays else None
             if item is None:
                 image = shape
                 if place is not None:
@@ -382,7 +332,7 @@ class _Run:
                     self.fit,
                 )
                 if stays:
-                    builder.keep_item((path, i, id(environment)), parts, item)
+                    builder.kept.keep_item((path, i, id(environment)), parts, item)
             self.items.append(item)
 
     def _coloring(
@@ -398,10 +348,10 @@ class _Run:
         path = context.path
         if isinstance(color, ColorMap):
             key = (path, "color", names)
-            return self.builder.once(
+            return self.builder.kept.once(
                 key, context.environment, _colors_by_value, color, context, names
             )
-        return self.builder.once(
+        return self.builder.kept.once(
             (path, "color"), context.environment, read_colors, color, f"{path}.color"
         )
 

@@ -5,7 +5,6 @@ Must not know object types.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,17 +30,15 @@ class Columns:
     objects : list of SceneObject
     rows : list of tuple of str or float
         The numbers of each.
+    is_plain : bool
+        True if no number is an expression.
 
     """
 
     indices: list[int]
     objects: list[SceneObject]
     rows: list[tuple[str | float, ...]]
-
-    @property
-    def are_plain(self) -> bool:
-        """True if no number is an expression."""
-        return {type(number) for row in self.rows for number in row} == {float}
+    is_plain: bool
 
     def build(self, table: Floats) -> dict[int, Curve]:
         """Return the curves of the numbers, (n, k), by the objects' places.
@@ -55,12 +52,14 @@ class Columns:
 
 def columns_of(objects: Sequence[tuple[int, SceneObject]]) -> list[Columns]:
     """Return the objects that can be read in columns, with their places in the scene."""
-    groups: dict[tuple[type, int, bool], Columns] = defaultdict(lambda: Columns([], [], []))
+    groups: dict[tuple[type, int, bool], Columns] = {}
     for index, scene_object in objects:
         row = scene_object.column_numbers if scene_object.is_simple else None
         if row is not None:
-            plain = set(map(type, row)) == {float}
-            group = groups[type(scene_object), len(row), plain]
+            key = type(scene_object), len(row), set(map(type, row)) == {float}
+            if key not in groups:
+                groups[key] = Columns([], [], [], is_plain=key[2])
+            group = groups[key]
             group.indices.append(index)
             group.objects.append(scene_object)
             group.rows.append(row)

@@ -29,7 +29,8 @@ Rendered = tuple[Chunk, list[EncodedFrame]]
 # How often a chunk is tried again after the worker that rendered it has died.
 _ATTEMPTS = 3
 _DASK_WAIT_S = 10
-_PRELOADED = ("voxdisplay.shows.render_engines", "voxdisplay.scene.model")
+# What all workers need: the fork server imports it once.
+_PRELOADED = ["voxdisplay.shows.render_engines", "voxdisplay.scene.model"]
 _MAX_PORT = 65_535
 
 
@@ -107,12 +108,12 @@ def _render_until_broken(
 def _worker_context() -> BaseContext:
     """Return how workers are started: no fork of this process, which would copy threads' locks.
 
-    Where there is a fork server, it imports once what all of its workers need.
+    A fork server is the process's own: one that runs already is used as it is.
     """
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(_PRELOADED))
+    context.set_forkserver_preload(_PRELOADED)
     return context
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import sys
 
 import pytest
 from recordings import Spin, recording_format, write_recording
@@ -45,6 +47,24 @@ def test_processes_give_the_same_bytes(expected, tmp_path, jobs):
     path = tmp_path / "a.vxs"
     record(rendering(Spin()), path, engine=process_pool(jobs), chunk_frames=9)
     assert path.read_bytes() == expected
+
+
+class Parents:
+    """A rendering of no frames but its worker's parent, and a module that is there already."""
+
+    def render(self, first, count):
+        del first, count
+        yield os.getppid(), "voxdisplay.scene.model" in sys.modules
+
+
+@pytest.mark.skipif(
+    "forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a fork server"
+)
+def test_workers_are_forked_from_a_server_that_has_imported_what_they_need():
+    rendered = process_pool(2)(Parents(), [(0, 1), (1, 1)])
+    ((parent, preloaded),) = {found for _, (found,) in rendered}
+    assert parent != os.getpid()
+    assert preloaded
 
 
 def test_a_worker_that_dies_costs_nothing_but_its_chunks(expected, tmp_path):

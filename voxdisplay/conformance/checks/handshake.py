@@ -42,6 +42,11 @@ def info_fields(probe: Probe) -> None:
             info.rx_buffer,
         ),
         (not info.features & ~known, "no bit of features without a name", hex(info.features)),
+        (
+            info.minor or not info.features >> spec.FEATURE_SLABS,
+            "minor 1 with features from bit 9 on",
+            info.minor,
+        ),
     ):
         probe.require(bool(holds), must, came)
     for name in ("DIFF", "PALETTE"):

@@ -37,7 +37,7 @@ def can_hold(device: AnnouncedDevice) -> str:
     return feature("HOLD")(device) or refresh_tick(device)
 
 
-def _ticks(probe: Probe, attempt: int = 0) -> int:
+def _ticks(probe: Probe, attempt: int) -> int:
     """Return the ticks of a hold that is observed, longer with each attempt."""
     device = probe.device
     longest = min(spec.LIMIT_MAX_HOLD, spec.LIMIT_MAX_HELD * device.refresh // 1_000_000)

@@ -37,7 +37,8 @@ function setLink(...is) {
 async function reason() {
   try {
     const answer = await fetch(new URL(`live?origin=${encodeURIComponent(location.origin)}`, location.href));
-    return [403, history.length || 426].includes(answer.status) ? (await answer.text()).trim() : "";
+    const refused = answer.status === 403 || answer.status === 426 && !history.length;
+    return refused ? (await answer.text()).trim() : "";
   } catch { return ""; }
 }
 function refusal(why) {
