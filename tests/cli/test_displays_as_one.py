@@ -156,6 +156,8 @@ def test_axes_are_not_asked_of_parts_for_another_profile(command, tmp_path):
 
 def test_a_recording_is_made_for_the_whole_and_played_on_it(command, tmp_path):
     recording = tmp_path / "day.vxs"
+    scene = tmp_path / "scene.json"  # of another size, as that of the display counts
+    scene.write_text(SCENE.replace("[8, 5, 7]", "[16, 10, 14]"))
     code, _, err = command("record", "-o", recording, pitch_mm=[1, 1, 2])
     assert code == 0, err
     assert "scaled" in err  # round stays round on voxels that are no cubes

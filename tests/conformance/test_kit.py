@@ -12,6 +12,7 @@ from kit_runs import DEVICES, by_verdict, emulated_port, examined, explain, info
 
 from firmware_sim import crc
 from firmware_sim.packet_error import PacketError
+from firmware_sim.session import Session
 from voxdisplay.conformance import CHECKS, ops, packets
 from voxdisplay.conformance.announced_device import AnnouncedDevice
 from voxdisplay.conformance.catalogue import HANDSHAKE, SECTIONS
@@ -150,6 +151,18 @@ def test_a_hold_is_not_blamed_for_late_pauses(late, verdict, monkeypatch):
     report = examined(emulated_port(refresh=50_000), ["7.12/held", "7.12/longest-counts"])
     assert report.results[0].verdict is verdict, explain(report)
     assert report.results[1].verdict is (Verdict.HOLDS if late == 1 else verdict), explain(report)
+
+
+@pytest.mark.parametrize(("early", "verdict"), [(1, Verdict.HOLDS), (2, Verdict.BROKEN)])
+def test_a_hold_that_is_over_early_is_looked_at_twice(early, verdict, monkeypatch):
+    lengths = iter([0] * early)
+
+    def hold(old, self, ticks):
+        old(self, ticks and next(lengths, 1) * ticks)
+
+    around(monkeypatch, Session, "hold", hold)
+    report = examined(emulated_port(refresh=50_000), ["7.12/held"])
+    assert report.results[0].verdict is verdict, explain(report)
 
 
 def test_late_responses_are_waited_for_and_counted():
