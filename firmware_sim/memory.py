@@ -8,6 +8,7 @@ nothing of packets and ops: callers pass voxels that are on the grid.
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 from firmware_sim import spec
@@ -17,7 +18,6 @@ from firmware_sim.sparse_pixels import BLOCK_BITS, SparsePixels
 
 _COLOR: Final = 3  # bytes of a colour: red, green, blue
 _LOG_VOXELS: Final = 4096  # written voxels to collect before the digest is updated with them
-_DIRECT_VOXELS: Final = 256  # writes of so many voxels update the digest at once
 _PENDING_VOXELS: Final = 1 << 16  # written voxels to collect before their blocks are found
 _RUN_VOXELS: Final = 1 << 16  # longest run to write at once, to bound what a copy of it takes
 
@@ -89,6 +89,8 @@ class Page:
         self.volume = volume
         self.pixel_size = pixel_size
         self.stored = SparsePixels(volume, pixel_size)
+        self._log_bytes = _LOG_VOXELS * pixel_size
+        self._run_start = self._run_end = -1  # the last write, if of consecutive voxels
         self.clear()
 
     def clear(self) -> None:
@@ -103,15 +105,16 @@ class Page:
 
     def copy_from(self, other: "Page") -> None:
         """Copy pixels and palette of another page of the same size."""
+        self._settle()
         self._find_blocks()
-        other._find_blocks()  # noqa: SLF001 - of its own kind
+        other._settle()  # noqa: SLF001 - of its own kind
+        other._find_blocks()  # noqa: SLF001
         blocks = None
         if self._equal_since is other._equal_since:  # noqa: SLF001
             blocks = self._changed_blocks | other._changed_blocks  # noqa: SLF001
         self.stored.copy_from(other.stored, blocks)
         self.palette[:] = other.palette
         self._digest = other.digest
-        self._clear_log()
         self._equal_since = other._equal_since = object()  # noqa: SLF001
         self._changed_blocks.clear()
         other._changed_blocks.clear()  # noqa: SLF001
@@ -132,7 +135,11 @@ class Page:
             Pixels of consecutive voxels on the grid, at least one.
         """
         old = self.stored.exchange_run(start, pixels)
-        self._log_replaced(range(start, start + len(pixels) // self.pixel_size), old, pixels)
+        if start != self._run_end:
+            self._end_run()
+            self._run_start = start
+        self._run_end = start + len(pixels) // self.pixel_size
+        self._log_pixels(old, pixels)
 
     def fill(self, starts: Sequence[int], count: int, pixel: bytes) -> None:
         """Write the same pixel to runs of voxels in scan order.
@@ -148,10 +155,11 @@ class Page:
         """
         dark = not any(pixel)
         run = pixel * min(count, _RUN_VOXELS)
-        for start in starts:
-            if count <= _RUN_VOXELS and not dark:
+        if count <= _RUN_VOXELS and not dark:
+            for start in starts:
                 self.put(start, run)
-                continue
+            return
+        for start in starts:
             at, end = start, start + count
             while (at := self.stored.next_stored(at, end) if dark else at) < end:
                 length = min(end - at, _RUN_VOXELS)
@@ -169,7 +177,9 @@ class Page:
             The pixel.
         """
         old = self.stored.exchange(indices, pixel)
-        self._log_replaced(indices, old, pixel * len(indices))
+        self._end_run()
+        self._log.append(indices)
+        self._log_pixels(old, pixel * len(indices))
 
     def set_colors(self, first: int, colors: bytes) -> None:
         """Set entries of the palette.
@@ -184,41 +194,48 @@ class Page:
         place = slice(first * _COLOR, first * _COLOR + len(colors))
         gain = -self._color_terms(place)
         self.palette[place] = colors
-        self._digest += gain + self._color_terms(place)
+        self._digest = (self._digest + gain + self._color_terms(place)) & 0xFFFFFFFF
 
     # The digest
 
     @property
     def digest(self) -> int:
         """Digest of the page as it is now, section 8."""
-        size = self.pixel_size
-        gain = mix_sum(self._written, self._new, size) - mix_sum(self._written, self._old, size)
-        self._digest = (self._digest + gain) & 0xFFFFFFFF
-        self._clear_log()
+        self._settle()
         return self._digest
 
     def _clear_log(self) -> None:
         """Begin a new log of writes that are not in the digest yet."""
-        self._written = array("Q")  # indices in the order of the writes, possibly repeated
+        self._log: list[Sequence[int]] = []  # indices, in the order of the writes
         self._old = bytearray()  # pixels before each write
         self._new = bytearray()  # pixels after it
+        self._run_end = -1
 
-    def _log_replaced(self, indices: Sequence[int], old: bytes | bytearray, new: bytes) -> None:
-        if old == new:
-            return
-        size = self.pixel_size
-        self._writes.append(indices)
-        self._pending_voxels += len(indices)
-        if self._pending_voxels > _PENDING_VOXELS:
-            self._find_blocks()
-        if len(indices) >= _DIRECT_VOXELS:
-            self._digest += mix_sum(indices, new, size) - mix_sum(indices, old, size)
-            return
-        self._written.extend(indices)
+    def _end_run(self) -> None:
+        """Take consecutive voxels that were written in one or more pieces for one write."""
+        if self._run_end >= 0:
+            self._log.append(range(self._run_start, self._run_end))
+            self._run_end = -1
+
+    def _log_pixels(self, old: bytes | bytearray, new: bytes) -> None:
         self._old += old
         self._new += new
-        if len(self._written) >= _LOG_VOXELS:
-            self._digest = self.digest
+        if len(self._new) >= self._log_bytes:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Update the digest with all logged writes."""
+        self._end_run()
+        log, size = self._log, self.pixel_size
+        if self._old != self._new:
+            indices = log[0] if len(log) == 1 else array("Q", chain.from_iterable(log))
+            gain = mix_sum(indices, self._new, size) - mix_sum(indices, self._old, size)
+            self._digest = (self._digest + gain) & 0xFFFFFFFF
+            self._writes += log
+            self._pending_voxels += len(indices)
+            if self._pending_voxels > _PENDING_VOXELS:
+                self._find_blocks()
+        self._clear_log()
 
     # Blocks
 

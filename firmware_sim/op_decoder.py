@@ -92,27 +92,18 @@ class _PacketDecoder:
         self._fade: fades.Fade | None = None
         self.hold_ticks = 0
         self._cursor = 0
-        self._pen = device.pixel_format.full
+        self._pen = device.pixel_format.full  # with a fade, that of its next voxel
+        self._written = False  # True if the fade has written the voxel at the cursor
 
     # Cursor and pen, which a fade depends on (7.9)
 
-    @property
-    def _cursor(self) -> int:
-        return self._cursor_index
+    def _set_cursor(self, index: int) -> None:
+        self._cursor = index
+        self._written = False
 
-    @_cursor.setter
-    def _cursor(self, index: int) -> None:
-        self._cursor_index = index
-        self._written = False  # True if the fade has written the voxel at the cursor
-
-    @property
-    def _pen(self) -> bytes:
-        return self._fade.pixel if self._fade else self._plain_pen
-
-    @_pen.setter
-    def _pen(self, pixel: bytes) -> None:
+    def _set_pen(self, pixel: bytes) -> None:
+        self._pen = pixel
         self._fade = None
-        self._plain_pen = pixel
 
     def _plot_row(self, voxels: "array[int]", end: int, *, again: bool = False) -> None:
         """Write voxels in their order, and set the cursor to the end.
@@ -121,11 +112,12 @@ class _PacketDecoder:
         """
         if not self._fade:
             self._page.plot(voxels, self._pen)
-            self._cursor = end
+            self._set_cursor(end)
             return
         for voxel, pixel in self._fade.pens(voxels, again=again and self._written):
             self._page.plot(array("Q", (voxel,)), pixel)
-        self._cursor = end
+        self._pen = self._fade.pixel
+        self._set_cursor(end)
         self._written = True
 
     # Bounds
@@ -158,12 +150,12 @@ class _PacketDecoder:
         pixel = self._operands.take(self._format.size)
         if self._device.mono and pixel[0] > 1:
             raise self._operands.error(spec.CODE_PIXEL, "a pixel of MONO1 is 00 or 01")
-        self._pen = pixel
+        self._set_pen(pixel)
 
     def move(self, _: int) -> None:
         place = self._operands.coordinates()
         self._check_coordinates(place)
-        self._cursor = self._grid.index(*place)
+        self._set_cursor(self._grid.index(*place))
 
     def hold(self, _: int) -> None:
         self.hold_ticks = max(self.hold_ticks, self._operands.byte())
@@ -195,6 +187,7 @@ class _PacketDecoder:
         size = 1 if self._format.code == spec.FORMAT_INDEX8 else 3
         colors = fades.split_colors(self._operands.take(size * stops), size)
         self._fade = fades.Fade(self._format.code, fades.Blend(colors, count, place))
+        self._pen = self._fade.pixel
         self._written = False
 
     # Chains
@@ -208,7 +201,7 @@ class _PacketDecoder:
         count = self._operands.byte() + 1
         crumbs = self._operands.packed(count, 2)
         self._check_coordinates(place)
-        self._cursor = self._grid.index(*place)
+        self._set_cursor(self._grid.index(*place))
         self._draw_chain(octant, count, crumbs)
 
     def arc(self, _: int) -> None:
@@ -257,12 +250,13 @@ class _PacketDecoder:
     # Runs
 
     def skip(self, operand: int) -> None:
-        self._cursor += self._check_room(self._operands.count(operand))
+        self._set_cursor(self._cursor + self._check_room(self._operands.count(operand)))
 
     def run(self, operand: int) -> None:
         count = self._check_room(self._operands.count(operand))
-        self._page.fill((self._cursor,), count, self._pen)
-        self._cursor += count
+        start = self._cursor
+        self._page.fill((start,), count, self._pen)
+        self._set_cursor(start + count)
 
     def literal(self, operand: int) -> None:
         count = self._operands.count(operand)
@@ -285,8 +279,8 @@ class _PacketDecoder:
 
     def _write_pixels(self, count: int, pixels: bytes) -> None:
         self._page.put(self._cursor, pixels)
-        self._cursor += count
-        self._pen = pixels[-self._format.size :]
+        self._set_cursor(self._cursor + count)
+        self._set_pen(pixels[-self._format.size :])
 
     # Shapes
 
@@ -303,7 +297,7 @@ class _PacketDecoder:
         self._check_coordinates(place)
         for starts, count in box(self._grid, self._cursor, place):
             self._page.fill(starts, count, self._pen)
-        self._cursor = self._grid.index(*place)
+        self._set_cursor(self._grid.index(*place))
 
     def dots(self, _: int) -> None:
         x, y, z = self._operands.coordinate_lists(self._operands.byte() + 1)
@@ -314,7 +308,7 @@ class _PacketDecoder:
             self._plot_row(voxels, voxels[-1])
             return
         self._page.plot(array("Q", set(voxels)), self._pen)
-        self._cursor = voxels[-1]
+        self._set_cursor(voxels[-1])
 
     def brick(self, level: int) -> None:
         x, y, z = (axis << level for axis in self._operands.coordinates())

@@ -219,16 +219,18 @@ class SparsePixels:  # noqa: PLW1641 - not hashable: its pixels change
             The pixels before.
         """
         table, size = self._table, self.pixel_size
-        begin, end = start * size, start * size + len(pixels)
+        begin = start * size
+        end = begin + len(pixels)
         first = start >> BLOCK_BITS
         last = (end - 1) // size >> BLOCK_BITS
         offset = table[first]
         offsets = [table[block] for block in range(first, last + 1)] if last > first else []
         pool = table.pool
         if offsets.count(offset) == len(offsets):  # in one piece in the pool, too
-            place = slice(offset + begin, offset + end)
-            old = pool[place]
-            pool[place] = pixels
+            begin += offset
+            end += offset
+            old = pool[begin:end]
+            pool[begin:end] = pixels
             return old
         block_bytes = size << BLOCK_BITS
         old = bytearray()

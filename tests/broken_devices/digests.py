@@ -46,8 +46,8 @@ def digest_forgets_to_take_out(patch):
     around(
         patch,
         Page,
-        "_log_replaced",
-        lambda old, self, i, before, now: old(self, i, bytes(len(before)), now),
+        "_log_pixels",
+        lambda old, self, before, now: old(self, bytes(len(before)), now),
     )
 
 

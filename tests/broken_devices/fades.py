@@ -73,12 +73,11 @@ def fade_begins_anew(patch):
 
 @mutant("7.9/fade-ended", spreads=True)
 def fade_survives_a_pen(patch):
-    def set_pen(self, pixel):
-        self._plain_pen = pixel
-        if not hasattr(self, "_fade"):
-            self._fade = None
+    def set_pen(old, self, pixel):
+        if not self._fade:
+            old(self, pixel)
 
-    patch.setattr(Decoder, "_pen", property(Decoder._pen.fget, set_pen))
+    around(patch, Decoder, "_set_pen", set_pen)
 
 
 @mutant("7.9/ramps", spreads=True)

@@ -99,7 +99,7 @@ def holds_outlive_their_session(patch):
 def hold_resets_the_pen(patch):
     def hold(self, _):
         self.hold_ticks = max(self.hold_ticks, self._operands.byte())
-        self._pen = self._format.full
+        self._set_pen(self._format.full)
 
     _replace(patch, hold)
 
@@ -108,7 +108,7 @@ def hold_resets_the_pen(patch):
 def hold_resets_the_cursor(patch):
     def hold(self, _):
         self.hold_ticks = max(self.hold_ticks, self._operands.byte())
-        self._cursor = 0
+        self._set_cursor(0)
 
     _replace(patch, hold)
 
