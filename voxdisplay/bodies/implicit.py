@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -11,7 +11,7 @@ import numpy as np
 from voxdisplay.bodies.body import Body, Fill, check_fill, transform_bounds
 from voxdisplay.bodies.functions import Callback, ScalarFunction
 from voxdisplay.bodies.geometry import Bounds, Geometry
-from voxdisplay.compute.array_types import Floats
+from voxdisplay.compute.array_types import Bools, Floats
 from voxdisplay.curves import arguments
 from voxdisplay.curves.arguments import ArgumentError
 from voxdisplay.curves.formula_arguments import Formula
@@ -48,21 +48,25 @@ class ImplicitFunction(Geometry):
         The box, possibly infinite.
     wires : tuple of (n, 3) float64 arrays
         Polylines near which there must be voxels, however thin the surface is.
+    inside : callable, optional
+        Of x, y and z, where the function is taken, in a box that is turned; elsewhere it is nan.
 
     """
 
     function: SpaceFunction
     bounds: Bounds
     wires: tuple[Floats, ...] = ()
+    inside: Callable[[Floats, Floats, Floats], Bools] | None = None
 
     def transformed(self, matrix: Floats, offset: Floats) -> ImplicitFunction:
         """Return the function of the points ``matrix @ p + offset``."""
         inverse: Floats = np.linalg.inv(matrix).astype(np.float64)
-        function = _Mapped(self.function, self.bounds, inverse, offset)
+        function = _Mapped(self.function, self.bounds, self.inside, inverse, offset)
         return ImplicitFunction(
             function,
             transform_bounds(self.bounds, matrix, offset),
             tuple(wire @ matrix.T + offset for wire in self.wires),
+            function.is_inside,
         )
 
 
@@ -72,6 +76,7 @@ class _Mapped:
 
     inner: SpaceFunction
     bounds: Bounds
+    inside: Callable[[Floats, Floats, Floats], Bools] | None
     inverse: Floats
     offset: Floats
 
@@ -80,15 +85,28 @@ class _Mapped:
         return self.inner.always_defined
 
     def __call__(self, x: Floats, y: Floats, z: Floats) -> Floats:
+        at = self._before(x, y, z)
+        return np.where(self._holds(at), self.inner(*at), np.nan)
+
+    def is_inside(self, x: Floats, y: Floats, z: Floats) -> Bools:
+        """Return where points are in the box, or in a voxel that reaches into it."""
+        at = self._before(x, y, z)
+        holds = self._holds(at)
+        return holds if self.inside is None else holds & self.inside(*at)
+
+    def _before(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the points that are mapped here."""
         d = x - self.offset[0], y - self.offset[1], z - self.offset[2]
-        at = [sum(m * each for m, each in zip(row, d, strict=True)) for row in self.inverse]
-        values = self.inner(*at)
+        x, y, z = (sum(m * each for m, each in zip(row, d, strict=True)) for row in self.inverse)
+        return x, y, z
+
+    def _holds(self, at: tuple[Floats, Floats, Floats]) -> Bools:
         slack = 0.5 * np.abs(self.inverse).sum(axis=1)  # a voxel that reaches into the box is in it
+        holds = np.ones(np.broadcast_shapes(*(each.shape for each in at)), dtype=bool)
         for axis, (low, high) in enumerate(zip(*self.bounds, strict=True)):
             if np.isfinite(low) or np.isfinite(high):
-                outside = (at[axis] < low - slack[axis]) | (at[axis] > high + slack[axis])
-                values = np.where(outside, np.nan, values)
-        return values
+                holds &= (at[axis] >= low - slack[axis]) & (at[axis] <= high + slack[axis])
+        return holds
 
     def enclosure(self, x: Interval, y: Interval, z: Interval) -> Interval | None:
         d = x - self.offset[0], y - self.offset[1], z - self.offset[2]

@@ -11,6 +11,7 @@ import numpy as np
 
 from voxdisplay.argument_checks import choice
 from voxdisplay.errors import BodyError
+from voxdisplay.voxelization.clipping_note import clipping_note
 from voxdisplay.voxelization.voxel_box import VoxelBox
 
 if TYPE_CHECKING:
@@ -74,6 +75,14 @@ def voxelize_body(body: Body, box: VoxelBox, *, certified: bool = False) -> Voxe
     voxelize: Voxeliser = getattr(import_module(f"{package}.surfaces.{module}"), name)
     voxels = voxelize(geometry, box, body, certified=certified)
     notes = (*getattr(geometry, "notes", ()), *voxels.notes)
+    cut = clipping_note(
+        geometry,
+        body,
+        voxels,
+        lambda wider: voxelize(geometry, wider, body, certified=False).voxels,
+    )
+    if cut:
+        notes = (*notes, cut)
     return replace(voxels, body=body, notes=notes, seconds=time.perf_counter() - began_s)
 
 

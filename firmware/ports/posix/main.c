@@ -167,24 +167,23 @@ static int run_terminal(uint32_t refresh)
         double left = due - now();
         int timeout = refresh == 0 ? -1 : left <= 0 ? 0 : (int)(left * 1000) + 1;
 
-        if (poll(&wait, 1, timeout) > 0) {
-            uint8_t bytes[1024];
-            ssize_t count = read(out_file, bytes, sizeof bytes);
+        uint8_t bytes[1024];
+        ssize_t count = 0;
 
+        if (poll(&wait, 1, timeout) > 0) {
+            count = read(out_file, bytes, sizeof bytes);
             if (count < 0 && errno != EINTR) {
                 perror("device: the pseudo-terminal is gone");
                 return 1;
             }
-            if (count > 0) {
-                take(bytes, (size_t)count);
-            }
         }
-        if (refresh != 0 && now() >= due) {
+        /* A busy machine may run this late: a display would have refreshed meanwhile, each time. */
+        while (refresh != 0 && now() >= due) {
             tick();
             due += period;
-            if (due < now()) {
-                due = now() + period;
-            }
+        }
+        if (count > 0) {
+            take(bytes, (size_t)count);
         }
         flush_out();
     }

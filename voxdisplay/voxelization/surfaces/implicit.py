@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from voxdisplay.bodies.body import Body
-    from voxdisplay.bodies.implicit import ImplicitFunction, SpaceFunction
+    from voxdisplay.bodies.implicit import ImplicitFunction
     from voxdisplay.compute.array_types import Bools, Floats, Ints
 
 _BLOCK_SIZE = 1 << 18  # values at a time, so that they stay in a core's cache
@@ -46,7 +46,7 @@ def voxelize_implicit(
     region = _region(geometry, box)
     if region.size == 0:
         return VoxelSet(box, np.empty(0, dtype=np.int64), body.kind, certified=certified)
-    scan = _Scan(geometry.function, region, solid=body.kind == "solid")
+    scan = _Scan(geometry, region, solid=body.kind == "solid")
     # A voxel's cross ends halfway to the centres beside it: those around the region count.
     centres = region.expanded(1)
     bricks = prune(geometry.function, centres)
@@ -115,8 +115,9 @@ def _voxels(place: Ints, origin: Ints, sides: tuple[int, int, int]) -> Ints:
 class _Scan:
     """Signs at centres, block by block, and the voxels that they light."""
 
-    def __init__(self, function: SpaceFunction, region: VoxelBox, *, solid: bool) -> None:
-        self.function = function
+    def __init__(self, geometry: ImplicitFunction, region: VoxelBox, *, solid: bool) -> None:
+        self.function = geometry.function
+        self.is_taken = geometry.inside
         self.region = region
         self.solid = solid
         # Of solids all centres, those around the region too, and room for whole bricks.
@@ -148,9 +149,11 @@ class _Scan:
         inside = value <= 0
         absent = np.isnan(value)
         has_gaps = bool(absent.any())
-        self.values += value.size
-        if has_gaps:
-            self.missing += int(absent.sum())
+        cut = 0  # where the function is not taken
+        if self.is_taken is not None:
+            cut = value.size - int(np.count_nonzero(self.is_taken(*axes)))
+        self.values += value.size - cut
+        self.missing += int(np.count_nonzero(absent)) - cut
         if self.solid:
             self._store(inside, origin)
             return

@@ -9,6 +9,7 @@ from surface_checks import centres, leaks, mask
 from voxdisplay.bodies.implicit import Implicit
 from voxdisplay.bodies.primitives import Sphere
 from voxdisplay.errors import BodyError, CurveError
+from voxdisplay.voxelization import voxelize
 from voxdisplay.voxelization.body_voxelization import voxelize_body
 from voxdisplay.voxelization.surfaces import implicit
 from voxdisplay.voxelization.voxel_box import VoxelBox
@@ -159,3 +160,20 @@ def test_functions_of_numbers_and_of_wrong_shapes() -> None:
 def test_hostile_functions_end() -> None:
     for f in ("sin(1e9*x)*sin(1e9*y)*sin(1e9*z)", "9**9**x", "x**1000 - 1", "1/sin(1e6*x)"):
         voxelized(Implicit(f), certified=True)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_box_that_is_turned_is_no_gap(times):
+    """Outside its box a function is not taken, which is not to have no value."""
+    body = Implicit("sqrt(x + 6) - 2", box=((-5, -5, -5), (5, 5, 5)))
+    for _ in range(times):
+        body = body.transformed([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
+    voxels = voxelize(body.transformed(np.eye(3), (10, 10, 10)))
+    assert len(voxels)
+    assert voxels.notes == ()
+
+
+def test_gaps_are_counted_inside_a_turned_box_alone():
+    body = Implicit("sqrt(x) - 2", box=((-5, -5, -5), (5, 5, 5)))
+    (note,) = voxelize(body.transformed([[0, -1, 0], [1, 0, 0], [0, 0, 1]], (10, 10, 10))).notes
+    assert note.startswith("f has no value at 50 %")
