@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from voxdisplay.argument_checks import number, wrong_kind
+from voxdisplay.argument_checks import choice, number, wrong_kind
 from voxdisplay.bodies.body import Fill, check_fill
 from voxdisplay.bodies.geometry import TriangleMesh
 from voxdisplay.bodies.glyphs import MAX_CHARACTERS, Glyphs, choose_font, lacking_error
@@ -28,6 +28,10 @@ _MAX_LINES = 1000
 _CLOSE = 0.02  # voxels by which outlines may be off
 _FINE = 2000  # and parts of a capital's height
 _MAX_SIZE = 1e9
+# Shares of a line's ends in the place that is at `at`; the left end is where the pen begins.
+_SHARES = {"left": (0.0, 0.0), "center": (0.5, 0.5), "right": (0.0, 1.0)}
+
+Align = Literal["left", "center", "right"]
 
 
 class Text(TriangulatedBody):
@@ -38,7 +42,7 @@ class Text(TriangulatedBody):
     text : str
         One or more lines. Any script that the font has; lines of mixed direction are ordered.
     at : (3,) array
-        Left end of the first line's baseline, in voxels.
+        Left end of the first line's baseline, in voxels; its middle or right end by ``align``.
     height : float
         Height of a capital letter, in voxels.
     direction : (3,) array
@@ -49,6 +53,8 @@ class Text(TriangulatedBody):
         A TrueType or OpenType font. Default: that of the extra, or one of the system.
     depth : float, optional
         Thickness of the letters, away from the reader. Default: flat.
+    align : {"left", "center", "right"}
+        Which place of each line is at ``at``; the last two by what of it can be seen.
     fill : {"shell", "solid"}
         With a depth: whether the letters are hollow. Flat ones are filled always.
 
@@ -71,6 +77,7 @@ class Text(TriangulatedBody):
         up: ArrayLike = (0, 0, 1),
         font: bytes | str | os.PathLike[str] | None = None,
         depth: float | None = None,
+        align: Align = "left",
         fill: Fill = "shell",
     ) -> None:
         if not isinstance(text, str):
@@ -83,6 +90,8 @@ class Text(TriangulatedBody):
         start = arguments.vector("at", at)
         size = _positive("height", height)
         thickness = None if depth is None else _positive("depth", depth)
+        choice("align", align, tuple(_SHARES))
+        shares = _SHARES[align]
         frame = _frame(arguments.vector("direction", direction), arguments.vector("up", up))
         letters = "".join(lines)
         glyphs = choose_font(letters) if font is None else _font(font)
@@ -94,9 +103,11 @@ class Text(TriangulatedBody):
         regions: dict[int, Region] = {}
         parts = []
         for row, line in enumerate(lines):
+            placed = glyphs.set_line(line, tolerance)
+            left = float(np.dot(shares, _ends(placed)))
             drop = row * glyphs.line_height
-            for outlines, x, y in glyphs.set_line(line, tolerance):
-                place = np.array([x, y - drop])
+            for outlines, x, y in placed:
+                place = np.array([x - left, y - drop])
                 self._outlines += [outline + place for outline in outlines]
                 if id(outlines) not in regions:
                     regions[id(outlines)] = triangulate(outlines)
@@ -122,6 +133,7 @@ class Text(TriangulatedBody):
             "up": frame[1],
             "font": glyphs.name,
             "depth": thickness,
+            "align": align,
             "fill": self.fill,
         }
 
@@ -132,6 +144,14 @@ class Text(TriangulatedBody):
             Polyline(np.concatenate((outline, outline[:1])) * scale @ frame[:2] + start)
             for outline in self._outlines
         )
+
+
+def _ends(placed: list[tuple[list[Floats], float, float]]) -> tuple[float, float]:
+    """Return the left and the right end of what can be seen of a line, in units of the font."""
+    across = [outline[:, 0] + x for outlines, x, _ in placed for outline in outlines]
+    if not across:
+        return 0.0, 0.0
+    return min(float(each.min()) for each in across), max(float(each.max()) for each in across)
 
 
 def _positive(name: str, value: float) -> float:

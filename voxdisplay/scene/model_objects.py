@@ -169,7 +169,11 @@ class Text(EnclosingObject, tag="text", frozen=True):
     ]
     at: Annotated[
         Vector,
-        Meta(title="At", description="The left end of the first line's base line, in voxels."),
+        Meta(
+            title="At",
+            description="The left end of the first line's base line, in voxels; its middle or "
+            "right end by `align`.",
+        ),
     ]
     height: Annotated[
         Number, Meta(title="Height", description="Height of a capital letter, in voxels.")
@@ -196,6 +200,10 @@ class Text(EnclosingObject, tag="text", frozen=True):
             description="Thickness of the letters, in voxels; flat when left out.",
         ),
     ] = None
+    align: Annotated[
+        Literal["left", "center", "right"],
+        Meta(title="Align", description="Which place of each line is at `at`."),
+    ] = "left"
 
     def build_body(self, context: EvaluationContext) -> Body:
         """Return the body."""
@@ -207,5 +215,6 @@ class Text(EnclosingObject, tag="text", frozen=True):
             up=context.numbers("up", self.up),
             font=None if self.font is None else context.file_bytes("font", self.font),
             depth=None if self.depth is None else context.number("depth", self.depth),
+            align=self.align,
             fill=self.fill,
         )

@@ -287,3 +287,19 @@ def test_wrong_arguments_are_named(arguments, words):
 def test_without_crossings_large_outlines_are_still_regions(monkeypatch):
     monkeypatch.setattr(outline_triangulation, "_MAX_PAIRS", 0)
     assert area_of(triangulate([SQUARE, SQUARE[::-1] / 2 + 2])) == pytest.approx(48)
+
+
+@pytest.mark.parametrize(("align", "share"), [("center", 0.5), ("right", 1.0)])
+def test_each_line_is_aligned_by_what_can_be_seen(align, share):
+    at, lines = (5.0, 7.0, 9.0), ["i", " Ada ", "Lovelace"]
+    for line in lines:
+        low, high = vd.Text(line, at, 12, align=align).bounds()
+        assert low[0] + share * (high[0] - low[0]) == pytest.approx(at[0])
+    together = vd.Text("\n".join(lines), at, 12, align=align).bounds()
+    widest = vd.Text(lines[-1], at, 12, align=align).bounds()
+    assert [end[0] for end in together] == pytest.approx([end[0] for end in widest])
+
+
+def test_an_empty_line_may_be_aligned():
+    aligned = vd.Text("A\n\nB", (0, 0, 0), 12, align="center")
+    assert vd.Text("A", (0, 0, 0), 12, align="center").bounds()[1][2] == aligned.bounds()[1][2]
