@@ -108,7 +108,6 @@ function updateStatus() {
   }
   if (frame.digest) $("fact-Digest").className = frame.proved[1];
 }
-setInterval(updateStatus, 400);
 let spoken = null;
 setInterval(() => {
   const frame = current();

@@ -112,4 +112,6 @@ else connect();
 new ResizeObserver(schedule).observe(area);
 if (!inCell) area.focus({ preventScroll: true });  // a notebook keeps the focus
 updateStatus();
+// Not before: between two scripts of a page that loads slowly there is time for a timer.
+setInterval(updateStatus, 400);
 schedule();
